@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Candidate

@@ -17,8 +17,8 @@ from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
-from armid_ros.diagnosis.data.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
+from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import (
@@ -216,17 +216,17 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     left, resting = _excesses(asked, chosen, rest, unseen, bool(found))
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
-    minor = small_print(explanation.minor, max(total, 1e-300), tried, arm)
+    small = sorted(explanation.minor, key=lambda trial: -trial.gain)
+    minor = small_print(small, max(total, 1e-300), tried, arm)
     matters = settings.material * evidence.torque_rms
+    refitted = frees_body(explanation.base, explanation.given)
     word = decide(
         found,
         not_repeating(floors, arm, settings.thresholds, matters) if measured else (),
         [*left, *resting],
         arm,
         NOISE if measured else chosen.floor_in_words,
-        _as_it_is(arm, _sure(evidence, chosen), settings)
-        if frees_body(explanation.base, explanation.given)
-        else None,
+        _as_it_is(arm, _sure(evidence, chosen), settings) if refitted else None,
         minor,
     )
     gap = measure_gap(explanation, unseen)
@@ -245,7 +245,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         data=tuple(data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
-        refitted=explanation.base is not None,
+        refitted=refitted,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),

@@ -30,8 +30,8 @@ class Thresholds:
     rival_z : float
         Deviations by which a name has to be ahead of another one to exclude it.
     tie : float
-        Share of the same by which it has to be ahead as well, and share of a simpler cause, in
-        squares, that what contains it leaves at most.
+        Twice the share of the same by which it has to be ahead as well, and share of a simpler
+        cause, in squares, that what contains it leaves at most.
     far : float
         Lead over its own share that excludes another one however few blocks show it, and that
         a link, which never changes, or a load of one that is not at the end of the arm has to have

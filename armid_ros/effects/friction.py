@@ -241,7 +241,7 @@ class ThermalFriction(Effect):
     shown_by = 'the same motion cold and after half an hour of work'
     friction = True
     quantities = (Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),)
-    shapes = (Shape('warm_up_time', 's', 5.0, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
+    shapes = (Shape('warm_up_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/ddFv = (1 - exp(-t / T)) dq [rad/s], shape (N, n, P)."""

@@ -110,7 +110,7 @@ class TorqueDrift(TorqueReading):
     summary = 'torque reading that drifts with time, whatever the motion'
     shown_by = 'the same static hold, repeated for half an hour'
     quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
-    shapes = (Shape('drift_time', 's', 5.0, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
+    shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
     def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """Return times that differ on a recording: beyond three of it, a drift is a line."""

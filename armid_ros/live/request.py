@@ -10,8 +10,8 @@ import time
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding
-from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.errors import ArmidError
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.live.onset import onset

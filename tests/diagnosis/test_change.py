@@ -5,6 +5,7 @@
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.search.explain import Search
 from armid_ros.identification import identify
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
@@ -145,3 +146,35 @@ def test_drag_of_three_joints_is_no_person_who_slows_them_down(upright):
     (found,) = asked(upright, before, after, new).findings
     assert (found.name, found.joints) == ('viscous_friction', upright.robot.joints)
     assert np.allclose(found.values, drag, atol=0.05)
+
+
+@pytest.mark.parametrize('with_baseline', [True, False])
+def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
+    """Equal periods differ by a push, and a misfit that was known before has none in it."""
+
+    def push(motion, tau):
+        late = (motion.t - 0.75 * motion.t[-1]) / 0.5
+        return np.outer(np.exp(-(late**2)), [0.0, 1.0])
+
+    before = bench.recordings(seed=1)
+    model = identify(bench.arm, before, rng=np.random.default_rng(0))
+    known = {'baseline': before} if with_baseline else {'misfit': model.misfit({})}
+    for hidden, wanted in ((None, 'consistent'), (push, 'unknown')):
+        now = bench.recordings(hidden, seed=2)
+        found = diagnose(model.arm, now, rng=np.random.default_rng(0), **known)
+        assert (found.verdict, found.findings) == (wanted, ()), found.summary
+
+
+def test_a_value_that_may_all_have_been_there_before_is_no_name(bench):
+    """The model lacks a ripple of which 0.1 or 0.2 N m were there of 0.3 that are there now."""
+
+    def day(size, seed):
+        return bench.recordings(lambda m, tau: size * np.sin(8.0 * m.q) * [0.0, 1.0], seed)
+
+    for before, names in ((0.1, ['torque_ripple']), (0.2, [])):
+        found = diagnose(
+            bench.arm, day(0.3, 0), baseline=day(before, 5), rng=np.random.default_rng(0)
+        )
+        assert [one.name for one in found.findings] == names, found.summary
+        for one in found.findings:
+            assert excludes_zero(np.array(one.values), np.array(one.std)).any()

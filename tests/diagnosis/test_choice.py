@@ -9,8 +9,8 @@ from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.choice import (
     _as_good,
     _beside_a_correction,
+    _noise_within,
     _stands,
-    _told_by,
 )
 from armid_ros.diagnosis.search.explanation import at_floor
 from armid_ros.diagnosis.search.trial import Candidate
@@ -84,18 +84,15 @@ def test_what_may_be_a_correction_is_asked_about(bench, names, rivals, asked):
     assert _beside_a_correction(explanation(bench, *names, rivals=rivals)) == asked
 
 
-@pytest.mark.parametrize(
-    ('repeats', 'recorded', 'wanted'), [(False, 0.01, 1.0), (False, 0.02, 5.0), (True, 0.01, 5.0)]
-)
-def test_assumed_noise_is_no_more_than_what_a_baseline_left(repeats, recorded, wanted):
+@pytest.mark.parametrize(('recorded', 'wanted'), [(0.01, 1.0), (0.02, 3.0)])
+def test_noise_is_no_more_than_a_misfit_or_rough(recorded, wanted):
     """A fault that is as rough as noise would hide itself; fewer samples have more of it."""
-    before = SimpleNamespace(data=[SimpleNamespace(period_recorded=0.01)] * 3)
     now = SimpleNamespace(
         as_described=(np.array([5.0, 0.1]),),
-        floors=(SimpleNamespace(period=4.0 if repeats else None),),
+        floors=(SimpleNamespace(rough=np.array([3.0, 0.2])),),
         data=(SimpleNamespace(period_recorded=recorded),),
     )
-    (noise,) = _told_by(before, now, np.array([1.0, 1.0]))
+    (noise,) = _noise_within(np.array([1.0, 1.0]), now, 0.01)
     assert noise.tolist() == [wanted, 0.1]
 
 

@@ -5,8 +5,8 @@
 from dataclasses import replace
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.trajectory import thinnable, trajectories
+from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import Motion

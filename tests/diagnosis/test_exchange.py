@@ -2,11 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A cause has changed between two days if no other division of the recordings shows more of it."""
 
+from dataclasses import replace
+
 from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.acceptance import Rows, showing_more
-from armid_ros.effects import make_effect
+from armid_ros.diagnosis.search.round import Later
+from armid_ros.diagnosis.search.trial import Candidate
+from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.fitting.normal_equations import NormalEquations
+from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest
 
@@ -120,3 +127,21 @@ def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench, ma
     assert [(one.name, one.joints) for one in found.findings] == [
         ('coulomb_friction', ('elbow',))
     ] * many, found.summary
+
+
+def test_stretches_of_one_recording_are_one_unit_of_the_permutation_test(bench):
+    """Unbroken stretches of one recording are no more independent than its halves are."""
+    data = trajectories(bench.recordings(), Conditioning(200.0, 20.0, 5))
+    stretches = [data[0], replace(data[1], fold=0), data[2]]
+    unit = tuple(np.ones(2) for _ in data)
+    evidence = Evidence(tuple(stretches), unit, unit)
+    rng = np.random.default_rng(0)
+    columns = [rng.normal(size=(*part.torque.shape, 3)) for part in data]
+    later = Later.of(evidence, columns, [part.torque for part in data])
+    rows = [part.torque.size for part in data]
+    assert [len(one) for one in later.residual] == [rows[0] + rows[1], rows[2]]
+    assert [one.shape for one in later.free] == [(rows[0] + rows[1], 3), (rows[2], 3)]
+    effect = CATALOGUE['torque_offset'].on(bench.robot, ('elbow',))
+    candidate = Candidate(effect, slice(0, 1), (0,), bench.robot)
+    wider = later.and_columns(bench.arm, candidate)
+    assert [one.shape[1] for one in wider.free] == [4, 4]

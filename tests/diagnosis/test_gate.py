@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.prepare import mended
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.prepare import mended
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
 from armid_ros.identification.assess.data_faults import check_data

@@ -6,8 +6,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.prepare import choose_filters
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE, make_effect

@@ -4,8 +4,8 @@
 
 from dataclasses import replace
 
-from armid_ros.diagnosis.data.prepare import prepare
 from armid_ros.diagnosis.data.trajectory import trajectories, UNSURE
+from armid_ros.diagnosis.prepare import prepare
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np

@@ -55,7 +55,7 @@ def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(benc
 def test_what_does_not_repeat_has_to_matter(bench):
     joints = bench.robot.n_joints
     one = np.ones(joints)
-    floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), one)
+    floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), 0.1 * one, one)
     closed = Excess(0.5 * one, 'in the recordings')
 
     def word(least):

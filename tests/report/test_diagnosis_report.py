@@ -9,6 +9,7 @@ from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report
 from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
+from armid_ros.report.sections.gap import GapOverlay
 from armid_ros.report.sources import short_names, with_names
 import numpy as np
 import pytest
@@ -177,3 +178,17 @@ def test_a_browser_draws_it_without_complaint(browser, tmp_path, html, width):
     box = 'document.querySelector("svg.arm").getBoundingClientRect()'
     assert browser.run(f'{box}.width') > 200
     assert browser.run(f'{box}.bottom') < 900  # the drawing is above the fold
+
+
+def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
+    """A joint that rests in a recording has its torque shown from end to end."""
+
+    def resting(overlay):
+        unsure = np.full_like(overlay.trajectory.unsure, np.inf)
+        return replace(overlay, trajectory=replace(overlay.trajectory, unsure=unsure))
+
+    gap = replace(found.gap, overlays=tuple(resting(one) for one in found.gap.overlays))
+    torque, _ = GapOverlay(found.arm.robot, gap, True, {}).charts
+    shown = gap.overlays
+    assert len(torque.x) > 10
+    assert any(torque.x[-1] == pytest.approx(one.trajectory.t[-1], abs=0.1) for one in shown)

@@ -192,6 +192,8 @@ class NoiseFloor:
         Power of the difference of two periods at low frequency over that at high frequency.
     slow : ndarray, shape (n,)
         Standard deviation of one period at low frequency [N m]; zero where nothing repeats.
+    rough : ndarray, shape (n,)
+        Upper estimate of noise that differs from row to row [N m].
     growth : ndarray, shape (n,)
         Power per bin of that difference in the upper third of the band that rows keep, over that
         in the lower third: the model amplifies noise of positions with frequency.
@@ -202,6 +204,7 @@ class NoiseFloor:
     period: float | None
     structure: FloatArray
     slow: FloatArray
+    rough: FloatArray
     growth: FloatArray
 
 
@@ -225,10 +228,10 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     smooth = signal.fftconvolve(residual, taps[:, np.newaxis], mode='same', axes=0)
     found = trajectory.period
     least = _least(trajectory, arm)
+    rough = np.maximum(_assumed(trajectory, smooth), least)
     if found is None:
-        sigma = np.maximum(_assumed(trajectory, smooth), least)
         one, zero = np.ones(motion.n_joints), np.zeros(motion.n_joints)
-        return NoiseFloor(sigma, None, one, zero, one)
+        return NoiseFloor(rough, None, one, zero, rough, one)
     lag, where = found
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
@@ -246,7 +249,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     structure[sigma < least] = growth[sigma < least] = 1.0
     sigma = np.maximum(sigma, least)
     period = lag * float(motion.t[1] - motion.t[0])
-    return NoiseFloor(sigma, period, structure, slow, growth)
+    return NoiseFloor(sigma, period, structure, slow, rough, growth)
 
 
 def _difference(

@@ -219,8 +219,11 @@ def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
 def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) -> FloatArray:
     """Return the nuisance columns, fitted whichever name is right, shape (N, n, f)."""
     assert diagnosis.explanation is not None
+    given = diagnosis.explanation.given
+    known = zip(given.effects, given.values, strict=True)
+    unknown = [effect for effect, values in known if not np.any(values)]
     found = [own.effect for own in diagnosis.explanation.fitted.named]
-    effects = arm.effects if diagnosis.refitted else found
+    effects = arm.effects if diagnosis.refitted else [*unknown, *found]
     blocks = [arm.columns_of(effect, motion) for effect in effects if effect != named]
     if diagnosis.refitted:
         blocks.append(arm.rigid_columns(motion))
@@ -243,8 +246,8 @@ def _shapes(rival: Effect, motion: Motion, arm: ArmModel) -> Iterator[Effect]:
     if not rival.shapes:
         return
     grids = rival.shape_grids(motion, arm)
-    chosen = list(product(*(range(grid.shape[1]) for grid in grids)))[:_MOST_SHAPES]
-    for index in chosen:
+    chosen = list(product(*(range(grid.shape[1]) for grid in grids)))
+    for index in chosen[:: -(-len(chosen) // _MOST_SHAPES)]:
         values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
         try:
             yield rival.with_shape(values)

@@ -18,8 +18,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
-from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.prepare import Prepared
 from armid_ros.diagnosis.search.candidates import as_given, fitted_anew
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
@@ -131,9 +131,9 @@ class Explainer:
         of a model that was right when it was identified, they have changed, and not all links.
 
         """
-        prepared, settings, noise = self.prepared, self.settings, self.prepared.as_described
+        prepared, settings = self.prepared, self.settings
         self.tell(0.2, 'what has changed')
-        misfit = np.hypot(misfit, self._parameter_error())
+        noise = _noise_within(misfit, prepared, 0.0)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         most = 2 * settings.thresholds.few_causes
         given = as_given(self.arm, prepared.data, most, settings.library)
@@ -153,19 +153,6 @@ class Explainer:
         loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
         stays = _most(loads, settings) or _as_good(found, anew, settings)
         return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT, notes)
-
-    def _parameter_error(self) -> FloatArray:
-        """Return the deviation of the predicted torque for that of the parameters, (n,) [N m]."""
-        data, covariance = self.prepared.data, self.covariance
-        if covariance is None:
-            return np.zeros(self.arm.robot.n_joints)
-        columns = [part.reduce(self.arm.columns(part.motion)) for part in data]
-        variance = [np.einsum('mnp,pq,mnq->mn', x, covariance, x, optimize=True) for x in columns]
-        unit = [np.ones(self.arm.robot.n_joints)] * len(data)
-        power = Evidence.over_noise(data, unit).power(
-            [np.sqrt(np.maximum(v, 0.0)) for v in variance]
-        )
-        return np.sqrt(power)
 
     def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
         """
@@ -197,7 +184,8 @@ class Explainer:
         self.tell(0.2, 'what has changed')
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
-        noise = _told_by(baseline, prepared, misfit)
+        usual = float(np.median([part.period_recorded for part in baseline.data]))
+        noise = _noise_within(misfit, prepared, usual)
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         most, both = 2 * settings.thresholds.few_causes, [*prepared.data, *baseline.data]
@@ -221,18 +209,26 @@ class Explainer:
         return replace(chosen, explanation=in_model_as_given(found), rest=found)
 
 
-def _told_by(baseline: Baseline, prepared: Prepared, misfit: FloatArray) -> tuple[FloatArray, ...]:
+def _noise_within(
+    misfit: FloatArray, prepared: Prepared, period_recorded: float
+) -> tuple[FloatArray, ...]:
     """
-    Return the noise of data, at most the misfit of the baseline, each (n,).
+    Return the noise of data beside a misfit that contains noise, each (n,).
 
-    The misfit contains the noise of data that were sampled as often. What periods differ by is
-    more where something happens in one of them, which is a gap.
+    What periods differ by is more where something happens in one of them, which is a gap: noise
+    beyond the misfit differs from row to row. Data that were sampled as often have none beyond it.
 
     """
-    usual = np.median([part.period_recorded for part in baseline.data])
     return tuple(
-        np.minimum(one, misfit) if part.period_recorded < _AS_OFTEN * usual else one
-        for one, part in zip(prepared.as_described, prepared.data, strict=True)
+        np.minimum(
+            sigma,
+            misfit
+            if part.period_recorded < _AS_OFTEN * period_recorded
+            else np.maximum(misfit, floor.rough),
+        )
+        for sigma, floor, part in zip(
+            prepared.as_described, prepared.floors, prepared.data, strict=True
+        )
     )
 
 

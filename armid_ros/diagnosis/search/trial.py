@@ -169,7 +169,7 @@ class Trial:
     def deviation(self) -> FloatArray:
         """Standard deviations of the values, for noise of any colour (jackknife), shape (p,)."""
         coloured = jackknife(self.values, self.std, self.fold_values, self.fold_std)
-        return np.asarray(np.sqrt(np.maximum(self.std**2, coloured)))
+        return np.asarray(np.sqrt(self.std**2 + coloured))
 
     @property
     def gains(self) -> FloatArray:

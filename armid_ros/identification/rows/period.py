@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 #: Positions of two periods agree within this share of the range of motion.
 _SAME = 0.02
+#: A period goes so many times as far, in some joint: slower motion is like itself a while later.
+_FARTHER = 3.0
 #: The shortest period that is looked for [s].
 _SHORTEST = 1.5
 
@@ -43,7 +45,9 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
         same = np.all(np.abs(q[lag:] - q[:-lag]) < allowed[:-lag], axis=1)
         start, stop = _longest(same)
         length = int(np.sum(moving[start:stop]))
-        if length > 0.6 * lag and (best is None or length > 1.2 * (best[2] - best[1])):
+        if length <= 0.6 * lag or (best is not None and length <= 1.2 * (best[2] - best[1])):
+            continue
+        if np.ptp(q[start : start + lag], axis=0).max() > _FARTHER * _SAME:
             best = lag, start, stop
     if best is None:
         return None

@@ -18,9 +18,9 @@ from functools import cache
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.prepare import Prepared
 from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.data.trajectory import Workspace
+from armid_ros.diagnosis.prepare import Prepared
 from armid_ros.diagnosis.search.candidates import candidates, Question
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE

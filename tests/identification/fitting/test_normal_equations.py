@@ -5,6 +5,8 @@
 from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
     informative_basis,
+    informative_solution,
+    NormalEquations,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -61,3 +63,38 @@ def test_of_two_columns_that_are_the_same_only_the_sum_is_told():
     inverse = independent_inverse(products, np.diag(products))
     values = inverse @ [column @ column, 2.0 * column @ column]
     assert values @ [1.0, 2.0] == pytest.approx(1.0)
+
+
+def rows(rng, count, size=3):
+    return rng.normal(size=(count, size)), rng.normal(size=count)
+
+
+def test_sources_that_are_independent_add_up_and_can_be_taken_away():
+    rng = np.random.default_rng(4)
+    (x, y), (more, z) = rows(rng, 20), rows(rng, 30)
+    first, second = NormalEquations.of_rows(x, y), NormalEquations.of_rows(more, z)
+    both = NormalEquations.of_rows(np.vstack([x, more]), np.concatenate([y, z]))
+    for one, other in ((first + second, both), (both - second, first)):
+        np.testing.assert_allclose(one.matrix, other.matrix, atol=1e-12)
+        np.testing.assert_allclose(one.vector, other.vector, atol=1e-12)
+
+
+def test_what_is_still_to_be_added_is_the_rest_of_the_solution():
+    rng = np.random.default_rng(5)
+    known, change = NormalEquations.of_rows(*rows(rng, 20)), rng.normal(size=3)
+    rest = known.after(change)
+    np.testing.assert_allclose(
+        change + informative_solution(rest.matrix, rest.vector),
+        informative_solution(known.matrix, known.vector),
+    )
+
+
+def test_more_values_are_zero_as_surely_as_they_are_known_to_be():
+    rng = np.random.default_rng(6)
+    known = NormalEquations.of_rows(*rows(rng, 20))
+    more = known.and_zeros(np.array([2.0, 0.0]))
+    solution = informative_solution(more.matrix, more.vector)
+    expected = informative_solution(known.matrix, known.vector)
+    np.testing.assert_allclose(solution, [*expected, 0.0, 0.0], atol=1e-12)
+    assert more.matrix[3, 3] == 2.0
+    np.testing.assert_array_equal(more.among(range(3)).matrix, known.matrix)
