@@ -270,8 +270,9 @@ def _as_stated(
     """
     Return the names that stay, their explanation in the model as given, its shares, and notes.
 
-    Values that may all be zero in the model as given are no names. Where names explain too little
-    there, the explanation keeps the rigid body common to both days.
+    Values that may all be zero in the model as given are no name, unless that explains most of the
+    gap. Where names explain too little there, the explanation keeps the rigid body common to both
+    days.
 
     """
     if not rest.steps:
@@ -281,7 +282,7 @@ def _as_stated(
     names, least = range(len(as_described.steps)), settings.thresholds.headline
     if alone.share(names) >= least:
         small = smallest(as_described, alone, settings, least)
-        if small is None:
+        if small is None or alone.share([small]) > settings.thresholds.open_share:
             return rest, as_described, alone, []
         fewer = rest.without(small)
         return _as_stated(fewer, shares_of(fewer, unseen, settings), unseen, arm, settings)

@@ -2,14 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Between two days only what differs is named: not what was there, nor what the body can do."""
 
-from armid_ros.diagnosis import diagnose
+from dataclasses import dataclass
+from importlib import import_module
+
+from armid_ros.diagnosis import diagnose, DiagnosisSettings
 from armid_ros.diagnosis.search.explain import Search
 from armid_ros.identification import identify
-from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
+diagnosing = import_module('armid_ros.diagnosis.diagnose')
 HOSE = np.array([1.5, 0.8])
 
 
@@ -165,16 +168,44 @@ def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
         assert (found.verdict, found.findings) == (wanted, ()), found.summary
 
 
-def test_a_value_that_may_all_have_been_there_before_is_no_name(bench):
-    """The model lacks a ripple of which 0.1 or 0.2 N m were there of 0.3 that are there now."""
+@dataclass(frozen=True)
+class Named:
+    """Stands for an explanation: shares of its names, and whether their values may be zero."""
 
-    def day(size, seed):
-        return bench.recordings(lambda m, tau: size * np.sin(8.0 * m.q) * [0.0, 1.0], seed)
+    steps: tuple[tuple[float, bool], ...]
 
-    for before, names in ((0.1, ['torque_ripple']), (0.2, [])):
-        found = diagnose(
-            bench.arm, day(0.3, 0), baseline=day(before, 5), rng=np.random.default_rng(0)
-        )
-        assert [one.name for one in found.findings] == names, found.summary
-        for one in found.findings:
-            assert excludes_zero(np.array(one.values), np.array(one.std)).any()
+    def without(self, k):
+        return Named(self.steps[:k] + self.steps[k + 1 :])
+
+    def share(self, names):
+        return sum(self.steps[k][0] for k in names)
+
+
+@pytest.mark.parametrize(
+    ('names', 'stay'),
+    [
+        ([(0.9, False)], [0.9]),
+        ([(0.3, True)], []),
+        ([(0.6, True)], [0.6]),
+        ([(0.6, False), (0.2, True)], [0.6]),
+        ([(0.6, False), (0.2, False)], [0.6, 0.2]),
+    ],
+)
+def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
+    monkeypatch, names, stay
+):
+    """What the model had wrong before is in the interval of what is stated of the given model."""
+
+    def doubtful(named, *others):
+        return next((k for k, (_, zero) in enumerate(named.steps) if zero), None)
+
+    for name, stub in (
+        ('in_model_as_given', lambda named: named),
+        ('shares_of', lambda named, *others: named),
+        ('smallest', doubtful),
+    ):
+        monkeypatch.setattr(diagnosing, name, stub)
+    rest = Named(tuple(names))
+    left, stated, *_ = diagnosing._as_stated(rest, rest, None, None, DiagnosisSettings())
+    assert [share for share, _ in left.steps] == stay
+    assert stated.steps == left.steps
