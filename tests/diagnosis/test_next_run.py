@@ -231,6 +231,7 @@ def test_only_a_known_payload_tells_a_gain_from_the_mass():
         refitted=True,
         data=[SimpleNamespace(used=used)],
         explanation=SimpleNamespace(
+            given=SimpleNamespace(effects=(), values=()),
             fitted=SimpleNamespace(named=[Named(gain, (0,))]),
             evidence=SimpleNamespace(sigma=[np.array([0.02])]),
         ),
