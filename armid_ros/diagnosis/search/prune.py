@@ -85,6 +85,12 @@ class View:
         return cls(problem, fitted, tuple(more))
 
     @property
+    def power(self) -> FloatArray:
+        """Held-out squares of each block, shape (B,)."""
+        _, free, prior = self.without((), ())
+        return held_out(self.problem, free, [], prior)[1]
+
+    @property
     def first(self) -> int:
         """The first column of a name."""
         return int(self.fitted.columns[0].shape[2]) - len(self.fitted.estimate.values)
@@ -212,10 +218,7 @@ class Retrial:
     @cached_property
     def gap(self) -> float:
         """Held-out squares with nothing named."""
-        view = View.of(self.reference, self.evidence)
-        problem, free, prior = view.without((), ())
-        _, power = held_out(problem, free, [], prior)
-        return float(power.sum())
+        return float(View.of(self.reference, self.evidence).power.sum())
 
     def stands(self, step: Step, again: Again) -> bool:
         """

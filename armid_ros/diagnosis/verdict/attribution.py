@@ -122,8 +122,7 @@ def _left_out(explanation: Explanation) -> Attribution:
         order.append(k)
         left.remove(k)
     if whole is None:
-        _, free, prior = view.without((), ())
-        _, whole = held_out(view.problem, free, [], prior)
+        whole = view.power
     return Attribution(tuple(order), whole, taken.reshape(len(named), len(whole)))
 
 

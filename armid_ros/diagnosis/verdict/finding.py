@@ -201,7 +201,7 @@ class Diagnosis:
     not_visible : tuple of str
         Names of the catalogue that these data cannot show.
     refitted : bool
-        Whether parameters of the given model were fitted anew.
+        Whether the rigid body was fitted anew.
     notes : tuple of str
         What a reader should know.
     baseline : str

@@ -11,6 +11,8 @@ import numpy.typing as npt
 #: Positions of two periods agree within this share of the range of motion.
 _SAME = 0.02
 #: A period goes so many times as far, in some joint: slower motion is like itself a while later.
+#: A crawl that agrees goes hardly once as far in a lag. Of 108 recordings of 17 arms 30 % more or
+#: less changes none.
 _FARTHER = 3.0
 #: The shortest period that is looked for [s].
 _SHORTEST = 1.5
