@@ -26,16 +26,12 @@ from armid_ros.diagnosis.search.explanation import (
     Chosen,
     ESTIMATED,
     Explanation,
-    in_model_as_given,
     NOISE,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import (
     attribute,
-    Attribution,
-    headline,
-    shares_of,
-    smallest,
+    Names,
 )
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
@@ -46,7 +42,7 @@ from armid_ros.diagnosis.verdict.gap import (
 )
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, locate, Where
-from armid_ros.diagnosis.verdict.words import decide, not_repeating
+from armid_ros.diagnosis.verdict.words import decide, not_repeating, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.motion import FloatArray
@@ -62,11 +58,6 @@ Explain = Callable[[ArmModel, Sequence[Recording], Prepared, DiagnosisSettings],
 _ASSUMED = (
     'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
     'their neighbours; two equal periods would measure it'
-)
-#: Note where a cause shows only jointly with a rigid body that is common to both days.
-_COMMON = (
-    'the baseline did not determine the model for these motions: a rigid body and friction common '
-    'to both were fitted'
 )
 #: Error where a partner was set and its ties would be left out.
 _ALONE = (
@@ -203,17 +194,13 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
     measured = chosen.measured
-    least = 0.0 if measured else settings.thresholds.headline
-    rest, shares = headline(chosen.rest or explanation, unseen, settings, least)
-    explanation = rest
-    if chosen.rest is not None and rest.steps:
-        rest, explanation, shares, remarks = _as_stated(rest, shares, unseen, arm, settings)
-        notes += remarks
-    found = findings(explanation, shares, arm, asked.rng)
+    names = Names.of(replace(chosen, explanation=explanation), unseen, arm, settings)
+    explanation, notes = names.stated, [*notes, *names.notes]
+    found = findings(explanation, names.shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
     data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
-    left, resting = _excesses(asked, chosen, rest, unseen, bool(found))
+    left, resting = _excesses(asked, chosen, names, unseen)
     total = float(attribute(explanation, None).whole.sum())
     tried = 1 if explanation.survey is None else explanation.survey.tried
     small = sorted(explanation.minor, key=lambda trial: -trial.gain)
@@ -234,7 +221,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *_unpatched(found, worse), chosen.doubt]).strip(),
+        summary=' '.join([word.summary, *_unpatched(found, worse), *_doubts(chosen, word)]),
         findings=found,
         minor=minor,
         where=_where(explanation, limits, bool(found)) or places_held(arm, resting),
@@ -260,34 +247,10 @@ def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
     return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
 
 
-def _as_stated(
-    rest: Explanation,
-    shares: Attribution,
-    unseen: Evidence | None,
-    arm: ArmModel,
-    settings: DiagnosisSettings,
-) -> tuple[Explanation, Explanation, Attribution, list[str]]:
-    """
-    Return the names that stay, their explanation in the model as given, its shares, and notes.
-
-    Values that may all be zero in the model as given are no name, unless that explains most of the
-    gap. Where names explain too little there, the explanation keeps the rigid body common to both
-    days.
-
-    """
-    if not rest.steps:
-        return rest, rest, shares, []
-    as_described = in_model_as_given(rest)
-    alone = shares_of(as_described, unseen, settings)
-    names, least = range(len(as_described.steps)), settings.thresholds.headline
-    if alone.share(names) >= least:
-        small = smallest(as_described, alone, settings, least)
-        if small is None or alone.share([small]) > settings.thresholds.open_share:
-            return rest, as_described, alone, []
-        fewer = rest.without(small)
-        return _as_stated(fewer, shares_of(fewer, unseen, settings), unseen, arm, settings)
-    bodily, remarks = as_bodies(rest, arm)
-    return rest, bodily, shares, [_COMMON, *remarks]
+def _doubts(chosen: Chosen, verdict: Verdict) -> list[str]:
+    """Say what would tell an unknown change from a misfit, and why the model may be wrong."""
+    remedy = chosen.untested if verdict.word == 'unknown' else ''
+    return [text for text in (remedy, chosen.doubt) if text]
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:
@@ -328,12 +291,14 @@ def _harmed(
 
 
 def _excesses(
-    asked: _Asked, chosen: Chosen, rest: Explanation, unseen: Evidence | None, named: bool
+    asked: _Asked, chosen: Chosen, names: Names, unseen: Evidence | None
 ) -> tuple[list[Excess], list[Excess]]:
     """Return losses over their limits, and residuals over friction where a joint is held."""
+    rest = names.rest
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
-    usual = 1.0 if chosen.measured or named else more  # a misfit varies from motion to motion
+    there = chosen.measured or bool(rest.steps) or names.taken_back
+    usual = 1.0 if there else more  # a misfit varies from motion to motion
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
     parts = [evidence]
     if unseen is not None:

@@ -3,16 +3,17 @@
 """Between two days only what differs is named: not what was there, nor what the body can do."""
 
 from dataclasses import dataclass
-from importlib import import_module
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.search.choice import WRITTEN_MISFIT
 from armid_ros.diagnosis.search.explain import Search
+from armid_ros.diagnosis.search.explanation import Chosen
+from armid_ros.diagnosis.verdict import attribution
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
-diagnosing = import_module('armid_ros.diagnosis.diagnose')
 HOSE = np.array([1.5, 0.8])
 
 
@@ -180,6 +181,13 @@ class Named:
     def share(self, names):
         return sum(self.steps[k][0] for k in names)
 
+    @property
+    def denied(self):
+        return ()
+
+    def with_nothing_named(self):
+        return Named(())
+
 
 @pytest.mark.parametrize(
     ('names', 'stay'),
@@ -204,8 +212,28 @@ def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
         ('shares_of', lambda named, *others: named),
         ('smallest', doubtful),
     ):
-        monkeypatch.setattr(diagnosing, name, stub)
+        monkeypatch.setattr(attribution, name, stub)
     rest = Named(tuple(names))
-    left, stated, *_ = diagnosing._as_stated(rest, rest, None, None, DiagnosisSettings())
-    assert [share for share, _ in left.steps] == stay
-    assert stated.steps == left.steps
+    headline = attribution.Names(rest, rest, rest)
+    kept = attribution._as_stated(headline, None, None, DiagnosisSettings())
+    assert [share for share, _ in kept.rest.steps] == stay
+    assert kept.stated.steps == kept.rest.steps
+
+
+@pytest.mark.parametrize(
+    ('untested', 'share', 'stays'), [('', 0.2, True), ('ask', 0.6, True), ('ask', 0.4, False)]
+)
+def test_what_nothing_tells_from_a_misfit_has_to_take_most_of_the_gap(
+    monkeypatch, untested, share, stays
+):
+    """Without recordings of both days another motion's misfit looks like a small change."""
+    for name, stub in (
+        ('shares_of', lambda named, *others: named),
+        ('smallest', lambda *arguments: None),
+    ):
+        monkeypatch.setattr(attribution, name, stub)
+    found = Named(((share, False),))
+    chosen = Chosen(found, np.zeros(1), WRITTEN_MISFIT, untested=untested)
+    names = attribution.Names.of(chosen, None, None, DiagnosisSettings())
+    assert len(names.stated.steps) == stays
+    assert names.taken_back is not stays

@@ -285,10 +285,14 @@ def weighted_rows(
         yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
 
 
+def count_recordings(data: Sequence[Trajectory]) -> int:
+    """Return the number of recordings that trajectories are stretches of."""
+    return len({part.fold for part in data})
+
+
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
     """Return the fold of every row, a stretch of a recording."""
-    recordings = len({part.fold for part in data})
-    pieces = max(2, -(-PARTS // max(recordings, 1)))
+    pieces = max(2, -(-PARTS // max(count_recordings(data), 1)))
     rows = []
     for part in data:
         span = np.linspace(0, pieces, len(part.rows), endpoint=False).astype(np.intp)

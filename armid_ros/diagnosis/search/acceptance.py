@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, islice
 from math import comb
 
+from armid_ros.diagnosis.data.trajectory import count_recordings
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import Round, worth
 from armid_ros.diagnosis.search.trial import ROUNDING, Trial
@@ -168,7 +169,12 @@ def surely_changed(trial: Trial, here: Round) -> bool:
     It cannot be where there are too few divisions.
 
     """
-    if here.before is None or not _seldom(0, _count_divisions(here), here):
+    if here.before is None:
+        return False
+    first = count_recordings(here.before.prior.data)
+    second = count_recordings(here.evidence.data)
+    second += 0 if here.before.later is None else len(here.before.later.residual)
+    if not _seldom(0, min(count_divisions(first, second), _DIVISIONS), here):
         return False
     return _seldom(*_showing_more(trial, here), here)
 
@@ -178,15 +184,9 @@ def _seldom(more: int, divisions: int, here: Round) -> bool:
     return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
 
 
-def _count_divisions(here: Round) -> int:
-    """Return the number of other divisions of the recordings that are tried."""
-    assert here.before is not None
-    later = here.before.later
-    first = len({part.fold for part in here.before.prior.data})
-    second = len({part.fold for part in here.evidence.data})
-    second += 0 if later is None else len(later.residual)
-    exchanges = comb(first + second, first) - 1 - (first == second)
-    return min(exchanges, _DIVISIONS)
+def count_divisions(first: int, second: int) -> int:
+    """Return the number of other divisions of recordings into groups of two sizes."""
+    return comb(first + second, first) - 1 - (first == second)
 
 
 def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:

@@ -18,8 +18,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
-from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
 from armid_ros.diagnosis.prepare import Prepared
+from armid_ros.diagnosis.search.acceptance import count_divisions
 from armid_ros.diagnosis.search.candidates import as_given, fitted_anew
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
@@ -48,6 +49,18 @@ _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
     'are off by is not in the intervals'
 )
+
+#: What would tell a change from a misfit, where there are no or too few recordings.
+_NO_BASELINE = (
+    'It may be the misfit of another motion: recordings from before, given as baseline, tell '
+    'that from a change.'
+)
+_ONE_EACH = (
+    'It may be the misfit of another motion: more than one recording a day tells that from a '
+    'change.'
+)
+#: Divisions of the recordings from which on no note says that they are few.
+_MANY_WAYS = 20
 
 
 @dataclass(frozen=True)
@@ -146,13 +159,14 @@ class Explainer:
         if self.covariance is not None:
             fitted = with_model_error(found.fitted, evidence, self.arm, self.covariance)
             found = replace(found, fitted=fitted)
+        chosen = Chosen(found, misfit, WRITTEN_MISFIT, notes, untested=_NO_BASELINE)
         if at_floor(found, settings):
-            return Chosen(found, misfit, WRITTEN_MISFIT, notes)
+            return chosen
         self.tell(0.6, 'the model fitted anew')
         anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma))
         loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
         stays = _most(loads, settings) or _as_good(found, anew, settings)
-        return Chosen(found if stays else anew, misfit, WRITTEN_MISFIT, notes)
+        return chosen if stays else replace(chosen, explanation=anew)
 
     def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
         """
@@ -206,7 +220,15 @@ class Explainer:
         chosen = Chosen(found, misfit, OWN_MISFIT, doubt=_doubt(baseline))
         if not found.steps:
             return chosen
-        return replace(chosen, explanation=in_model_as_given(found), rest=found)
+        first = count_recordings(baseline.data)
+        second = count_recordings(prepared.data) + count_recordings(self.unseen)
+        return replace(
+            chosen,
+            explanation=in_model_as_given(found),
+            rest=found,
+            notes=_few_recordings(first, second),
+            untested='' if count_divisions(first, second) else _ONE_EACH,
+        )
 
 
 def _noise_within(
@@ -229,6 +251,17 @@ def _noise_within(
         for sigma, floor, part in zip(
             prepared.as_described, prepared.floors, prepared.data, strict=True
         )
+    )
+
+
+def _few_recordings(first: int, second: int) -> tuple[str, ...]:
+    """Say how easily a misfit of another motion passes for a change in so few recordings."""
+    ways = 1 + count_divisions(first, second) // (2 if first == second else 1)
+    if ways >= _MANY_WAYS:
+        return ()
+    return (
+        f'{first} recordings from before and {second} since can be divided in {ways} ways: one '
+        f'misfit in {ways} passes for a change; of four recordings a day it is one in 35',
     )
 
 

@@ -139,6 +139,9 @@ class Chosen:
         leave.
     doubt : str
         Why the model itself may be wrong, a sentence; empty if it need not be.
+    untested : str
+        What would tell a change from another motion's misfit, a sentence; empty if the recordings
+        do. Where they do not, names have to take most of the gap.
 
     """
 
@@ -148,6 +151,7 @@ class Chosen:
     notes: tuple[str, ...] = ()
     rest: Explanation | None = None
     doubt: str = ''
+    untested: str = ''
 
     @property
     def measured(self) -> bool:

@@ -17,6 +17,8 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.explanation import (
+    as_bodies,
+    Chosen,
     Explanation,
     in_model_as_given,
 )
@@ -29,6 +31,11 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
+#: Note where a cause shows only jointly with a rigid body that is common to both days.
+_COMMON = (
+    'the baseline did not determine the model for these motions: a rigid body and friction common '
+    'to both were fitted'
+)
 #: Resamplings of the blocks: the ends of a 95 % interval are accurate to a tenth of it.
 _RESAMPLINGS = 500
 
@@ -164,7 +171,86 @@ def _staircase(explanation: Explanation, order: Sequence[int]) -> list[ArmModel]
     return [*(one.fitted.arm for one in fewer), explanation.fitted.arm] if order else []
 
 
-def headline(
+@dataclass(frozen=True)
+class Names:
+    """
+    The names that are given.
+
+    Attributes
+    ----------
+    rest : Explanation
+        The names, fitted jointly with a body common to both days where there is a baseline: its
+        residual is what they leave.
+    stated : Explanation
+        The same in the model as given, whose values and gap are stated.
+    shares : Attribution
+        Shares of ``stated``.
+    notes : tuple of str
+        What a reader should know.
+    taken_back : bool
+        Whether names are none any more as nothing tells them from another motion's misfit.
+
+    """
+
+    rest: Explanation
+    stated: Explanation
+    shares: Attribution
+    notes: tuple[str, ...] = ()
+    taken_back: bool = False
+
+    @classmethod
+    def of(
+        cls, chosen: Chosen, unseen: Evidence | None, arm: ArmModel, settings: DiagnosisSettings
+    ) -> Names:
+        """
+        Return what is given of the names of an explanation.
+
+        Where recordings cannot tell a change from another motion's misfit, names have to explain
+        most of the gap.
+
+        """
+        thresholds = settings.thresholds
+        least = 0.0 if chosen.measured else thresholds.headline
+        rest, shares = _large(chosen.rest or chosen.explanation, unseen, settings, least)
+        names = cls(rest, rest, shares)
+        if chosen.rest is not None and rest.steps:
+            names = _as_stated(names, unseen, arm, settings)
+        steps = names.stated.steps
+        if not (chosen.untested and steps):
+            return names
+        if names.shares.share(range(len(steps))) > thresholds.open_share:
+            return names
+        rest, stated = (one.with_nothing_named() for one in (names.rest, names.stated))
+        return cls(rest, stated, shares_of(stated, unseen, settings), taken_back=True)
+
+
+def _as_stated(
+    names: Names, unseen: Evidence | None, arm: ArmModel, settings: DiagnosisSettings
+) -> Names:
+    """
+    Return the names that stay in the model as given.
+
+    Values that may all be zero there are no name, unless that explains most of the gap. Where
+    names explain too little there, the explanation keeps the rigid body common to both days.
+
+    """
+    rest, least = names.rest, settings.thresholds.headline
+    if not rest.steps:
+        return names
+    as_described = in_model_as_given(rest)
+    alone = shares_of(as_described, unseen, settings)
+    if alone.share(range(len(as_described.steps))) < least:
+        bodily, remarks = as_bodies(rest, arm)
+        return replace(names, stated=bodily, notes=(_COMMON, *remarks))
+    small = smallest(as_described, alone, settings, least)
+    if small is None or alone.share([small]) > settings.thresholds.open_share:
+        return replace(names, stated=as_described, shares=alone)
+    fewer = rest.without(small)
+    kept = Names(fewer, fewer, shares_of(fewer, unseen, settings))
+    return _as_stated(kept, unseen, arm, settings)
+
+
+def _large(
     explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings, least: float
 ) -> tuple[Explanation, Attribution]:
     """
@@ -178,7 +264,7 @@ def headline(
     gone = shares.denied[0] if shares.denied else smallest(explanation, shares, settings, least)
     if gone is None:
         return explanation, shares
-    return headline(explanation.without(gone), unseen, settings, least)
+    return _large(explanation.without(gone), unseen, settings, least)
 
 
 def smallest(
