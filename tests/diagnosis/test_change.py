@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.search.choice import WRITTEN_MISFIT
+from armid_ros.diagnosis.search.choice import few_recordings, WRITTEN_MISFIT
 from armid_ros.diagnosis.search.explain import Search
 from armid_ros.diagnosis.search.explanation import Chosen
 from armid_ros.diagnosis.verdict import attribution
@@ -203,14 +203,10 @@ def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
     monkeypatch, names, stay
 ):
     """What the model had wrong before is in the interval of what is stated of the given model."""
-
-    def doubtful(named, *others):
-        return next((k for k, (_, zero) in enumerate(named.steps) if zero), None)
-
     for name, stub in (
         ('in_model_as_given', lambda named: named),
         ('shares_of', lambda named, *others: named),
-        ('smallest', doubtful),
+        ('may_be_nothing', lambda named, k: named.steps[k][1]),
     ):
         monkeypatch.setattr(attribution, name, stub)
     rest = Named(tuple(names))
@@ -237,3 +233,32 @@ def test_what_nothing_tells_from_a_misfit_has_to_take_most_of_the_gap(
     names = attribution.Names.of(chosen, None, None, DiagnosisSettings())
     assert len(names.stated.steps) == stays
     assert names.taken_back is not stays
+
+
+@pytest.mark.parametrize(
+    ('first', 'second', 'said'),
+    [(1, 1, 'any misfit'), (2, 2, 'in 3 passes'), (2, 1, 'in 3 passes'), (3, 3, 'in 10 passes')],
+)
+def test_it_is_said_how_easily_few_recordings_make_a_change_of_a_misfit(first, second, said):
+    (note,) = few_recordings(first, second)
+    assert said in note
+    assert few_recordings(4, 4) == ()
+
+
+def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
+    """Nothing tells a smaller cause from the misfit of another motion."""
+
+    def with_drag(size):
+        return lambda motion, tau: (
+            hose(motion, tau) + size * np.array([0.0, 1.0]) * np.sign(motion.dq)
+        )
+
+    before = bench.recordings(hose, seed=1)[1:2]
+    large, small = (
+        asked(bench, before, bench.recordings(with_drag(size), seed=2)[1:2], ())
+        for size in (1.2, 0.7)
+    )
+    assert [one.name for one in large.findings] == ['coulomb_friction']
+    assert any('any misfit passes for a change' in note for note in large.notes)
+    assert not small.findings
+    assert [one.name for one in small.minor] == ['coulomb_friction']

@@ -226,7 +226,7 @@ class Explainer:
             chosen,
             explanation=in_model_as_given(found),
             rest=found,
-            notes=_few_recordings(first, second),
+            notes=few_recordings(first, second),
             untested='' if count_divisions(first, second) else _ONE_EACH,
         )
 
@@ -254,14 +254,15 @@ def _noise_within(
     )
 
 
-def _few_recordings(first: int, second: int) -> tuple[str, ...]:
+def few_recordings(first: int, second: int) -> tuple[str, ...]:
     """Say how easily a misfit of another motion passes for a change in so few recordings."""
     ways = 1 + count_divisions(first, second) // (2 if first == second else 1)
     if ways >= _MANY_WAYS:
         return ()
+    which = 'any misfit passes' if ways == 1 else f'one misfit in {ways} passes'
     return (
-        f'{first} recordings from before and {second} since can be divided in {ways} ways: one '
-        f'misfit in {ways} passes for a change; of four recordings a day it is one in 35',
+        f'recordings from before: {first}, since: {second}; of so few {which} for a change where '
+        'motions differ, of four a day one in 35',
     )
 
 

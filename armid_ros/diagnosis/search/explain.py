@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.candidates import Candidates, candidates, Question
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.fit import fit, Fitted, Start
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
 from armid_ros.diagnosis.search.held_out import widened
 from armid_ros.diagnosis.search.look import Look, look_at
 from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial, View
@@ -279,15 +279,8 @@ class Search:
         before = Before(self.baseline, prior, current.change)
         if unseen is None:
             return before
-        there = fit(
-            question.nuisance_arm,
-            current.named,
-            unseen,
-            question.nuisance_base,
-            Start(current.values),
-            prior,
-            known=current.estimate,
-        )
+        arm, base = question.nuisance_arm, question.nuisance_base
+        there = with_values_of(current, arm, unseen, base, prior)
         rank = len(current.change)
         pairs = zip(there.residual, there.columns, strict=True)
         left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]

@@ -18,7 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.fit import fit, Fitted, Start
+from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
 from armid_ros.diagnosis.search.held_out import as_change, widened
 from armid_ros.diagnosis.search.round import cost
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial
@@ -165,14 +165,7 @@ def in_model_as_given(found: Explanation) -> Explanation:
     if found.prior is not None and found.baseline is not None:
         fitted = as_change(fitted, found.prior, found.baseline)
     reference = fit(arm, (), evidence, None)
-    alone = fit(
-        arm,
-        fitted.named,
-        evidence,
-        None,
-        Start(fitted.values),
-        known=fitted.estimate,
-    )
+    alone = with_values_of(fitted, arm, evidence)
     return replace(found, base=None, prior=None, fitted=alone, reference=reference)
 
 

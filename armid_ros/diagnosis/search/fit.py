@@ -109,7 +109,6 @@ def fit(
     base: BaseParameters | None,
     start: Start | None = None,
     prior: Prior | None = None,
-    known: Estimate | None = None,
 ) -> Fitted:
     """
     Fit base parameters and named effects jointly.
@@ -128,8 +127,6 @@ def fit(
         Where to begin; at the arm as it is by default.
     prior : Prior, optional
         Information of other data about the base parameters.
-    known : Estimate, optional
-        Of the named effects; where it is given no step is taken.
 
     """
     start = start or Start()
@@ -137,23 +134,70 @@ def fit(
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     if start.change is not None and base is not None:
         state = state.with_change(start.change, base)
-    described = np.zeros((0, 0)) if base is None else described_precision(base, arm)
-    held = NormalEquations(described, np.zeros(len(described)))
-    if prior is not None and base is not None:
-        held = held + prior.of_change
+    held = _prior_of_change(arm, base, prior)
     rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
-    rounds = 0 if known is not None else rounds
     state, residual, columns = _settled(state, evidence, base, held, rounds)
-    size = 0 if base is None else base.rank
+    size = len(state.change)
     names, numbers = state.parameters()
-    estimate = known
-    if estimate is None:
-        covariance = np.zeros((size, size))
-        if named:
-            more = [] if prior is None else prior.regressions(state.change, len(numbers))
-            covariance = _covariance(columns, residual, evidence, described, more)
-        estimate = Estimate(names, numbers, covariance[size:, size:])
-    open_values = np.zeros(columns[0].shape[2] - size)
+    covariance = np.zeros((size, size))
+    if named:
+        described = np.zeros((0, 0)) if base is None else described_precision(base, arm)
+        more = [] if prior is None else prior.regressions(state.change, len(numbers))
+        covariance = _covariance(columns, residual, evidence, described, more)
+    estimate = Estimate(names, numbers, covariance[size:, size:])
+    return _fitted(state, residual, columns, held, estimate)
+
+
+def with_values_of(
+    found: Fitted,
+    arm: ArmModel,
+    evidence: Evidence,
+    base: BaseParameters | None = None,
+    prior: Prior | None = None,
+) -> Fitted:
+    """
+    Return an arm with the names of a fit at the values that they have there.
+
+    Parameters
+    ----------
+    found : Fitted
+        The fit.
+    arm : ArmModel
+        An arm without the named effects.
+    evidence : Evidence
+        The data of residual and columns.
+    base : BaseParameters, optional
+        Base parameters that columns are of; they stay as they are.
+    prior : Prior, optional
+        Information of other data about them.
+
+    """
+    state = Patch(arm, found.named, found.values, np.zeros(0 if base is None else base.rank))
+    residual = _residuals(state, evidence.data)
+    columns = [patch_columns(state, part, base) for part in evidence.data]
+    held = _prior_of_change(arm, base, prior)
+    return _fitted(state, residual, columns, held, found.estimate)
+
+
+def _prior_of_change(
+    arm: ArmModel, base: BaseParameters | None, prior: Prior | None
+) -> NormalEquations:
+    """Return the prior of a change of base parameters: the description, and other data."""
+    if base is None:
+        return NormalEquations.none(0)
+    described = described_precision(base, arm)
+    held = NormalEquations(described, np.zeros(len(described)))
+    return held if prior is None else held + prior.of_change
+
+
+def _fitted(
+    state: Patch,
+    residual: Sequence[FloatArray],
+    columns: Sequence[FloatArray],
+    held: NormalEquations,
+    estimate: Estimate,
+) -> Fitted:
+    open_values = np.zeros(columns[0].shape[2] - len(state.change))
     return Fitted(
         state.model,
         state.named,

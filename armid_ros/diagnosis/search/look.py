@@ -287,7 +287,7 @@ def _examined(
     whole, most = here.settings.thresholds.misfit_share, here.settings.thresholds.open_share
     open_squares = _open_squares(here)
     there: list[Trial] = []
-    large: list[Trial] = []
+    large: list[tuple[Trial, Trial]] = []
     for trial in ranking[:_LOOKED_AT]:
         if not acceptable(trial, here):
             continue
@@ -301,10 +301,10 @@ def _examined(
         if not (matters and material(size, here, 0.0)):
             continue
         if material(size, here, whole) or surely_changed(trial, here):
-            large.append(trial)
-    best = large[:_COMPARED]
+            large.append((trial, change))
+    best = [trial for trial, _ in large[:_COMPARED]]
     others = [trial for trial in ranking if not any(trial is one for one in best)]
-    compared = _compared(best, here)
+    compared = _compared(best, [change for _, change in large[:_COMPARED]], here)
     pairs = zip(compared, best, strict=True)
     closing = {id(change): closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
@@ -317,18 +317,22 @@ def _open_squares(here: Round) -> FloatArray:
     return np.where(here.gaps(here.residual), np.sum(here.residual**2, axis=0), np.inf)
 
 
-def _compared(trials: Sequence[Trial], here: Round) -> list[Trial]:
+def _compared(trials: Sequence[Trial], alone: Sequence[Trial], here: Round) -> list[Trial]:
     """
     Return the changes of candidates, jointly with all baseline values, on the scale of the gap.
 
     The uncertainty of their values in the baseline hides a part of any change. The one with the
     largest gain is given the gain of its trial without such values, and the others in proportion.
+    Where the baseline determines so little of them jointly that no change is significant, the
+    changes are those jointly with the own baseline value alone.
 
     """
     if here.before is None or len(trials) < 2:
         return list(trials)
     found = _changes(trials, here)
     changes = [trial if one is None else one for trial, one in zip(trials, found, strict=True)]
+    if not any(acceptable(change, here) for change in changes):
+        changes = list(alone)
     first = max(range(len(trials)), key=lambda k: changes[k].gain)
     if changes[first].gain <= 0.0:
         return list(trials)

@@ -230,8 +230,7 @@ def _as_stated(
     """
     Return the names that stay in the model as given.
 
-    Values that may all be zero there are no name, unless that explains most of the gap. Where
-    names explain too little there, the explanation keeps the rigid body common to both days.
+    Where they explain too little there, the explanation keeps the rigid body common to both days.
 
     """
     rest, least = names.rest, settings.thresholds.headline
@@ -243,7 +242,7 @@ def _as_stated(
         bodily, remarks = as_bodies(rest, arm)
         return replace(names, stated=bodily, notes=(_COMMON, *remarks))
     small = smallest(as_described, alone, settings, least)
-    if small is None or alone.share([small]) > settings.thresholds.open_share:
+    if small is None:
         return replace(names, stated=as_described, shares=alone)
     fewer = rest.without(small)
     kept = Names(fewer, fewer, shares_of(fewer, unseen, settings))
@@ -273,12 +272,13 @@ def smallest(
     """
     Return the name of the smallest share that is small print; None if all are headline.
 
-    A name is small print if all of its values may be zero, or if its share is below `least` and no
-    gap opens without it.
+    A name is small print if all of its values may be zero and it does not explain most of the gap,
+    or if its share is below `least` and no gap opens without it.
 
     """
     for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
-        if may_be_nothing(explanation, k):
+        most = shares.share([k]) > settings.thresholds.open_share
+        if may_be_nothing(explanation, k) and not most:
             return k
         small = shares.share([k]) < least
         if small and not _opens(explanation.without(k), explanation, settings):
