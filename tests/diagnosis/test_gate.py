@@ -124,8 +124,11 @@ def test_a_model_of_another_arm_is_doubted(bench):
     assert 'is it the model' not in found.summary
 
 
-@pytest.mark.parametrize('since', [0, 1000])
-def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since):
+@pytest.mark.parametrize(
+    ('since', 'remedy'),
+    [(0, 'record with the joint held still'), (1000, 'leave that time out')],
+)
+def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since, remedy):
     def dead(one):
         tau = one.tau.copy()
         tau[since:, 0] = tau[since, 0] if since else 0.0
@@ -136,6 +139,7 @@ def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since
     )
     assert found.verdict == 'bad_data'
     assert 'the torque of shoulder stays at' in found.summary
+    assert remedy in found.summary
 
 
 def test_a_joint_that_nobody_drives_is_not_dead(bench):

@@ -54,10 +54,12 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
         if stop - start < least or not moved or at_limit:
             continue
         if _changes(arm, motions, j, float(t[start]), float(t[stop - 1])):
+            always = stop - start == len(reading)
+            when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+            remedy = 'record with the joint held still' if always else 'leave that time out'
             yield (
                 f'in {recording.source or "a recording"} the torque of {joint} stays at '
-                f'{reading[start]:.4g} from {t[start]:.3f} s to {t[stop - 1]:.3f} s while the '
-                'joint moves: its channel is dead; leave that time out'
+                f'{reading[start]:.4g} {when} while the joint moves: its channel is dead; {remedy}'
             )
 
 

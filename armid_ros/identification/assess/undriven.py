@@ -113,7 +113,11 @@ def _text(joint: HeldJoint, found: PositionRange, moves: bool, change: str) -> s
             'make it fixed there in the description, or drive it (--joints)'
         )
     carries = f', and carries {", ".join(joint.carries)}' if joint.carries else ''
-    remedy = 'leave out where it moves' if joint.follows else 'drive it as well (--joints)'
+    remedy = (
+        'leave out where it moves'
+        if joint.follows
+        else 'drive it as well (--joints), or hold it still where its torque is not measured'
+    )
     return (
         f'joint {name} is not driven, but moves from {found.lowest:.3g} to {found.highest:.3g} '
         f'{unit}{carries}; the model has it at {joint.position:.3g} {unit}; where it is makes '
