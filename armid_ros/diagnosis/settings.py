@@ -67,7 +67,8 @@ class Thresholds:
     open_share : float
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
         there, however little that is of the gap of the arm; and of the whole gap that a cause
-        takes which is named though nothing shows that it has changed, or though it is small.
+        takes which is named though nothing shows that it has changed, or though each of its values
+        may be zero.
     surely : float
         Deviations that noise may make: a value may be beyond what is possible by so many, and a
         joint is worse, or held, beyond them.
