@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is common goes before what is rare, and an effect before itself where it is seldom."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
+from armid_ros.diagnosis.search import look
 from armid_ros.diagnosis.search.round import beaten, likeliest, rarity, says_no_more
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -101,3 +103,31 @@ def test_a_body_that_contains_an_offset_is_a_rival_where_it_surely_says_more(
     offset = Known(bench, 'torque_offset', gains)
     body = Known(bench, 'link_inertia', (1.0 + ahead) * gains + more - more.mean(), freedom=10.0)
     assert says_no_more(body, offset, asked(360.0, False)) == wanted
+
+
+@dataclass(frozen=True)
+class Change:
+    """The trial of a change: what it takes, and whether it is there beyond chance."""
+
+    name: str
+    cross: float
+    square: float
+    there: bool = True
+
+    @property
+    def gain(self):
+        return 2.0 * self.cross - self.square
+
+
+@pytest.mark.parametrize(('there', 'first'), [(True, 'offset'), (False, 'gain')])
+def test_changes_are_compared_one_by_one_where_a_baseline_tells_no_more(monkeypatch, there, first):
+    """The order of candidates of which none is significant means nothing."""
+    trials = [Change('gain', 7.0, 7.0), Change('offset', 6.8, 6.8)]
+    alone = [Change('gain', 6.0, 6.0), Change('offset', 5.0, 5.0)]
+    jointly = [Change('gain', 0.1, 0.1, False), Change('offset', 0.5, 0.5, there)]
+    monkeypatch.setattr(look, '_changes', lambda *arguments: jointly)
+    monkeypatch.setattr(look, 'acceptable', lambda change, here: change.there)
+    compared = look._compared(trials, alone, SimpleNamespace(before=object()))
+    best = max(compared, key=lambda change: change.gain)
+    assert best.name == first
+    assert best.gain == pytest.approx(next(t.gain for t in trials if t.name == first))
