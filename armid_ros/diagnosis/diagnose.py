@@ -29,10 +29,7 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.attribution import (
-    attribute,
-    Names,
-)
+from armid_ros.diagnosis.verdict.attribution import attribute, Names
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
     harmed,

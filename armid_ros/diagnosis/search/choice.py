@@ -49,7 +49,6 @@ _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
     'are off by is not in the intervals'
 )
-
 #: What would tell a change from a misfit, where there are no or too few recordings.
 _NO_BASELINE = (
     'It may be the misfit of another motion: recordings from before, given as baseline, tell '
@@ -59,7 +58,8 @@ _ONE_EACH = (
     'It may be the misfit of another motion: more than one recording a day tells that from a '
     'change.'
 )
-#: Divisions of the recordings from which on no note says that they are few.
+#: From so many divisions of the recordings on a misfit passes for a change in no more than 5 % of
+#: cases, and no note says that they are few.
 _MANY_WAYS = 20
 
 
@@ -256,14 +256,19 @@ def _noise_within(
 
 def few_recordings(first: int, second: int) -> tuple[str, ...]:
     """Say how easily a misfit of another motion passes for a change in so few recordings."""
-    ways = 1 + count_divisions(first, second) // (2 if first == second else 1)
+    ways = _ways(first, second)
     if ways >= _MANY_WAYS:
         return ()
     which = 'any misfit passes' if ways == 1 else f'one misfit in {ways} passes'
     return (
         f'recordings from before: {first}, since: {second}; of so few {which} for a change where '
-        'motions differ, of four a day one in 35',
+        f'motions differ, of four a day one in {_ways(4, 4)}',
     )
+
+
+def _ways(first: int, second: int) -> int:
+    """Return in how many ways recordings divide; groups of equal sizes may be exchanged."""
+    return 1 + count_divisions(first, second) // (2 if first == second else 1)
 
 
 def _doubt(baseline: Baseline) -> str:

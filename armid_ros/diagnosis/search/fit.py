@@ -134,14 +134,14 @@ def fit(
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     if start.change is not None and base is not None:
         state = state.with_change(start.change, base)
-    held = _prior_of_change(arm, base, prior)
+    described = _described(base, arm)
+    held = _prior_of_change(described, prior)
     rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
     state, residual, columns = _settled(state, evidence, base, held, rounds)
     size = len(state.change)
     names, numbers = state.parameters()
     covariance = np.zeros((size, size))
     if named:
-        described = np.zeros((0, 0)) if base is None else described_precision(base, arm)
         more = [] if prior is None else prior.regressions(state.change, len(numbers))
         covariance = _covariance(columns, residual, evidence, described, more)
     estimate = Estimate(names, numbers, covariance[size:, size:])
@@ -175,19 +175,19 @@ def with_values_of(
     state = Patch(arm, found.named, found.values, np.zeros(0 if base is None else base.rank))
     residual = _residuals(state, evidence.data)
     columns = [patch_columns(state, part, base) for part in evidence.data]
-    held = _prior_of_change(arm, base, prior)
+    held = _prior_of_change(_described(base, arm), prior)
     return _fitted(state, residual, columns, held, found.estimate)
 
 
-def _prior_of_change(
-    arm: ArmModel, base: BaseParameters | None, prior: Prior | None
-) -> NormalEquations:
+def _described(base: BaseParameters | None, arm: ArmModel) -> FloatArray:
+    """Return the precision of the base parameters in the description, (r, r); none if held."""
+    return np.zeros((0, 0)) if base is None else described_precision(base, arm)
+
+
+def _prior_of_change(described: FloatArray, prior: Prior | None) -> NormalEquations:
     """Return the prior of a change of base parameters: the description, and other data."""
-    if base is None:
-        return NormalEquations.none(0)
-    described = described_precision(base, arm)
     held = NormalEquations(described, np.zeros(len(described)))
-    return held if prior is None else held + prior.of_change
+    return held + prior.of_change if prior is not None and len(described) else held
 
 
 def _fitted(

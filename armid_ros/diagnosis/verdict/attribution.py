@@ -278,7 +278,7 @@ def smallest(
     """
     for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
         most = shares.share([k]) > settings.thresholds.open_share
-        if may_be_nothing(explanation, k) and not most:
+        if not most and may_be_nothing(explanation, k):
             return k
         small = shares.share([k]) < least
         if small and not _opens(explanation.without(k), explanation, settings):
