@@ -23,6 +23,8 @@ import numpy.typing as npt
 _BLOCKS = 10
 #: Columns of each joint's own: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
+#: A joint below this share of its top speed may be held by its friction.
+_SLOW = 0.05
 
 
 @dataclass(frozen=True)
@@ -84,9 +86,11 @@ def described_error(motion: Motion, fixed: FloatArray, columns: FloatArray) -> P
 
     """
     assert motion.tau is not None
-    scale = _scale(motion.tau)
-    rest, shared = (motion.tau - fixed) / scale, columns / scale[:, np.newaxis]
-    own = [_own_columns(motion, joint) for joint in range(motion.n_joints)]
+    scale, weight = _scale(motion.tau), _weight(motion)
+    rest = (motion.tau - fixed) / scale * weight
+    shared = columns * (weight / scale)[:, :, np.newaxis]
+    joints = range(motion.n_joints)
+    own = [_own_columns(motion, joint) * weight[:, joint, np.newaxis] for joint in joints]
     left = np.empty_like(rest)
     for fitted in _folds(len(motion)):
         values = _shared_values(own, rest, shared, fitted)
@@ -108,7 +112,9 @@ def fitted_error(robot: Robot, motion: Motion) -> PredictionError:
     for joint in range(n):
         start = columns.shape[2] - _OWN * (n - joint)
         columns[:, joint, start : start + _OWN] = _own_columns(motion, joint)
-    columns /= scale[:, np.newaxis]
+    weight = _weight(motion)
+    rest *= weight
+    columns *= (weight / scale)[:, :, np.newaxis]
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1), axis=0))
     columns /= np.where(size > 0.0, size, 1.0)
     left = np.empty_like(rest)
@@ -154,6 +160,20 @@ def _own_columns(motion: Motion, joint: int) -> FloatArray:
     dq, ddq = motion.dq[:, joint], motion.ddq[:, joint]
     columns = np.column_stack([np.ones(len(dq)), dq, np.sign(dq), ddq])
     return columns / _scale(columns)
+
+
+def _weight(motion: Motion) -> FloatArray:
+    """
+    Return weights of rows, shape (N, n), of mean square one.
+
+    They are zero where a joint rests or turns round. Dry friction is any torque there: a bristle
+    that gives way before it slips looks like a torque that comes late.
+
+    """
+    speed = np.abs(motion.dq)
+    moves = speed > _SLOW * speed.max(axis=0)
+    moves[:, ~moves.any(axis=0)] = True
+    return np.asarray(moves / np.sqrt(moves.mean(axis=0)))
 
 
 def _folds(count: int) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:

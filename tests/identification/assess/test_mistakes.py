@@ -10,6 +10,7 @@ from armid_ros.identification.assess.faulty_samples import faulty_samples
 from armid_ros.identification.assess.hypotheses import hypotheses, known_gravity
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
@@ -90,6 +91,41 @@ def test_recordings_of_arms_drawn_at_random_have_none(name, seed):
     source = str(real_recordings.example_robot(paths[name])) if name in paths else name
     robot = load_robot(source)
     assert mistake_in(robot, recording_of(robot, seed)) == ''
+
+
+def dwelling(joints, count, seed):
+    """Return a motion from pose to pose with dwells, 40 s of 100 samples a second."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(4000) / RATE
+    poses = rng.uniform(-1.0, 1.0, (11, count))
+    leg, share = np.divmod(t, 4.0)
+    s = np.clip(share / 2.5, 0.0, 1.0)[:, np.newaxis]
+    step = 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
+    begin = poses[leg.astype(int)]
+    q = begin + (poses[leg.astype(int) + 1] - begin) * step
+    dq = np.gradient(q, t, axis=0)
+    return Motion(joints, t, q, dq, np.gradient(dq, t, axis=0))
+
+
+def bristles(motion, give):
+    """Return friction of 1 N m that gives way elastically before it slips, shape (N, n)."""
+    bent = np.zeros_like(motion.q)
+    for k in range(1, len(bent)):
+        bent[k] = np.clip(bent[k - 1] + motion.q[k] - motion.q[k - 1], -give, give)
+    return bent / give
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_friction_that_gives_way_before_it_slips_is_no_late_torque(robot, seed):
+    links = robot.rigid_parameters.reshape(-1, 10)
+    links = links * np.random.default_rng(seed).uniform(0.9, 1.1, (robot.n_joints, 1))
+    arm = ArmModel(robot.with_inertias(links.ravel()))
+    motion = dwelling(robot.joints, robot.n_joints, seed)
+    exact = recorded(arm, motion, seed, position_noise=1e-5)
+    size = 0.3 * np.sqrt(np.mean(exact.tau**2, axis=0))
+    friction = size * (bristles(motion, 2e-4) + 0.3 * motion.dq)
+    assert mistake_in(robot, replace(exact, tau=exact.tau + friction)) == ''
+    assert ' ms later' in mistake_in(robot, late(replace(exact, tau=exact.tau + friction), 10))
 
 
 @pytest.mark.parametrize('alone', [0, 1, 2, 3])
