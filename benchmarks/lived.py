@@ -7,7 +7,7 @@ A model is identified on day 1, and the diagnosis is asked about day 2, with day
 about day 1 itself, of which nothing may be named. Cases: tests/hidden/lived/README.md.
 
     python -m benchmarks.lived [KIND] [--cases FIRST:LAST] [--only CAUSE ...] [--no-again]
-        [--plain] [--out FILE] [--processes N]
+        [--plain] [--each N] [--out FILE] [--processes N]
 
 """
 
@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
 from dataclasses import asdict, replace
+from functools import partial
 import json
 import multiprocessing
 import os
@@ -75,6 +76,19 @@ def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> Liv
     except Exception:
         answer = Answer(verdict='failed', error=traceback.format_exc(limit=-3))
     return LivedJudged(LivedTruth.of(case, shares, described), answer, repeated)
+
+
+def ask_few(
+    each: int,
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    *,
+    validate: Sequence[Recording] = (),
+    baseline: Sequence[Recording] = (),
+    contribution: FloatArray | None = None,
+) -> Answer:
+    """Ask with so many recordings of each day, none of which is held out."""
+    return ask(arm, [*recordings, *validate][:each], baseline=baseline[:each])
 
 
 def known_arm(case: LivedCase) -> ArmModel:
@@ -144,6 +158,7 @@ def main() -> None:
     parser.add_argument('--only', nargs='+', default=[], metavar='CAUSE', help='of some causes')
     parser.add_argument('--no-again', action='store_true', help='do not ask about day 1')
     parser.add_argument('--plain', action='store_true', help='ask the plain ranking instead')
+    parser.add_argument('--each', type=int, help='ask with so many recordings of each day')
     parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
@@ -153,7 +168,10 @@ def main() -> None:
     what = f'lived, {options.kind}, {len(cases)} cases'
     what += f', only {" ".join(options.only)}' if options.only else ''
     what += ', the plain ranking' if options.plain else ''
-    question = plain_ranking if options.plain else ask
+    what += f', {options.each} recordings a day' if options.each else ''
+    question: Ask = plain_ranking if options.plain else ask
+    if options.each:
+        question = partial(ask_few, options.each)
     with ExitStack() as stack:
         locked = options.kind.startswith('locked')
         record = stack.enter_context(look(what)) if locked else None

@@ -187,7 +187,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     arm, settings = asked.arm, asked.settings
     asked.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation, arm)
-    notes = [*notes, *chosen.notes, *said]
+    notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
     measured = chosen.measured
@@ -294,8 +294,7 @@ def _excesses(
     rest = names.rest
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
-    there = chosen.measured or bool(rest.steps) or names.taken_back
-    usual = 1.0 if there else more  # a misfit varies from motion to motion
+    usual = 1.0 if chosen.measured else more  # a misfit varies from motion to motion
     left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
     parts = [evidence]
     if unseen is not None:

@@ -39,6 +39,9 @@ class Thresholds:
     misfit_share : float
         Power of a cause over that of the model's own misfit, below which it is small print in that
         joint: a quarter of it names a change in one of five arms to which nothing happened.
+    of_state : float
+        Share of a misfit, root mean square, that is a function of position and velocity: 0.4 to
+        0.8 in half of the joints of 14 arms.
     exchanged : float
         Share of the divisions of all recordings that may show as much of a change as the days do.
         Where there are so many of them that one is less than that, smaller changes are told, too.
@@ -100,6 +103,7 @@ class Thresholds:
     tie: float = 0.02
     far: float = 0.25
     misfit_share: float = 1.0
+    of_state: float = 0.6
     exchanged: float = 0.01
     headline: float = 0.1
     same_fit: float = 1.5

@@ -115,14 +115,15 @@ def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
 
     The description is believed to a factor or so: data decide what they determine, and what they
     hardly determine stays where it predicts other motions well. A value of zero of an effect is
-    no description.
+    no description, but for what the effect knows of its size.
 
     """
     size = len(arm.robot.rigid_parameters)
     spread = np.full(len(base.standard), np.inf)
     spread[:size] = described_spread(arm.robot).ravel()
     known = np.abs(arm.theta[size:])
-    spread[size:] = np.where(known > 0.0, known, np.inf)
+    own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
+    spread[size:] = np.where(known > 0.0, known, own)
     described = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
     finite = np.where(np.isfinite(spread), spread, 0.0)
     grouped = base.grouping[described] * finite
@@ -192,12 +193,20 @@ class Baseline:
             worst / np.maximum(predicted**2, 1e-300),
         )
 
-    @property
-    def error(self) -> float:
-        """Norm of the residual of the model over that of the torque, all joints together."""
-        left = np.concatenate([rows.ravel() for rows in self.residual])
-        torque = np.concatenate([part.torque.ravel() for part in self.data])
-        return float(np.linalg.norm(left) / max(float(np.linalg.norm(torque)), 1e-300))
+    @cached_property
+    def errors(self) -> tuple[float, FloatArray]:
+        """
+        Return the residual of the model over the torque, of the arm and of each joint, (n,).
+
+        Root mean square, where a joint moves: friction holds one at rest with any torque.
+
+        """
+        sums = np.zeros((2, len(self.misfit)))
+        for part, left in zip(self.data, self.residual, strict=True):
+            for k, rows in enumerate((left, part.torque)):
+                sums[k] += np.sum(rows**2, axis=0, where=part.informative)
+        whole = float(np.sqrt(sums[0].sum() / max(float(sums[1].sum()), 1e-300)))
+        return whole, np.sqrt(sums[0] / np.maximum(sums[1], 1e-300))
 
     def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
         """

@@ -133,8 +133,8 @@ class Evidence:
         each = 1.0 - (1.0 - thresholds.confidence) / len(count)
         noise = stats.f.ppf(each, free, free) * (thresholds.same_fit if self.assumed else 1.0)
         own = self.noise_share
-        misfit = np.where(own < 1.0 / thresholds.same_fit, self.as_good(settings), 1.0)
-        return np.asarray(np.maximum(noise, misfit) + self.matters(settings))
+        misfit = own < 1.0 / thresholds.same_fit
+        return np.where(misfit, self.as_good(settings), noise) + self.matters(settings)
 
     def as_good(self, settings: DiagnosisSettings) -> FloatArray:
         """Return the loss of each joint within which a misfit varies between motions, (n,)."""

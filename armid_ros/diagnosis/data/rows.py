@@ -163,6 +163,45 @@ def products(problem: Problem, free: Sequence[int], spans: Sequence[slice]) -> P
     )
 
 
+def set_to_zero(
+    known: Products, prior: NormalEquations, gone: Sequence[int], values: FloatArray
+) -> tuple[Products, NormalEquations]:
+    """
+    Return products and prior as if some nuisance parameters were zero, and no candidates.
+
+    Parameters
+    ----------
+    known : Products
+        Of all nuisance columns.
+    prior : NormalEquations
+        Their prior.
+    gone : sequence of int
+        Positions of the parameters among them.
+    values : ndarray, shape (g,)
+        Their present values, whose torque is added to the residual.
+
+    """
+    there = list(gone)
+    kept = np.setdiff1d(np.arange(len(prior.vector)), there)
+    made = known.free[:, :, there] @ values
+    power = known.power + (2.0 * known.aim + made)[:, there] @ values
+    blocks = len(power)
+    return (
+        Products(
+            known.free[:, kept][:, :, kept],
+            (known.aim + made)[:, kept],
+            np.empty((blocks, len(kept), 0)),
+            np.empty((blocks, 0)),
+            (),
+            power,
+        ),
+        NormalEquations(
+            prior.matrix[np.ix_(kept, kept)],
+            (prior.vector + prior.matrix[:, there] @ values)[kept],
+        ),
+    )
+
+
 def with_candidate(
     known: Products, problem: Problem, free: FloatArray, own: FloatArray
 ) -> Products:

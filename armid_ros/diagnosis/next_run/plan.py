@@ -178,7 +178,7 @@ def next_run(
     telling = [run for run in runs if any(one.z >= _NOTHING for one in run.separations)]
     if runs and not telling:
         pairs = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
-        raise TrajectoryError(f'no motion tells {pairs}'.replace('_', ' '))
+        raise TrajectoryError(f'none of the planned motions tells {pairs}'.replace('_', ' '))
     for run in _in_order(telling):
         settings = _settings(run.template)
         problem = DesignProblem.of(arm, settings, rng)

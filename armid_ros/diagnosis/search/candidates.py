@@ -136,11 +136,17 @@ def fitted_anew(
 
     """
     nuisance_arm, unknown = with_friction(arm, library)
-    bases = []
-    for one in (arm, nuisance_arm):
-        free = np.setdiff1d(np.arange(len(one.parameters)), held)
-        bases.append(excited(one, one.base_parameters(rng, free), data)[0])
-    return Question(arm, bases[0], nuisance_arm, bases[1], unknown, most)
+    base = _excited(arm, data, rng, held)
+    nuisance_base = base if nuisance_arm is arm else _excited(nuisance_arm, data, rng, held)
+    return Question(arm, base, nuisance_arm, nuisance_base, unknown, most)
+
+
+def _excited(
+    arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator, held: Sequence[int]
+) -> BaseParameters:
+    """Return the base parameters that data excite, without values that are held."""
+    free = np.setdiff1d(np.arange(len(arm.parameters)), held)
+    return excited(arm, arm.base_parameters(rng, free), data)[0]
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:

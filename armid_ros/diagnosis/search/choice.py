@@ -15,13 +15,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
 from armid_ros.diagnosis.prepare import Prepared
 from armid_ros.diagnosis.search.acceptance import count_divisions
-from armid_ros.diagnosis.search.candidates import as_given, fitted_anew
+from armid_ros.diagnosis.search.candidates import as_given, fitted_anew, Question
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
     at_floor,
@@ -202,22 +204,16 @@ class Explainer:
         noise = _noise_within(misfit, prepared, usual)
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
-        most, both = 2 * settings.thresholds.few_causes, [*prepared.data, *baseline.data]
-        free = fitted_anew(arm, both, most, settings.library, self.rng)
-        assert free.base is not None and free.nuisance_base is not None
-        prior = baseline.prior(free.arm, free.base)
-        nuisance_prior = (
-            prior
-            if free.nuisance_arm is arm
-            else baseline.prior(free.nuisance_arm, free.nuisance_base)
-        )
-        question = replace(free, prior=prior, nuisance_prior=nuisance_prior, since=True)
+        both = [*prepared.data, *baseline.data]
+        discrepancy = Discrepancy.over(both, settings.thresholds.of_state * misfit)
+        question = self._of_both_days(memoized_arm(arm.with_effect(discrepancy)), baseline)
         more = None
         if self.unseen:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
             more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
         found = explain(question, evidence, settings, baseline=baseline, unseen=more)
-        chosen = Chosen(found, misfit, OWN_MISFIT, doubt=_doubt(baseline))
+        found = found.in_arm(self._of_both_days(arm, baseline))
+        chosen = Chosen(found, misfit, OWN_MISFIT, doubt=_doubt(baseline, arm.robot.joints))
         if not found.steps:
             return chosen
         first = count_recordings(baseline.data)
@@ -229,6 +225,16 @@ class Explainer:
             notes=few_recordings(first, second),
             untested='' if count_divisions(first, second) else _ONE_EACH,
         )
+
+    def _of_both_days(self, arm: ArmModel, baseline: Baseline) -> Question:
+        """Ask what has changed in an arm whose body and friction both days have in common."""
+        both, most = [*self.prepared.data, *baseline.data], 2 * self.settings.thresholds.few_causes
+        free = fitted_anew(arm, both, most, self.settings.library, self.rng)
+        assert free.base is not None and free.nuisance_base is not None
+        prior = nuisance_prior = baseline.prior(free.arm, free.base)
+        if free.nuisance_arm is not arm:
+            nuisance_prior = baseline.prior(free.nuisance_arm, free.nuisance_base)
+        return replace(free, prior=prior, nuisance_prior=nuisance_prior, since=True)
 
 
 def _noise_within(
@@ -271,14 +277,21 @@ def _ways(first: int, second: int) -> int:
     return 1 + count_divisions(first, second) // (2 if first == second else 1)
 
 
-def _doubt(baseline: Baseline) -> str:
+def _doubt(baseline: Baseline, joints: Sequence[str]) -> str:
     """Say that the model is poor on the baseline itself, or nothing if it is not."""
-    error = 100.0 * baseline.error
-    if error <= LIMITS.poor:
+    whole, each = baseline.errors
+    bad = [
+        f'{100.0 * error:.0f} % of that of {joint}'
+        for joint, error in zip(joints, each, strict=True)
+        if 100.0 * error > LIMITS.unusable
+    ]
+    if 100.0 * whole > LIMITS.poor:
+        bad.insert(0, f'{100.0 * whole:.0f} % of the torque of the arm')
+    if not bad:
         return ''
     return (
-        f'The model leaves {error:.0f} % of the torque of the baseline itself: is it the model of '
-        'this arm? A change of less is not seen.'
+        f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this arm? '
+        'A change of less is not seen.'
     )
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.data.trajectory import Workspace
@@ -30,6 +31,7 @@ from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, S
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
 from armid_ros.identification.fitting.normal_equations import NormalEquations
+from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -253,6 +255,7 @@ class Search:
         current = fit(arm, named, self.evidence, base, Start(values, change), prior)
         found = candidates(current, self.evidence, question.kinds(self.settings.kinds))
         problem, nuisance = nuisance_of(found, current, self.evidence)
+        nuisance = replace(nuisance, discrepancy=_discrepancy(current, base))
         before = self._before(current)
         work = Workspace(memoized_arm(current.arm), self.evidence.data)
         here = Round(
@@ -285,6 +288,18 @@ class Search:
         pairs = zip(there.residual, there.columns, strict=True)
         left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
         return replace(before, later=Later.of(unseen, there.columns, left))
+
+
+def _discrepancy(current: Fitted, base: BaseParameters | None) -> tuple[tuple[int, float], ...]:
+    """Return the places of a model discrepancy among the base parameters, and its values."""
+    if base is None:
+        return ()
+    names = {quantity.name for quantity in Discrepancy.quantities}
+    return tuple(
+        (place, float(current.arm.theta[column]))
+        for place, column in enumerate(base.independent)
+        if base.standard[column].name in names
+    )
 
 
 def _offsets(friction: Sequence[Accepted]) -> list[Effect]:

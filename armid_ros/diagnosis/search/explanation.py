@@ -18,6 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.candidates import Question
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
 from armid_ros.diagnosis.search.held_out import as_change, widened
 from armid_ros.diagnosis.search.round import cost
@@ -98,6 +99,25 @@ class Explanation:
         )
         fitted = widened(fitted, self.evidence, self.prior, self.by_chance)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
+
+    def in_arm(self, question: Question) -> Explanation:
+        """Return what the names explain of another question, all fitted anew."""
+        fitted = fit(
+            question.arm,
+            self.fitted.named,
+            self.evidence,
+            question.base,
+            Start(self.fitted.values),
+            question.prior,
+        )
+        return replace(
+            self,
+            given=question.arm,
+            base=question.base,
+            prior=question.prior,
+            fitted=widened(fitted, self.evidence, question.prior, self.by_chance),
+            reference=fit(question.arm, (), self.evidence, question.base, prior=question.prior),
+        )
 
     def with_nothing_named(self) -> Explanation:
         """Return the explanation with all of its names in the small print."""

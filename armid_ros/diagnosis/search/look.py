@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
-from armid_ros.diagnosis.data.rows import products, with_candidate
+from armid_ros.diagnosis.data.rows import products, set_to_zero, with_candidate
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
     changed,
@@ -143,9 +143,12 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     nuisance = here.nuisance
     known = products(here.problem, nuisance.free, [one.columns for one in candidates])
     trials, power = tried_beside(known, here.problem, candidates, nuisance.prior)
-    left = float(power.sum())
-    total = left if here.total is None else here.total
-    here = replace(here, total=total, power=left, known=known)
+    total = float(power.sum()) if here.total is None else here.total
+    if nuisance.discrepancy:
+        places, values = zip(*nuisance.discrepancy, strict=True)
+        alone, prior = set_to_zero(known, nuisance.prior, places, np.array(values))
+        _, power = tried_beside(alone, here.problem, (), prior)
+    here = replace(here, total=total, power=float(power.sum()), known=known)
     seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
     survey = _survey(candidates, ranking, total, len(seen))

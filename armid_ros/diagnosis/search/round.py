@@ -40,16 +40,20 @@ class Nuisance:
         Their columns of the problem.
     prior : NormalEquations
         Their prior.
+    discrepancy : tuple of (int, float)
+        Places of a model discrepancy among them, and its present values [N m].
 
     """
 
     free: tuple[int, ...]
     prior: NormalEquations
+    discrepancy: tuple[tuple[int, float], ...] = ()
 
     def and_columns(self, candidate: Candidate) -> Nuisance:
         """Return the nuisance parameters and those of a candidate."""
         span = range(candidate.columns.start, candidate.columns.stop)
-        return Nuisance((*self.free, *span), self.prior.and_zeros(candidate.precision))
+        prior = self.prior.and_zeros(candidate.precision)
+        return replace(self, free=(*self.free, *span), prior=prior)
 
 
 @dataclass(frozen=True)
@@ -179,7 +183,8 @@ class Round:
     total : float or None
         Held-out squares that shares are of; those of this round if None.
     power : float
-        Held-out squares of this round without any candidate.
+        Held-out squares of this round without any candidate, and without a model discrepancy: what
+        is to be explained, whatever explains it.
     since : bool
         Whether what has changed is asked, and not what was always there.
     tried : int
@@ -337,8 +342,7 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     able = [trial for trial in tied if closing[id(trial)]]
     if able:
         return simplest(able, here)
-    alike = [t for t in tied if t.gain >= (1.0 - ROUNDING) * tied[0].gain]
-    return min(alike, key=rarity)
+    return simplest([t for t in tied if t.gain >= (1.0 - ROUNDING) * tied[0].gain], here)
 
 
 def _usual(trial: Trial) -> bool:

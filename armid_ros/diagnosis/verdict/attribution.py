@@ -187,8 +187,6 @@ class Names:
         Shares of ``stated``.
     notes : tuple of str
         What a reader should know.
-    taken_back : bool
-        Whether names are none any more as nothing tells them from another motion's misfit.
 
     """
 
@@ -196,7 +194,6 @@ class Names:
     stated: Explanation
     shares: Attribution
     notes: tuple[str, ...] = ()
-    taken_back: bool = False
 
     @classmethod
     def of(
@@ -221,7 +218,7 @@ class Names:
         if names.shares.share(range(len(steps))) > thresholds.open_share:
             return names
         rest, stated = (one.with_nothing_named() for one in (names.rest, names.stated))
-        return cls(rest, stated, shares_of(stated, unseen, settings), taken_back=True)
+        return cls(rest, stated, shares_of(stated, unseen, settings))
 
 
 def _as_stated(
