@@ -83,9 +83,9 @@ def ask_few(
     arm: ArmModel,
     recordings: Sequence[Recording],
     *,
-    validate: Sequence[Recording] = (),
-    baseline: Sequence[Recording] = (),
-    contribution: FloatArray | None = None,
+    validate: Sequence[Recording],
+    baseline: Sequence[Recording],
+    **others: object,
 ) -> Answer:
     """Ask with so many recordings of each day, none of which is held out."""
     return ask(arm, [*recordings, *validate][:each], baseline=baseline[:each])

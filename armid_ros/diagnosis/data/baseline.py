@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_rows
 from armid_ros.effects import Effect
 from armid_ros.effects.load import described_spread
@@ -193,7 +194,7 @@ class Baseline:
             worst / np.maximum(predicted**2, 1e-300),
         )
 
-    @cached_property
+    @property
     def errors(self) -> tuple[float, FloatArray]:
         """
         Return the residual of the model over the torque, of the arm and of each joint, (n,).
@@ -201,12 +202,11 @@ class Baseline:
         Root mean square, where a joint moves: friction holds one at rest with any torque.
 
         """
-        sums = np.zeros((2, len(self.misfit)))
-        for part, left in zip(self.data, self.residual, strict=True):
-            for k, rows in enumerate((left, part.torque)):
-                sums[k] += np.sum(rows**2, axis=0, where=part.informative)
-        whole = float(np.sqrt(sums[0].sum() / max(float(sums[1].sum()), 1e-300)))
-        return whole, np.sqrt(sums[0] / np.maximum(sums[1], 1e-300))
+        rows = Evidence.over_noise(self.data, [np.ones_like(self.misfit)] * len(self.data))
+        left = rows.power(self.residual)
+        torque = np.maximum(rows.torque_rms**2, 1e-300)
+        whole = (rows.count @ left) / max(float(rows.count @ torque), 1e-300)
+        return float(np.sqrt(whole)), np.sqrt(left / torque)
 
     def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
         """

@@ -102,22 +102,13 @@ class Explanation:
 
     def in_arm(self, question: Question) -> Explanation:
         """Return what the names explain of another question, all fitted anew."""
-        fitted = fit(
-            question.arm,
-            self.fitted.named,
-            self.evidence,
-            question.base,
-            Start(self.fitted.values),
-            question.prior,
-        )
-        return replace(
-            self,
-            given=question.arm,
-            base=question.base,
-            prior=question.prior,
-            fitted=widened(fitted, self.evidence, question.prior, self.by_chance),
-            reference=fit(question.arm, (), self.evidence, question.base, prior=question.prior),
-        )
+        arm, base, prior = question.arm, question.base, question.prior
+        reference = fit(arm, (), self.evidence, base, prior=prior)
+        moved = replace(self, given=arm, base=base, prior=prior, reference=reference)
+        if not self.steps:
+            return replace(moved, fitted=reference)
+        start = replace(self.fitted, change=np.zeros_like(reference.change))
+        return replace(moved, fitted=start).only(range(len(self.steps)))
 
     def with_nothing_named(self) -> Explanation:
         """Return the explanation with all of its names in the small print."""
