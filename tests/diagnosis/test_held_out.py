@@ -4,7 +4,13 @@
 
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis.data.rows import Problem, products, with_candidate
+from armid_ros.diagnosis.data.rows import (
+    beside_themselves,
+    of_nuisance,
+    Problem,
+    products,
+    with_candidate,
+)
 from armid_ros.diagnosis.search.held_out import held_out, tried_beside
 from armid_ros.diagnosis.search.trial import Candidate, denies, lead
 from armid_ros.effects import CATALOGUE
@@ -130,10 +136,9 @@ def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
     one = [group(bench, precision)]
     twice = replace(problem, x=np.concatenate([own, own, beside], axis=2))
     (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide)
-    both = np.concatenate([own, beside], axis=2)
-    of_both = products(replace(problem, x=both), range(size), ())
-    known = with_candidate(of_both, problem, both, own)
-    (trial,), _ = tried_beside(known, problem, one, wide)
+    alone = products(problem, range(OWN, size), ())
+    known = beside_themselves(with_candidate(alone, problem, beside, own))
+    (trial,), _ = tried_beside(of_nuisance(known, slice(0, OWN)), problem, one, wide)
     np.testing.assert_allclose(trial.values, expected.values, rtol=1e-8)
     np.testing.assert_allclose(trial.gains, expected.gains, rtol=1e-8)
 

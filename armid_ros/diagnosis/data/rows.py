@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.trajectory import block_rows, row_weights, Trajectory
@@ -42,6 +42,14 @@ class Problem:
     weight: FloatArray
     block: npt.NDArray[np.intp]
     fold_of_block: npt.NDArray[np.intp]
+
+    def blocks(self, *values: FloatArray) -> Iterator[tuple[FloatArray, ...]]:
+        """Yield what each block has of rows (R, n) or (R, n, p), as (S,) or (S, p) each."""
+        for one in range(int(self.block.max()) + 1):
+            found = np.flatnonzero(self.block == one)
+            whole = len(found) > 0 and found[-1] - found[0] < len(found)
+            rows = slice(found[0], found[-1] + 1) if whole else found  # a slice copies nothing
+            yield tuple(own[rows].reshape(-1, *own.shape[2:]) for own in values)
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:
@@ -140,19 +148,16 @@ def products(problem: Problem, free: Sequence[int], spans: Sequence[slice]) -> P
     """Return the products of a problem whose first columns are the candidates', a span each."""
     chosen = list(free)
     size = max((span.stop for span in spans), default=0)
-    blocks = int(problem.block.max()) + 1
     parts: list[list[FloatArray]] = [[] for _ in range(5)]
     own: list[list[FloatArray]] = [[] for _ in spans]
-    for block in range(blocks):
-        rows = problem.block == block
-        y = problem.y[rows].ravel()
-        x = problem.x[rows].reshape(len(y), problem.x.shape[2])
+    for x, y in problem.blocks(problem.x, problem.y):
         f, c = x[:, chosen], x[:, :size]
         for part, value in zip(parts, (f.T @ f, f.T @ y, f.T @ c, c.T @ y, y @ y), strict=True):
             part.append(value)
         for products_of, span in zip(own, spans, strict=True):
             products_of.append(c[:, span].T @ c[:, span])
     stacked = [np.array(part) for part in parts]
+    blocks = len(stacked[4])
     return Products(
         stacked[0],
         stacked[1].reshape(blocks, -1),
@@ -220,18 +225,26 @@ def with_candidate(
         Weighted columns of the candidate.
 
     """
-    blocks, size = len(known.power), own.shape[2]
-    border = np.empty((blocks, free.shape[2], size))
-    target, inner = np.empty((blocks, size)), np.empty((blocks, size, size))
-    for block in range(blocks):
-        rows = problem.block == block
-        x = own[rows].reshape(-1, size)
-        border[block] = free[rows].reshape(len(x), -1).T @ x
-        target[block] = x.T @ problem.y[rows].ravel()
-        inner[block] = x.T @ x
+    blocks = list(problem.blocks(free, own, problem.y))
     return replace(
         known,
-        border=border,
-        target=target,
-        own=(inner,),
+        border=np.array([f.T @ x for f, x, _ in blocks]),
+        target=np.array([x.T @ y for _, x, y in blocks]),
+        own=(np.array([x.T @ x for _, x, _ in blocks]),),
     )
+
+
+def beside_themselves(known: Products) -> Products:
+    """Return the products of nuisance columns that consist of one candidate's and all others."""
+    (own,), border = known.own, known.border
+    return replace(
+        known,
+        free=np.block([[own, border.transpose(0, 2, 1)], [border, known.free]]),
+        aim=np.concatenate([known.target, known.aim], axis=1),
+    )
+
+
+def of_nuisance(known: Products, span: slice) -> Products:
+    """Return the products of a candidate whose columns are among the nuisance columns as well."""
+    free = known.free[:, :, span]
+    return replace(known, border=free, target=known.aim[:, span], own=(free[:, span],))

@@ -9,7 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
-from armid_ros.diagnosis.data.rows import products, set_to_zero, with_candidate
+from armid_ros.diagnosis.data.rows import (
+    beside_themselves,
+    of_nuisance,
+    products,
+    set_to_zero,
+    with_candidate,
+)
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
     changed,
@@ -35,7 +41,7 @@ from armid_ros.diagnosis.search.round import (
     what_happens_first,
     worth,
 )
-from armid_ros.diagnosis.search.trial import Candidate, Step, Survey, Trial
+from armid_ros.diagnosis.search.trial import Candidate, Key, Step, Survey, Trial
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -64,8 +70,8 @@ class Look:
         All candidates.
     passing : tuple of Trial
         Those that may be accepted, best first.
-    closing : dict of int to bool
-        Whether each of them, by its id, leaves no gap.
+    closing : dict of Key to bool
+        Whether each of them leaves no gap.
     ranking : tuple of Trial
         The best candidates, one per name and joints, best first.
     here : Round
@@ -75,7 +81,7 @@ class Look:
 
     survey: Survey
     passing: tuple[Trial, ...]
-    closing: dict[int, bool]
+    closing: dict[Key, bool]
     ranking: tuple[Trial, ...]
     here: Round
 
@@ -198,9 +204,9 @@ def _joint_by_joint(
             if first.candidate.effect.external:
                 groups[_ANY].setdefault(where, trial)
     single = [trial for trial in passing if len(_touched(trial, here)) == 1]
-    able = [id(trial) for trial in single if changed(trial, here)]
+    able = [trial.candidate.key for trial in single if changed(trial, here)]
     found = [[*group.values()] for group in groups.values()]
-    found = [group for group in found if any(id(trial) in able for trial in group)]
+    found = [group for group in found if any(trial.candidate.key in able for trial in group)]
     if not found:
         return []
     parts = max(found, key=lambda group: sum(worth(trial, here) for trial in group))
@@ -209,7 +215,7 @@ def _joint_by_joint(
     simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
     if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
         return []
-    return sorted(parts, key=lambda trial: (id(trial) not in able, -worth(trial, here)))
+    return sorted(parts, key=lambda trial: (trial.candidate.key not in able, -worth(trial, here)))
 
 
 def _touched(trial: Trial, here: Round) -> tuple[int, ...]:
@@ -276,7 +282,7 @@ def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial]
 
 def _examined(
     ranking: Sequence[Trial], here: Round
-) -> tuple[list[Trial], list[Trial], dict[int, bool]]:
+) -> tuple[list[Trial], list[Trial], dict[Key, bool]]:
     """
     Return the ranking, the significant trials, and whether each that matters leaves no gap.
 
@@ -309,7 +315,7 @@ def _examined(
     others = [trial for trial in ranking if not any(trial is one for one in best)]
     compared = _compared(best, [change for _, change in large[:_COMPARED]], here)
     pairs = zip(compared, best, strict=True)
-    closing = {id(change): closes(trial, here) for change, trial in pairs}
+    closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
     return result, there, closing
@@ -361,16 +367,20 @@ def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
     """
     if here.before is None:
         return list(trials)
+    assert here.known is not None
     problem = here.problem
     held = here.before.information([one.candidate for one in trials], here.work.arm, here.nuisance)
-    free = np.concatenate([*(here.own(one.candidate) for one in trials), here.free], axis=2)
-    known = products(replace(problem, x=free), range(free.shape[2]), ())
+    own = np.concatenate([here.own(one.candidate) for one in trials], axis=2)
+    known = beside_themselves(with_candidate(here.known, problem, here.free, own))
     result: list[Trial | None] = []
+    first = 0
     for trial in trials:
-        candidate = replace(trial.candidate, columns=slice(0, trial.candidate.size))
-        whole = with_candidate(known, problem, free, here.own(trial.candidate))
+        size = trial.candidate.size
+        candidate = replace(trial.candidate, columns=slice(0, size))
+        whole = of_nuisance(known, slice(first, first + size))
         found, _ = tried_beside(whole, problem, [candidate], held)
         result.append(replace(found[0], candidate=trial.candidate) if found else None)
+        first += size
     return result
 
 
@@ -387,11 +397,11 @@ def _size(change: Trial, takes: FloatArray, here: Round) -> FloatArray:
     return np.asarray(np.minimum(takes, made))
 
 
-def _passing(ranking: Sequence[Trial], closing: dict[int, bool], here: Round) -> list[Trial]:
+def _passing(ranking: Sequence[Trial], closing: dict[Key, bool], here: Round) -> list[Trial]:
     """Return the candidates that may be accepted, best first."""
     result: list[Trial] = []
     for trial in ranking:
-        if id(trial) not in closing or made_of_noise(trial, here):
+        if trial.candidate.key not in closing or made_of_noise(trial, here):
             continue
         fair = without_echo(trial, here)
         if fair is not trial and explains_itself(trial, here):

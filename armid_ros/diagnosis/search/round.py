@@ -14,7 +14,7 @@ from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, Products, project, Projection
 from armid_ros.diagnosis.data.trajectory import Trajectory, Workspace
-from armid_ros.diagnosis.search.trial import Candidate, lead, ROUNDING, Trial
+from armid_ros.diagnosis.search.trial import Candidate, Key, lead, ROUNDING, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.normal_equations import NormalEquations
@@ -324,7 +324,7 @@ def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
     return list(passing)
 
 
-def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -> Trial:
+def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -> Trial:
     """
     Return the simplest of the tied causes that leave no gap, or the best where each leaves one.
 
@@ -339,7 +339,7 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[int, bool], here: Round) -
     tied = [trial for trial in tied if frequency(trial, here) <= least]
     if len(tied) == 1:
         return tied[0]
-    able = [trial for trial in tied if closing[id(trial)]]
+    able = [trial for trial in tied if closing[trial.candidate.key]]
     if able:
         return simplest(able, here)
     return simplest([t for t in tied if t.gain >= (1.0 - ROUNDING) * tied[0].gain], here)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from armid_ros.effects import Effect
 from armid_ros.identification.fitting.jackknife import jackknife
@@ -23,6 +23,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+#: Name, joints and kept values of a candidate.
+Key: TypeAlias = tuple[str, tuple[str, ...], tuple[int, ...]]
 #: Least resolution of an identifiable value: two that data do not separate have a half or less.
 IDENTIFIABLE = 0.9
 #: Relative difference of squares below which it is rounding.
@@ -87,7 +89,7 @@ class Candidate:
         return replace(self, found=(whole, deviation))
 
     @property
-    def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
+    def key(self) -> Key:
         """Name, joints and quantities: candidates of one key differ in their shape."""
         return self.effect.name, self.effect.joints, self.kept
 
