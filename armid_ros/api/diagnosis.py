@@ -29,7 +29,7 @@ from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
 from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.parameters_file import read_misfit
+from armid_ros.identification.parameters_file import identified_from, read_misfit
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.notation import with_interval
 from armid_ros.residual import (
@@ -39,6 +39,7 @@ from armid_ros.residual import (
     Residual,
     TABLE_FILE,
 )
+import numpy as np
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
@@ -195,7 +196,7 @@ def diagnose(
     recordings: RecordingLike | Sequence[RecordingLike],
     *,
     validate: RecordingLike | Sequence[RecordingLike] = (),
-    baseline: RecordingLike | Sequence[RecordingLike] = (),
+    baseline: RecordingLike | Sequence[RecordingLike] | None = None,
     effects: str = '',
     residual: Literal['gp'] | None = None,
     cutoff: float | None = None,
@@ -209,14 +210,16 @@ def diagnose(
     ----------
     arm : identification, model, robot, name or path
         What is believed of the arm. Of what ``identify`` returned, and of the path of the
-        model.yaml that it wrote, it is known what the model left then: without a ``baseline`` the
-        gap is what is beyond that. An `ArmModel` is believed as it is.
+        model.yaml that it wrote, it is known what the model left then, which is no gap. An
+        `ArmModel` is believed as it is.
     recordings : recording or path, or several
         What it did.
     validate : recording or path, or several
         To be predicted and not to be fitted.
-    baseline : recording or path, or several
-        From when the model was right: what it left then is no cause.
+    baseline : recording or path, or several, optional
+        From when the model was right: what it left then is no cause. By default what it was
+        identified from, where that is known and there, and is not looked at; ``()`` asks
+        without.
     effects : str
         Catalogue names with commas, for a robot without a model.
     residual : {'gp'}, optional
@@ -250,9 +253,12 @@ def diagnose(
     if residual is not None:
         require_libraries()
     model, misfit = _believed(arm, effects)
-    looked_at, held_out, before = with_sources_apart(
-        *(recordings_of(group, model.robot) for group in (recordings, validate, baseline))
-    )
+    looked_at, held_out = (recordings_of(group, model.robot) for group in (recordings, validate))
+    if baseline is None:
+        before = _since(arm, model, [*looked_at, *held_out])
+    else:
+        before = recordings_of(baseline, model.robot)
+    looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
     result = run(
         model,
@@ -276,3 +282,21 @@ def _believed(
     model = arm_of(arm, effects)
     written = isinstance(arm, (str, Path)) and is_model(arm)
     return model, read_misfit(str(arm), model) if written else None
+
+
+def _since(
+    arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
+) -> list[Recording]:
+    """Return what a model was identified from; nothing if some of it is looked at."""
+    if isinstance(arm, IdentificationResult):
+        found = [*arm.recordings, *arm.held_out]
+    elif isinstance(arm, (str, Path)) and is_model(arm):
+        found = recordings_of(identified_from(arm), model.robot)
+    else:
+        return []
+    again = any(_same(one, other) for one in found for other in asked)
+    return [] if again else found
+
+
+def _same(one: Recording, other: Recording) -> bool:
+    return bool(np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q))

@@ -24,6 +24,7 @@ from armid_ros.api.arguments import (
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.diagnosis import known_misfit
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
 from armid_ros.identification import (
@@ -116,10 +117,14 @@ class IdentificationResult(Shown):
 
     @property
     def misfit(self) -> Misfit:
-        """What the model leaves, with the covariance of its parameters."""
+        """What the model leaves, with what the recordings tell of its parameters."""
         known = parameters_of(self.arm.robot.name, self.document())
-        covariance = known.standard_covariance(self.arm.parameters)
-        return replace(self.core.misfit(self.validation), covariance=covariance)
+        information = known.information(self.arm.parameters)
+        return replace(self._misfit, information=information)
+
+    @cached_property
+    def _misfit(self) -> Misfit:
+        return known_misfit(self.core, self.recordings, self.held_out)
 
     @property
     def grade(self) -> str:
@@ -170,8 +175,7 @@ class IdentificationResult(Shown):
         """Write model.yaml, identification.json and report.html as ``armid identify`` does."""
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
-        misfit = self.core.misfit(self.validation)
-        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, misfit)
+        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, self._misfit)
         write_document(out / 'identification.json', self.document())
         self.report(out / 'report.html')
         if self.core.physical is not None:

@@ -41,8 +41,9 @@ class Misfit:
         100 |tau - tau_hat| / |tau| over all joints.
     torque_rms : mapping of str to float, or None
         Root mean square torque of each joint [N m]; None where it is not known.
-    covariance : ndarray, shape (P, P), or None
-        Of the parameters of the model, where it is known; model.yaml does not have it.
+    information : ndarray, shape (P, P), or None
+        What the recordings tell of the parameters of the model that it was identified from (the
+        inverse of a covariance), where it is known; model.yaml does not have it.
 
     """
 
@@ -50,7 +51,7 @@ class Misfit:
     rms: Mapping[str, float]
     relative_error_percent: float
     torque_rms: Mapping[str, float] | None = None
-    covariance: FloatArray | None = None
+    information: FloatArray | None = None
 
     def document(self) -> dict[str, Any]:
         """Return the block that model.yaml holds."""

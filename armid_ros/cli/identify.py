@@ -16,6 +16,7 @@ from armid_ros.cli import columns, options
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, print_rows, progress, say, Tick
+from armid_ros.diagnosis import known_misfit
 from armid_ros.errors import IdentificationError
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import (
@@ -234,9 +235,8 @@ def identify(
     if work.scores:
         document['methods'] = [score.document() for score in work.scores]
     source = options.kept_source(robot.robot_source, loaded, out)
-    save_model(
-        out / 'model.yaml', result.arm, source, result.estimate, result.misfit(work.validation)
-    )
+    misfit = known_misfit(result, work.recordings, work.held_out)
+    save_model(out / 'model.yaml', result.arm, source, result.estimate, misfit)
     exports = _export(result.arm, out) if bodies.physical else {}
     page = identification_report(
         result,

@@ -4,11 +4,13 @@
 Diagnosis: where model and measurement disagree, and which effect is missing.
 
 ``diagnose`` names the missing effects, ``diagnosis_document`` returns the result as a document,
-``next_run`` plans the motion that separates two names.
+``next_run`` plans the motion that separates two names, ``known_misfit`` measures what a model
+leaves, for later diagnoses.
 
 """
 
 from armid_ros.diagnosis.diagnose import diagnose
+from armid_ros.diagnosis.known_misfit import known_misfit
 from armid_ros.diagnosis.next_run.plan import EXPERIMENT_FILE, next_run, NextRun
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.document import diagnosis_document
@@ -22,5 +24,6 @@ __all__ = [
     'NextRun',
     'diagnose',
     'diagnosis_document',
+    'known_misfit',
     'next_run',
 ]

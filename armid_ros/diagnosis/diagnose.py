@@ -155,9 +155,9 @@ def diagnose(
         if found is not None:
             return _said(found, notes, asked)
     written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
-    covariance = None if misfit is None else misfit.covariance
+    information = None if misfit is None else misfit.information
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
-    explainer = Explainer(arm, prepared, known, rng, tell, settings, written, seen, covariance)
+    explainer = Explainer(arm, prepared, known, rng, tell, settings, written, seen, information)
     return _said(explainer.chosen(), notes, asked)
 
 

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from armid_ros.arm import ArmModel, Misfit
+from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.estimators.names import Estimator, least_squares_of
@@ -205,17 +205,6 @@ class Identification:
             f'Identification of {self.arm.robot.name}: {error:.2f} % relative error, condition '
             f'number {self.condition_number:.4g}\n{self.estimate}'
         )
-
-    def misfit(self, validation: Mapping[str, Sequence[Fit]]) -> Misfit:
-        """Return what the model leaves, of held-out recordings where there are any."""
-        held_out = [fit for part in validation.values() for fit in part]
-        score = Score.of(held_out or self.training)
-        joints = self.arm.robot.joints
-        rms, torque = (
-            dict(zip(joints, each.tolist(), strict=True)) for each in (score.rms, score.torque_rms)
-        )
-        data = 'held-out' if held_out else 'training'
-        return Misfit(data, rms, score.relative_error_percent, torque)
 
     @property
     def unidentified(self) -> tuple[Unidentified, ...]:

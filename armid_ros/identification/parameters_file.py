@@ -14,6 +14,7 @@ from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
 from armid_ros.identification.description import kinematics_digest
+from armid_ros.identification.fitting.normal_equations import scaled_inverse
 from armid_ros.model.base_parameters import symbol
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot
@@ -75,12 +76,11 @@ class ParameterFile:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
-    def standard_covariance(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
+    def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """
-        Return the covariance of what the values say of standard parameters.
+        Return what the values tell of standard parameters: the inverse of a covariance.
 
-        The torque of a motion that shows no more than theirs is off by that of its columns times
-        this. Parameters that are in none of the values have none.
+        It is zero in directions that no value tells.
 
         Parameters
         ----------
@@ -96,8 +96,9 @@ class ParameterFile:
         if self.covariance is None or len(self.terms) < len(self.values):
             return None
         rows = [self.terms[name] for name in self.values]
-        lift = np.linalg.pinv(_matrix(rows, [symbol(name) for name in parameters]))
-        return np.asarray(lift @ self.covariance @ lift.T)
+        grouping = _matrix(rows, [symbol(name) for name in parameters])
+        told = scaled_inverse(self.covariance)
+        return np.asarray(grouping.T @ told @ grouping)
 
     def regrouped_as(self, other: ParameterFile) -> ParameterFile:
         """
@@ -172,7 +173,7 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     Parameters
     ----------
     path : str or Path
-        model.yaml; the covariance of its parameters is in the identification.json beside it.
+        model.yaml; what is known of its parameters is in the identification.json beside it.
     arm : ArmModel
         The model.
 
@@ -185,7 +186,41 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     misfit, beside = load_misfit(path), Path(path).with_name('identification.json')
     if misfit is None or not is_file(beside):
         return misfit
-    return replace(misfit, covariance=read_parameters(beside).standard_covariance(arm.parameters))
+    return replace(misfit, information=read_parameters(beside).information(arm.parameters))
+
+
+def identified_from(path: str | Path) -> tuple[Path, ...]:
+    """
+    Return the recordings that a model was identified from, held-out ones included, that are there.
+
+    Parameters
+    ----------
+    path : str or Path
+        model.yaml; the identification.json beside it names them. Paths that are relative start
+        here, in that folder, or in the one that it is in.
+
+    Raises
+    ------
+    ModelError
+        If identification.json cannot be read.
+
+    """
+    beside = Path(path).with_name('identification.json')
+    if not is_file(beside):
+        return ()
+    text = read_text(beside, ModelError)
+    with reading(beside, ModelError):
+        document = load_json(text)
+        names = [
+            *document['training']['bags'],
+            *(row['bag'] for row in document.get('validation', [])),
+        ]
+        places = [
+            [start / str(name) for start in (Path(), beside.parent, beside.parent.parent)]
+            for name in names
+        ]
+    found = (next((place for place in some if place.exists()), None) for some in places)
+    return tuple(place for place in found if place is not None)
 
 
 def _with_robot(found: ParameterFile, path: Path) -> ParameterFile:

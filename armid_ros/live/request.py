@@ -10,7 +10,7 @@ import time
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding
-from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.known_misfit import misfit_of
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.errors import ArmidError
 from armid_ros.identification.rows.signals import Conditioning
@@ -43,29 +43,13 @@ class Healthy:
         """
         Measure what the model leaves of the motion: the narrower the band, the less noise.
 
-        Rows count as in a diagnosis, which learns nothing from the friction of a joint at rest.
-
         Raises
         ------
         IdentificationError
             If the motion is too short for the filters.
 
         """
-        data = trajectories([self.recording], filters, self.arm)
-        assert self.recording.tau is not None
-        left = np.concatenate([part.residual(self.arm) for part in data])
-        informative = np.concatenate([part.informative for part in data])
-        informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all of it
-        mean = np.mean(left**2, axis=0, where=informative)
-        whole = float(np.sum(self.recording.tau**2) / len(self.recording))
-        torque = np.mean(
-            np.concatenate([part.torque for part in data]) ** 2, axis=0, where=informative
-        )
-        rms, loud = (
-            dict(zip(self.arm.robot.joints, np.sqrt(each).tolist(), strict=True))
-            for each in (mean, torque)
-        )
-        return Misfit('held-out', rms, 100.0 * float(np.sqrt(mean.sum() / whole)), loud)
+        return misfit_of(self.arm, [self.recording], filters, 'held-out')
 
 
 @dataclass(frozen=True)

@@ -108,9 +108,17 @@ def test_a_saved_identification_is_what_the_command_line_writes(model, tmp_path)
     np.testing.assert_allclose(again.theta, model.arm.theta)
 
 
+def test_what_a_model_was_identified_from_is_its_baseline(model, loaded):
+    found = ar.diagnose(model, loaded)
+    assert found.core.baseline == 'the misfit that the model had before'
+    assert found.names == ('payload',)
+    again = ar.diagnose(model, model.recordings[0])
+    assert again.core.baseline == 'the misfit that the model had when it was identified'
+
+
 def test_what_a_model_left_is_known_of_an_identification_and_of_its_file(model, loaded, tmp_path):
     written = model.save(tmp_path / 'result') / 'model.yaml'
-    first, second = (ar.diagnose(arm, loaded) for arm in (model, written))
+    first, second = (ar.diagnose(arm, loaded, baseline=()) for arm in (model, written))
     assert first.core.baseline == 'the misfit that the model had when it was identified'
     assert first.names == ('payload',)
     assert second.document()['effects'] == first.document()['effects']

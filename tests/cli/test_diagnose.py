@@ -178,6 +178,27 @@ def test_the_misfit_of_the_model_file_is_the_floor_where_there_is_no_baseline(fi
     assert load_misfit(out / 'model.yaml') == misfit
 
 
+def test_what_a_model_was_identified_from_is_the_baseline(doubtful, tmp_path):
+    (now, before), urdf = doubtful, tmp_path / 'arm.urdf'
+    urdf.write_text(URDF, encoding='utf-8')
+    known = tmp_path / 'result' / 'model.yaml'
+    armid('identify', *before, '--robot', urdf, '--out', known.parent)
+    asked = ('--robot', urdf, '--model', known, '--out', tmp_path / 'out')
+
+    def floor(*more, of=now):
+        result = armid('diagnose', *of, *asked, *more)
+        document = json.loads((tmp_path / 'out' / 'diagnosis.json').read_text())
+        return result.output, document['baseline']
+
+    said, unit = floor()
+    assert f'baseline: {before[0]}' in said
+    assert unit == 'the misfit that the model had before'
+    for more, of in ((('--no-baseline',), now), ((), before)):
+        said, unit = floor(*more, of=of)
+        assert 'baseline:' not in said
+        assert unit == 'the misfit that the model had when it was identified'
+
+
 @pytest.mark.parametrize(('text', 'share'), [('2%', 0.02), ('0.5', 0.005), ('0 %', 0.0)])
 def test_what_matters_is_a_percentage(text, share):
     assert Percent().convert(text, None, None) == pytest.approx(share)

@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 
-from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
 from armid_ros.diagnosis.search.choice import few_recordings, WRITTEN_MISFIT
 from armid_ros.diagnosis.search.explain import Search
 from armid_ros.diagnosis.search.explanation import Chosen
@@ -114,11 +114,12 @@ def test_what_another_motion_makes_of_a_misfit_is_no_change(upright, seed):
         lag = -0.004 * np.gradient(tau, motion.t, axis=0)
         return lag + 0.02 * np.abs(tau) * np.sign(motion.dq)
 
-    model = identify(upright.arm, upright.recordings(clutter, 3), rng=np.random.default_rng(0))
+    before = upright.recordings(clutter, 3)
+    model = identify(upright.arm, before, rng=np.random.default_rng(0))
     found = diagnose(
         model.arm,
         upright.recordings(clutter, seed),
-        misfit=model.misfit({}),
+        misfit=known_misfit(model, before),
         rng=np.random.default_rng(0),
     )
     assert (found.verdict, found.findings) == ('consistent', ())
@@ -162,7 +163,7 @@ def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
 
     before = bench.recordings(seed=1)
     model = identify(bench.arm, before, rng=np.random.default_rng(0))
-    known = {'baseline': before} if with_baseline else {'misfit': model.misfit({})}
+    known = {'baseline': before} if with_baseline else {'misfit': known_misfit(model, before)}
     for hidden, wanted in ((None, 'consistent'), (push, 'unknown')):
         now = bench.recordings(hidden, seed=2)
         found = diagnose(model.arm, now, rng=np.random.default_rng(0), **known)

@@ -13,29 +13,26 @@ import numpy as np
 from tests.diagnosis.conftest import Bench
 
 
-def test_torques_are_off_by_the_covariance_of_the_standard_parameters():
+def test_what_values_tell_of_standard_parameters_is_the_inverse_of_their_covariance():
     bench = Bench()
     found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
     read = parameters_of('identification.json', identification_document(found, 'bench', {}))
-    standard = read.standard_covariance(bench.arm.parameters)
-    motion = found.training[0].motion
-    columns = bench.arm.columns(motion)[::20].reshape(-1, len(bench.arm.parameters))
-    base = columns[:, found.base.independent]
-    expected = np.einsum('rp,pq,rq->r', base, found.estimate.covariance, base)
-    off = np.einsum('rp,pq,rq->r', columns, standard, columns)
-    np.testing.assert_allclose(off, expected, rtol=1e-3, atol=1e-9 * expected.max())
-    assert replace(read, covariance=None).standard_covariance(bench.arm.parameters) is None
+    told = read.information(bench.arm.parameters)
+    lift = np.linalg.pinv(found.base.grouping)
+    product = lift.T @ told @ lift @ found.estimate.covariance
+    np.testing.assert_allclose(product, np.eye(found.base.rank), atol=1e-3)
+    hidden = np.eye(len(told)) - lift @ found.base.grouping
+    np.testing.assert_allclose(hidden @ told @ hidden, 0.0, atol=1e-9 * np.abs(told).max())
+    assert replace(read, covariance=None).information(bench.arm.parameters) is None
 
 
-def test_parameters_that_were_not_identified_have_no_variance():
+def test_nothing_is_told_of_parameters_that_were_not_identified():
     bench = Bench()
     found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
     read = parameters_of('identification.json', identification_document(found, 'bench', {}))
     spring = CATALOGUE['joint_spring'].on(bench.robot, ('elbow',))
     arm = bench.arm.with_effect(spring)
-    standard = read.standard_covariance(arm.parameters)
+    told = read.information(arm.parameters)
     known = len(bench.arm.parameters)
-    assert not np.any(standard[known:]) and not np.any(standard[:, known:])
-    np.testing.assert_allclose(
-        standard[:known, :known], read.standard_covariance(bench.arm.parameters)
-    )
+    assert not np.any(told[known:]) and not np.any(told[:, known:])
+    np.testing.assert_allclose(told[:known, :known], read.information(bench.arm.parameters))

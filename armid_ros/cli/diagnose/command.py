@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armid_ros.arm import ArmModel, load_model
@@ -21,7 +21,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.identification.parameters_file import read_misfit
+from armid_ros.identification.parameters_file import identified_from, read_misfit
 from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
@@ -62,6 +62,8 @@ class DiagnosisData:
     ----------
     bags, validate, baseline : tuple of Path
         Recordings to look at, those that are only predicted, and those from before.
+    no_baseline : bool
+        Whether what a model was identified from is no baseline either.
     topic : str or None
         Of the joint states.
 
@@ -70,7 +72,22 @@ class DiagnosisData:
     bags: tuple[Path, ...]
     validate: tuple[Path, ...]
     baseline: tuple[Path, ...]
+    no_baseline: bool
     topic: str | None
+
+    def since(self, model: Path | None) -> DiagnosisData:
+        """
+        Return the same with a baseline: what a model was identified from, if none is given.
+
+        There is none where some of it is looked at: the question is then what the model lacks.
+
+        """
+        if self.baseline or self.no_baseline or model is None:
+            return self
+        found, asked = identified_from(model), [*self.bags, *self.validate]
+        if {path.resolve() for path in found} & {path.resolve() for path in asked}:
+            return self
+        return replace(self, baseline=found)
 
     def read(
         self, robot: Robot, partner: Partner | None, partner_topic: str | None
@@ -134,7 +151,13 @@ class AskedOptions:
     type=click.Path(path_type=Path),
     metavar='BAG',
     help='A bag from when nothing was wrong, to ask what has changed since; may be given several '
-    'times. Without one, the misfit that identify wrote into --model is what the gap is beyond.',
+    'times. By default what --model was identified from, where it is there.',
+)
+@click.option(
+    '--no-baseline',
+    is_flag=True,
+    help='Ask without those recordings: the misfit that identify wrote into --model is what the '
+    'gap is beyond.',
 )
 @click.option(
     '--material',
@@ -199,7 +222,10 @@ def diagnose(
         material=asked.material,
         everything=asked.everything,
     )
+    given, data = data, data if beside is not None else data.since(asked.model)
     misfit = None if asked.model is None or data.baseline else read_misfit(asked.model, arm)
+    if data.baseline != given.baseline:
+        say(f'baseline: {", ".join(map(str, data.baseline))}, which the model was identified from')
     with progress('reading') as tick:
         recordings, held_out, before = data.read(loaded, beside, partner.partner_topic)
         result = diagnose_beside(

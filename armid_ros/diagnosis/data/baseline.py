@@ -22,7 +22,11 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_rows
 from armid_ros.effects import Effect
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.normal_equations import informative_solution, NormalEquations
+from armid_ros.identification.fitting.normal_equations import (
+    informative_solution,
+    NormalEquations,
+    scaled_inverse,
+)
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
@@ -45,22 +49,26 @@ class Prior:
         Their columns of the base parameters, weighted.
     rest : tuple of ndarray, each (M, n)
         The residual that the arm leaves of them, weighted.
+    described : ndarray, shape (r, r)
+        Precision of the base parameters without these rows.
 
     """
 
     data: tuple[Trajectory, ...]
     rows: tuple[FloatArray, ...]
     rest: tuple[FloatArray, ...]
+    described: FloatArray
 
     @cached_property
     def columns(self) -> FloatArray:
         """Return the weighted columns, a row for every joint and row of data, shape (S, r)."""
-        return np.concatenate([rows.reshape(-1, rows.shape[2]) for rows in self.rows])
+        rank = len(self.described)
+        return np.concatenate([np.empty((0, rank)), *(r.reshape(-1, rank) for r in self.rows)])
 
     @cached_property
     def residual(self) -> FloatArray:
         """Return the weighted residual in these rows, shape (S,)."""
-        return np.concatenate([rest.ravel() for rest in self.rest])
+        return np.concatenate([np.empty(0), *(rest.ravel() for rest in self.rest)])
 
     @cached_property
     def of_change(self) -> NormalEquations:
@@ -119,12 +127,7 @@ def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
     no description, but for what the effect knows of its size.
 
     """
-    size = len(arm.robot.rigid_parameters)
-    spread = np.full(len(base.standard), np.inf)
-    spread[:size] = described_spread(arm.robot).ravel()
-    known = np.abs(arm.theta[size:])
-    own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
-    spread[size:] = np.where(known > 0.0, known, own)
+    spread = _described_spread(arm)
     described = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
     finite = np.where(np.isfinite(spread), spread, 0.0)
     grouped = base.grouping[described] * finite
@@ -132,6 +135,44 @@ def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
     precision = np.zeros((base.rank, base.rank))
     precision[np.ix_(described, described)] = np.linalg.pinv(covariance, hermitian=True)
     return precision
+
+
+def _described_spread(arm: ArmModel) -> FloatArray:
+    """Return how far parameters may be from the description; infinite if it has none, (P,)."""
+    size = len(arm.robot.rigid_parameters)
+    known = np.abs(arm.theta[size:])
+    own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
+    effects = np.where(known > 0.0, known, own)
+    return np.concatenate([described_spread(arm.robot).ravel(), effects])
+
+
+@dataclass(frozen=True)
+class Identified:
+    """
+    What is known of a model from recordings that are not there any more.
+
+    Attributes
+    ----------
+    information : ndarray, shape (P, P)
+        Precision of its parameters by those recordings.
+
+    """
+
+    information: FloatArray
+    data: tuple[Trajectory, ...] = ()
+
+    def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
+        """Return the same of base parameters of the arm, or of that with more effects."""
+        size = len(self.information)
+        precision = np.diag(_described_spread(arm) ** -2.0)
+        precision[:size, :size] += self.information
+        told = np.diag(precision) > 0.0
+        known = ~np.any(base.grouping[:, ~told] != 0.0, axis=1)
+        grouping = base.grouping[known][:, told]
+        covariance = grouping @ scaled_inverse(precision[np.ix_(told, told)]) @ grouping.T
+        described = np.zeros((base.rank, base.rank))
+        described[np.ix_(known, known)] = scaled_inverse(covariance)
+        return Prior((), (), (), described)
 
 
 @dataclass(frozen=True)
@@ -218,7 +259,8 @@ class Baseline:
         rows = [
             part.reduce(arm.columns(part.motion)[:, :, base.independent]) for part in self.data
         ]
-        return Prior(self.data, self._weighted(rows), self._weighted(self.residual))
+        rest = self._weighted(self.residual)
+        return Prior(self.data, self._weighted(rows), rest, described_precision(base, arm))
 
     def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
         """Return the columns of an effect over the misfit, one row per row and joint, (S, p)."""

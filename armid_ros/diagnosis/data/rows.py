@@ -49,7 +49,8 @@ class Problem:
             found = np.flatnonzero(self.block == one)
             whole = len(found) > 0 and found[-1] - found[0] < len(found)
             rows = slice(found[0], found[-1] + 1) if whole else found  # a slice copies nothing
-            yield tuple(own[rows].reshape(-1, *own.shape[2:]) for own in values)
+            size = len(found) * self.y.shape[1]
+            yield tuple(own[rows].reshape(size, *own.shape[2:]) for own in values)
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:

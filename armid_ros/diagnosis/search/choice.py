@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
-from armid_ros.diagnosis.data.baseline import Baseline
+from armid_ros.diagnosis.data.baseline import Baseline, Identified
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
@@ -34,7 +34,6 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.held_out import with_model_error
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.assess.grade_limits import LIMITS
@@ -46,7 +45,7 @@ OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 #: Data are sampled as often as others if their sampling period is not longer by this factor.
 _AS_OFTEN = 1.2
-#: Note where a model without a covariance takes the place of a baseline.
+#: Note where nothing is known of how well a model was identified.
 _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
     'are off by is not in the intervals'
@@ -88,8 +87,8 @@ class Explainer:
         Misfit that the model is known to have, where there is no baseline [N m].
     unseen : sequence of Trajectory
         Further data of the day in question, which nothing is fitted to.
-    covariance : ndarray, shape (P, P), or None
-        Of the parameters of the model, where there is no baseline.
+    information : ndarray, shape (P, P), or None
+        What is known of the parameters of the model, where there is no baseline.
 
     """
 
@@ -101,7 +100,7 @@ class Explainer:
     settings: DiagnosisSettings
     written: FloatArray | None = None
     unseen: Sequence[Trajectory] = ()
-    covariance: FloatArray | None = None
+    information: FloatArray | None = None
 
     def chosen(self) -> Chosen:
         """Return the explanation that is given of the gap."""
@@ -137,38 +136,27 @@ class Explainer:
 
     def _beside(self, misfit: FloatArray) -> Chosen:
         """
-        Explain what exceeds a misfit of which only the size is known.
+        Explain what has changed since a model was identified, of whose misfit the size is known.
 
         Another motion makes another misfit, and without the recordings its form is unknown: where
         the residual is within what a model may leave of motions that were not used, nothing is
-        named. Nor is it known whether a body common to both days explains the gap. A body that is
-        fitted anew stays the rival of last resort. It hides loads: where they take most of the gap
-        of a model that was right when it was identified, they have changed, and not all links.
+        named.
 
         """
         prepared, settings = self.prepared, self.settings
-        self.tell(0.2, 'what has changed')
         noise = _noise_within(misfit, prepared, 0.0)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-        most = 2 * settings.thresholds.few_causes
-        given = as_given(self.arm, prepared.data, most, settings.library)
-        found = explain(replace(given, since=True), evidence, settings)
+        known = None if self.information is None else Identified(self.information)
+        found = self._changes(evidence, misfit, known)
         usual = settings.thresholds.predicted * evidence.as_good(settings)
         before = evidence.chi2_per_row(found.reference.residual)
         if np.all(before <= usual + evidence.matters(settings)):
             found = found.with_nothing_named()
-        notes = (_AS_EXACT,) if found.steps and self.covariance is None else ()
-        if self.covariance is not None:
-            fitted = with_model_error(found.fitted, evidence, self.arm, self.covariance)
-            found = replace(found, fitted=fitted)
-        chosen = Chosen(found, misfit, WRITTEN_MISFIT, notes, untested=_NO_BASELINE)
-        if at_floor(found, settings):
+        chosen = Chosen(found, misfit, WRITTEN_MISFIT, untested=_NO_BASELINE)
+        if not found.steps:
             return chosen
-        self.tell(0.6, 'the model fitted anew')
-        anew = self._anew(tuple(np.maximum(one, misfit) for one in prepared.sigma))
-        loads = [step for step in found.steps if step.trial.candidate.effect.changes_body]
-        stays = _most(loads, settings) or _as_good(found, anew, settings)
-        return chosen if stays else replace(chosen, explanation=anew)
+        notes = (_AS_EXACT,) if known is None else ()
+        return replace(chosen, explanation=in_model_as_given(found), rest=found, notes=notes)
 
     def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
         """
@@ -196,7 +184,7 @@ class Explainer:
 
     def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
-        arm, prepared, settings = self.arm, self.prepared, self.settings
+        arm, prepared = self.arm, self.prepared
         self.tell(0.2, 'what has changed')
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
@@ -204,15 +192,11 @@ class Explainer:
         noise = _noise_within(misfit, prepared, usual)
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
-        both = [*prepared.data, *baseline.data]
-        discrepancy = Discrepancy.over(both, settings.thresholds.of_state * misfit)
-        question = self._of_both_days(memoized_arm(arm.with_effect(discrepancy)), baseline)
         more = None
         if self.unseen:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
             more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
-        found = explain(question, evidence, settings, baseline=baseline, unseen=more)
-        found = found.in_arm(self._of_both_days(arm, baseline))
+        found = self._changes(evidence, misfit, baseline, more)
         chosen = Chosen(found, misfit, OWN_MISFIT, doubt=_doubt(baseline, arm.robot.joints))
         if not found.steps:
             return chosen
@@ -226,14 +210,34 @@ class Explainer:
             untested='' if count_divisions(first, second) else _ONE_EACH,
         )
 
-    def _of_both_days(self, arm: ArmModel, baseline: Baseline) -> Question:
-        """Ask what has changed in an arm whose body and friction both days have in common."""
-        both, most = [*self.prepared.data, *baseline.data], 2 * self.settings.thresholds.few_causes
-        free = fitted_anew(arm, both, most, self.settings.library, self.rng)
+    def _changes(
+        self,
+        evidence: Evidence,
+        misfit: FloatArray,
+        known: Baseline | Identified | None,
+        unseen: Evidence | None = None,
+    ) -> Explanation:
+        """Explain what has changed, beside what any model of the arm gets wrong."""
+        arm, settings = self.arm, self.settings
+        data = [*self.prepared.data, *(() if known is None else known.data)]
+        discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit)
+        question = self._since_then(memoized_arm(arm.with_effect(discrepancy)), data, known)
+        baseline = known if isinstance(known, Baseline) else None
+        found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)
+        return found.in_arm(self._since_then(arm, data, known))
+
+    def _since_then(
+        self, arm: ArmModel, data: Sequence[Trajectory], known: Baseline | Identified | None
+    ) -> Question:
+        """Ask what has changed in an arm whose body and friction are as they were known."""
+        library, most = self.settings.library, 2 * self.settings.thresholds.few_causes
+        if known is None:
+            return replace(as_given(arm, data, most, library), since=True)
+        free = fitted_anew(arm, data, most, library, self.rng)
         assert free.base is not None and free.nuisance_base is not None
-        prior = nuisance_prior = baseline.prior(free.arm, free.base)
+        prior = nuisance_prior = known.prior(free.arm, free.base)
         if free.nuisance_arm is not arm:
-            nuisance_prior = baseline.prior(free.nuisance_arm, free.nuisance_base)
+            nuisance_prior = known.prior(free.nuisance_arm, free.nuisance_base)
         return replace(free, prior=prior, nuisance_prior=nuisance_prior, since=True)
 
 
@@ -293,12 +297,6 @@ def _doubt(baseline: Baseline, joints: Sequence[str]) -> str:
         f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this arm? '
         'A change of less is not seen.'
     )
-
-
-def _most(steps: Sequence[Step], settings: DiagnosisSettings) -> bool:
-    """Return whether names take most of the gap."""
-    taken = sum(step.trial.gain / step.total for step in steps)
-    return taken > settings.thresholds.open_share
 
 
 def _beside_a_correction(first: Explanation) -> bool:

@@ -134,7 +134,7 @@ def fit(
     state = Patch(arm, tuple(named), tuple(values), np.zeros(0 if base is None else base.rank))
     if start.change is not None and base is not None:
         state = state.with_change(start.change, base)
-    described = _described(base, arm)
+    described = _described(base, arm, prior)
     held = _prior_of_change(described, prior)
     rounds = _MOST_ROUNDS if named else int(base is not None and prior is None)
     state, residual, columns = _settled(state, evidence, base, held, rounds)
@@ -175,13 +175,15 @@ def with_values_of(
     state = Patch(arm, found.named, found.values, np.zeros(0 if base is None else base.rank))
     residual = _residuals(state, evidence.data)
     columns = [patch_columns(state, part, base) for part in evidence.data]
-    held = _prior_of_change(_described(base, arm), prior)
+    held = _prior_of_change(_described(base, arm, prior), prior)
     return _fitted(state, residual, columns, held, found.estimate)
 
 
-def _described(base: BaseParameters | None, arm: ArmModel) -> FloatArray:
-    """Return the precision of the base parameters in the description, (r, r); none if held."""
-    return np.zeros((0, 0)) if base is None else described_precision(base, arm)
+def _described(base: BaseParameters | None, arm: ArmModel, prior: Prior | None) -> FloatArray:
+    """Return the precision of base parameters without other data, (r, r); none if held."""
+    if base is None:
+        return np.zeros((0, 0))
+    return described_precision(base, arm) if prior is None else prior.described
 
 
 def _prior_of_change(described: FloatArray, prior: Prior | None) -> NormalEquations:

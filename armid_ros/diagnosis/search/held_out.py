@@ -22,7 +22,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import (
@@ -39,7 +38,6 @@ from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
     informative_basis,
-    informative_solution,
     NormalEquations,
     UNINFORMATIVE,
 )
@@ -289,40 +287,6 @@ def as_change(fitted: Fitted, prior: Prior, baseline: Baseline) -> Fitted:
     """
     before = _seen_before(fitted, prior, baseline)
     return _with_deviation(fitted, np.hypot(_known(fitted), before))
-
-
-def with_model_error(
-    fitted: Fitted, evidence: Evidence, arm: ArmModel, covariance: FloatArray
-) -> Fitted:
-    """
-    Widen standard deviations by the errors of a model's parameters, as they propagate to names.
-
-    Parameters
-    ----------
-    fitted : Fitted
-        The model with all names.
-    evidence : Evidence
-        The data.
-    arm : ArmModel
-        The model.
-    covariance : ndarray, shape (P, P)
-        Of its parameters.
-
-    """
-    size = len(fitted.estimate.values)
-    if not size:
-        return fitted
-    own = fitted.prior.matrix.copy()
-    error = np.zeros((len(own), len(covariance)))
-    torques = [part.reduce(arm.columns(part.motion)) for part in evidence.data]
-    pairs = zip(evidence.weighted(fitted.columns), evidence.weighted(torques), strict=True)
-    for columns, torque in pairs:
-        x = columns.reshape(-1, len(own))
-        own += x.T @ x
-        error += x.T @ torque.reshape(len(x), -1)
-    follows = informative_solution(own, error)[-size:]
-    variance = np.einsum('kp,pq,kq->k', follows, covariance, follows)
-    return _with_deviation(fitted, np.hypot(_known(fitted), np.sqrt(np.maximum(variance, 0.0))))
 
 
 def _known(fitted: Fitted) -> FloatArray:

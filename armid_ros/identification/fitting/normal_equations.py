@@ -123,6 +123,18 @@ def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray
     return np.asarray(scaled * both)
 
 
+def scaled_inverse(matrix: FloatArray) -> FloatArray:
+    """
+    Invert a covariance or a precision, (p, p), whose values may be of any units.
+
+    Directions of less than a rounding error of the others get that.
+
+    """
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    both = np.outer(scale, scale)
+    return np.asarray(np.linalg.inv(matrix * both + UNINFORMATIVE * np.eye(len(matrix))) * both)
+
+
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
     Solve normal equations; directions that are not identifiable get no change.

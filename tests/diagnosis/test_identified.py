@@ -1,0 +1,92 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of a model whose recordings are not there any more."""
+
+from dataclasses import replace
+
+from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.diagnosis import diagnose, known_misfit
+from armid_ros.diagnosis.data.baseline import excited, Identified
+from armid_ros.diagnosis.data.discrepancy import Discrepancy
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.trial import Named
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification import identify, SignalSettings
+from armid_ros.identification.output import identification_document
+from armid_ros.identification.parameters_file import parameters_of
+from armid_ros.identification.rows.signals import conditioning
+import numpy as np
+import pytest
+
+
+def told_of(found):
+    """Return what an identification tells of its parameters, and that of a model file."""
+    read = parameters_of('identification.json', identification_document(found, 'arm', {}))
+    return read.information(found.arm.parameters)
+
+
+def test_base_parameters_are_as_sure_as_they_were_identified(bench):
+    found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+    prior = Identified(told_of(found)).prior(found.arm, found.base)
+    std = np.sqrt(np.diag(np.linalg.inv(prior.described)))
+    np.testing.assert_allclose(std, found.estimate.std, rtol=0.01)  # the description tells little
+    assert prior.columns.shape == (0, found.base.rank)
+    assert not np.any(prior.of_change.matrix)
+
+
+def test_what_was_not_identified_is_as_sure_as_its_description(bench):
+    recordings = bench.recordings()
+    data = trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm)
+    size = len(bench.arm.parameters)
+    discrepancy = Discrepancy.over(data, np.array([0.3, 0.1]))
+    arm = memoized_arm(bench.arm.with_effect(discrepancy))
+    base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
+    prior = Identified(1e12 * np.eye(size)).prior(arm, base)
+    told = np.any(base.grouping[:, :size] != 0.0, axis=1)
+    covariance = np.linalg.inv(prior.described)[np.ix_(~told, ~told)]
+    grouping, spread = base.grouping[~told][:, size:], discrepancy.spread(bench.robot)
+    np.testing.assert_allclose(covariance, (grouping * spread**2) @ grouping.T, rtol=1e-3)
+
+
+def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
+    """Errors of values over models that are off by draws of their covariance."""
+    rng = np.random.default_rng(7)
+    size = len(bench.arm.parameters)
+    off, own = [13, 21], 1e-4 * np.array([[1.0, 0.5], [0.5, 1.0]])  # mz, viscous friction
+    told = 1e12 * np.eye(size)
+    told[np.ix_(off, off)] = np.linalg.inv(own)
+    recordings = bench.recordings(lambda m, tau: np.array([0.0, 0.4]) * m.q)
+    data = tuple(trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm))
+    evidence = Evidence.over_noise(data, tuple(np.full(2, 0.3) for _ in data))
+    named = [Named(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
+    base, _ = excited(bench.arm, bench.arm.base_parameters(np.random.default_rng(0)), data)
+    errors = []
+    for _ in range(40):
+        theta = bench.arm.theta
+        theta[off] += rng.multivariate_normal(np.zeros(2), own)
+        arm = bench.arm.with_theta(theta)
+        found = fit(arm, named, evidence, base, prior=Identified(told).prior(arm, base))
+        errors.append((found.estimate.values[0] - 0.4) / found.estimate.std[0])
+    alone = fit(bench.arm, named, evidence, None).estimate.std[0]
+    assert found.estimate.std[0] > 1.2 * alone
+    assert np.mean(np.abs(errors) < 2.0) >= 0.9
+
+
+@pytest.mark.parametrize('seed', [0, 1])
+def test_what_a_model_was_identified_wrong_is_no_change(upright, seed):
+    """A slow short motion hardly tells inertias; a fast one of another day does."""
+    known = upright.recordings(seed=seed)[:1]
+    short = [replace_end(known[0], 0.25)]
+    model = identify(upright.arm, short, rng=np.random.default_rng(0))
+    misfit = replace(known_misfit(model, short), information=told_of(model))
+    found = diagnose(
+        model.arm, upright.recordings(seed=seed + 5), misfit=misfit, rng=np.random.default_rng(0)
+    )
+    assert (found.verdict, found.findings) == ('consistent', ())
+
+
+def replace_end(recording, share):
+    """Return the first part of a recording."""
+    return recording.select(slice(0, int(share * len(recording.t))))
