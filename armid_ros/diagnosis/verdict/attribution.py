@@ -203,7 +203,7 @@ class Names:
         Return what is given of the names of an explanation.
 
         Where recordings cannot tell a change from another motion's misfit, names have to explain
-        most of the gap.
+        most of the gap in which they were found.
 
         """
         thresholds = settings.thresholds
@@ -215,7 +215,7 @@ class Names:
         steps = names.stated.steps
         if not (chosen.untested and steps):
             return names
-        if names.shares.share(range(len(steps))) > thresholds.open_share:
+        if attribute(names.stated, None).share(range(len(steps))) > thresholds.open_share:
             return names
         rest, stated = (one.with_nothing_named() for one in (names.rest, names.stated))
         return cls(rest, stated, shares_of(stated, unseen, settings))
