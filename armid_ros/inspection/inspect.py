@@ -25,8 +25,6 @@ _TURNS = 4.0 * np.pi
 _DEGREE = np.pi / 180.0
 #: Steps between samples that vary by more than this share blur what is differentiated.
 _JITTER = 0.2
-#: A fit that leaves more than this share of the efforts explains little [%].
-POOR = 20.0
 
 
 @dataclass(frozen=True)
@@ -149,11 +147,10 @@ def inspect(
 
 
 def _of_fit(trial: TrialFit) -> Iterator[Remark]:
-    error = trial.relative_error_percent
-    if error is not None and error > POOR:
+    if trial.poor:
         yield Remark(
             'doubt',
-            f'rigid body and friction leave {error:.0f} % of the efforts; look for axes or zeros '
+            f'rigid body and friction leave {", ".join(trial.poor)}; look for axes or zeros '
             'other than those of the description, another unit, or contact',
         )
 
