@@ -11,6 +11,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import ArmidError
 from armid_ros.identification import Identification, identify, Score
+from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.undriven import held_elsewhere
@@ -48,6 +50,8 @@ class TrialFit:
         Joints that moved, or stood elsewhere, without being driven.
     poor : tuple of str
         Joints whose torque the fit hardly describes, each with its error.
+    dead : tuple of str
+        Channels that read the same though their joint moves.
 
     """
 
@@ -61,6 +65,7 @@ class TrialFit:
     notes: tuple[str, ...] = ()
     elsewhere: tuple[str, ...] = ()
     poor: tuple[str, ...] = ()
+    dead: tuple[str, ...] = ()
 
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
@@ -96,6 +101,10 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         notes=result.notes,
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
         poor=tuple(_poor(result, score.joint_relative_error_percent)),
+        dead=(
+            *dead_encoders(robot, recording, motions),
+            *dead_channels(arm, recording, motions),
+        ),
     )
 
 

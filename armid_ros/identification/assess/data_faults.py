@@ -17,6 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -122,13 +123,17 @@ def check_data(
         What a reader should know.
 
     """
-    mistaken = _mistaken(arm, recordings, used)
+    motions = {
+        one.source: [part.motion for part in data if part.source == one.source]
+        for one in recordings
+    }
+    blind = [x for one in recordings for x in dead_encoders(arm.body, one, motions[one.source])]
+    mistaken = blind or _mistaken(arm, recordings, used)
     if mistaken:
         return mistaken, []
     faults = [*_time_base(recordings, _band(used, data)), *_laws(arm, data)]
-    for recording in recordings:
-        motions = [part.motion for part in data if part.source == recording.source]
-        faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, motions)]
+    for one in recordings:
+        faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
     faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
     notes += _described_friction(arm)

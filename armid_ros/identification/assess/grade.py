@@ -16,6 +16,7 @@ from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
@@ -80,8 +81,11 @@ def grade(
         Those recordings.
 
     """
+    blind = _blind(result, description, validation, [*recordings, *held_out])
+    seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
     reasons = [
-        *_mistakes(result, description, [*recordings, *held_out]),
+        *(_Reason('unusable', _sentence(text)) for texts in blind.values() for text in texts),
+        *_mistakes(result, description, seeing),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
         *_errors(result, validation),
@@ -115,6 +119,21 @@ def _mistakes(
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
         yield _Reason('unusable' if certain else 'poor', _sentence(text))
+
+
+def _blind(
+    result: Identification,
+    description: ArmModel,
+    validation: Mapping[str, Sequence[Fit]],
+    recordings: Sequence[Recording],
+) -> dict[str, list[str]]:
+    """Say of which recordings encoders are dead; what else they seem to show is of that."""
+    fits = _fits(result, validation)
+    said = {}
+    for recording in recordings:
+        motions = [fit.motion for fit in fits if fit.source == recording.source]
+        said[recording.source] = list(dead_encoders(description.body, recording, motions))
+    return {source: texts for source, texts in said.items() if texts}
 
 
 def _dead(

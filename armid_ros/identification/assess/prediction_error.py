@@ -117,10 +117,29 @@ def fitted_error(robot: Robot, motion: Motion) -> PredictionError:
     columns *= (weight / scale)[:, :, np.newaxis]
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1), axis=0))
     columns /= np.where(size > 0.0, size, 1.0)
+    return _error(left_of_blocks(columns, rest), scale, np.empty(0))
+
+
+def left_of_blocks(columns: FloatArray, rest: FloatArray) -> FloatArray:
+    """
+    Return what is left of rows where blocks take turns at being fitted and being predicted.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (N, n, k)
+        Of mean square one, what values are multiplied by.
+    rest : ndarray, shape (N, n)
+        What is fitted, as a share of the torque of each joint.
+
+    Returns
+    -------
+    ndarray, shape (N, n)
+
+    """
     left = np.empty_like(rest)
-    for fitted in _folds(len(motion)):
+    for fitted in _folds(len(rest)):
         left[~fitted] = _left(columns, rest, fitted)
-    return _error(left, scale, np.empty(0))
+    return left
 
 
 def _left(columns: FloatArray, rest: FloatArray, fitted: npt.NDArray[np.bool_]) -> FloatArray:
