@@ -25,6 +25,10 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
     """
     Return what is left of errors of joints without the noise of their torques.
 
+    Noise counts twice: a row has it, and so has the prediction of a row, where that is as sure as a
+    measurement of it (leverage of one, Hoaglin and Welsch 1978). A model that is no further off
+    than a sensor is not what is wrong.
+
     Parameters
     ----------
     errors : ndarray, shape (n,)
@@ -45,7 +49,7 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
     rows = np.maximum(np.count_nonzero(told, axis=0), 1)
     size = np.sqrt(np.sum(torque**2, axis=0) / rows)
     noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
-    left = np.sqrt(np.maximum(np.square(errors) - np.square(100.0 * noise), 0.0))
+    left = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * noise), 0.0))
     moved = np.max([np.ptp(fit.motion.q, axis=0) for fit in fits], axis=0) >= REST_RANGE
     return np.where(moved, left, 0.0)
 
