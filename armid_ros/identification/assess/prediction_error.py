@@ -36,16 +36,26 @@ class PredictionError:
     ----------
     joints : ndarray, shape (n,)
         Of each joint, as a share of its torque.
-    whole : float
-        Of all joints together.
+    torque : ndarray, shape (n,)
+        Root mean square torque of each joint [N m or N].
     shared : ndarray, shape (k,)
         Values that all joints share, fitted to all blocks.
 
     """
 
     joints: FloatArray
-    whole: float
+    torque: FloatArray
     shared: FloatArray
+
+    def whole(self, robot: Robot) -> float:
+        """Return the error of all slides or of all other joints together, whichever is more."""
+        alike = [robot.prismatic, ~robot.prismatic]
+        left = self.joints * self.torque
+        return max(
+            float(np.linalg.norm(left[own]) / np.linalg.norm(self.torque[own]))
+            for own in alike
+            if np.any(own)
+        )
 
     def gain(self, better: PredictionError) -> float:
         """
@@ -61,7 +71,7 @@ class PredictionError:
     def least(self, other: PredictionError) -> PredictionError:
         """Return the smaller error of every joint."""
         joints = np.minimum(self.joints, other.joints)
-        return PredictionError(joints, min(self.whole, other.whole), np.empty(0))
+        return PredictionError(joints, self.torque, np.empty(0))
 
     def best_gain(self) -> float:
         """Return the largest gain that anything could have."""
@@ -207,6 +217,4 @@ def _scale(columns: FloatArray) -> FloatArray:
 
 
 def _error(left: FloatArray, scale: FloatArray, shared: FloatArray) -> PredictionError:
-    joints = np.sqrt(np.mean(left**2, axis=0))
-    whole = np.linalg.norm(joints * scale) / np.linalg.norm(scale)
-    return PredictionError(joints, float(whole), shared)
+    return PredictionError(np.sqrt(np.mean(left**2, axis=0)), scale, shared)
