@@ -155,7 +155,9 @@ def _mistaken(
         return []
     ratio = _since(arm, recordings, used, before)
     if ratio is not None and unit_of(ratio):
-        return [f'torques are in {unit_of(ratio)} if those of the baseline are in N m: convert them']
+        return [
+            f'torques are in {unit_of(ratio)} if those of the baseline are in N m: convert them'
+        ]
     said: set[tuple[str, ...]] = set()
     for recording in recordings:
         mistake = find_mistake(arm.body, recording, used)

@@ -168,4 +168,3 @@ def _thinned(motions: Sequence[Motion]) -> Motion | None:
     arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
     step = max(1, len(arrays[0]) // _ROWS)
     return Motion(parts[0].joints, *(array[::step] for array in arrays))
-

@@ -25,8 +25,8 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
     """
     Return what is left of errors of joints without the noise of their torques.
 
-    Noise counts twice: a row has it, and so has the prediction of a row, where that is as sure as a
-    measurement of it (leverage of one, Hoaglin and Welsch 1978). A model that is no further off
+    Noise counts twice: a row has it, and so has the prediction of a row, where that is as sure as
+    a measurement of it (leverage of one, Hoaglin and Welsch 1978). A model that is no further off
     than a sensor is not what is wrong.
 
     Parameters

@@ -246,7 +246,7 @@ def test_currents_for_torques(robot, sound, factor):
 )
 @pytest.mark.parametrize('rubs', [1.0, 20.0])
 def test_a_unit_of_all_torques_is_no_gravity_and_no_current(robot, factor, unit, rubs):
-    """Where friction is most of a torque, gravity of a thousand times as much explains the rest."""
+    """Where friction is most of a torque, gravity a thousand times as large explains the rest."""
     recording = recording_of(robot, 1, friction=rubs)
     wrong = replace(recording, tau=factor * recording.tau)
     used = conditioning([wrong], SignalSettings())
