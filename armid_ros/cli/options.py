@@ -18,7 +18,13 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import is_table
-from armid_ros.robots import driven_in_words, load_robot, Robot, robot_from_urdf
+from armid_ros.robots import (
+    driven_in_words,
+    load_robot,
+    parse_gravity,
+    Robot,
+    robot_from_urdf,
+)
 import click
 from click.core import ParameterSource
 import numpy as np
@@ -160,9 +166,9 @@ def _loaded(
     )
 
 
-def model_of(path: Path, robot: Robot) -> ArmModel:
+def model_of(path: Path, robot: Robot | None) -> ArmModel:
     """
-    Read the model.yaml of a robot.
+    Read the model.yaml of a robot, or of the one that it names.
 
     Raises
     ------
@@ -171,11 +177,14 @@ def model_of(path: Path, robot: Robot) -> ArmModel:
 
     """
     arm = load_model(path, robot)
-    asked = click.get_current_context().get_parameter_source('gravity')
-    if asked is ParameterSource.COMMANDLINE and not np.allclose(arm.robot.gravity, robot.gravity):
-        told, own = (','.join(f'{part:g}' for part in one.gravity) for one in (robot, arm.robot))
+    context = click.get_current_context()
+    if context.get_parameter_source('gravity') is not ParameterSource.COMMANDLINE:
+        return arm
+    asked, own = parse_gravity(context.params['gravity']), arm.robot.gravity
+    if not np.allclose(asked, own):
+        told, known = (','.join(f'{part:g}' for part in vector) for vector in (asked, own))
         raise ModelError(
-            f'{path}: its gravity is {own}, and --gravity says {told}: leave --gravity out, or '
+            f'{path}: its gravity is {known}, and --gravity says {told}: leave --gravity out, or '
             'write that gravity into the file if the arm stands there now'
         )
     return arm

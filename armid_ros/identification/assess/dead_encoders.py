@@ -151,7 +151,7 @@ def _moves_unseen(robot: Robot, motions: Sequence[Motion], joint: int) -> bool:
     columns = (columns / np.where(length > 0.0, length, 1.0))[:, np.newaxis]
     left = left_of_blocks(columns, (torque - described)[:, np.newaxis] / size)[:, 0]
     smooth = float(np.mean(left**2)) - _white(left)
-    return 100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor
+    return bool(100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor)
 
 
 def _white(values: FloatArray) -> float:
