@@ -172,6 +172,10 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
 
     """
     path = Path(path)
+    if path.is_dir():
+        inside = path / 'model.yaml'
+        hint = f'name the model in it, {inside}' if inside.is_file() else 'there is no model.yaml'
+        raise ModelError(f'{path}: a folder; {hint}')
     text = read_text(path, ModelError)
     with reading(path, ModelError):
         document = _document(text)

@@ -8,18 +8,25 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
 from armid_ros.effects import make_effect, USUAL_EFFECTS
-from armid_ros.errors import RecordingError, RobotError, visible
+from armid_ros.errors import ModelError, RecordingError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import is_table
-from armid_ros.robots import driven_in_words, load_robot, Robot, robot_from_urdf
+from armid_ros.robots import (
+    driven_in_words,
+    load_robot,
+    parse_gravity,
+    Robot,
+    robot_from_urdf,
+)
 import click
+from click.core import ParameterSource
 import numpy as np
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
@@ -157,6 +164,30 @@ def _loaded(
         f'no /robot_description in {", ".join(map(str, bags)) or "any bag"}; '
         'name the URDF with --robot'
     )
+
+
+def model_of(path: Path, robot: Robot | None) -> ArmModel:
+    """
+    Read the model.yaml of a robot, or of the one that it names.
+
+    Raises
+    ------
+    ModelError
+        It cannot be read, or has another gravity than --gravity asks for.
+
+    """
+    arm = load_model(path, robot)
+    context = click.get_current_context()
+    if context.get_parameter_source('gravity') is not ParameterSource.COMMANDLINE:
+        return arm
+    asked, own = parse_gravity(context.params['gravity']), arm.robot.gravity
+    if not np.allclose(asked, own):
+        told, known = (','.join(f'{part:g}' for part in vector) for vector in (asked, own))
+        raise ModelError(
+            f'{path}: its gravity is {known}, and --gravity says {told}: leave --gravity out, or '
+            'write that gravity into the file if the arm stands there now'
+        )
+    return arm
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:

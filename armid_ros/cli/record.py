@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from armid_ros.arm import ArmModel, load_model
+from armid_ros.arm import ArmModel
 from armid_ros.cli import options
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
@@ -58,7 +58,7 @@ class ArmOptions:
             require_masses(robot)
             arm, drives = shipped_arm(robot)
         else:
-            arm, drives = load_model(self.model, robot), None
+            arm, drives = options.model_of(self.model, robot), None
         for text in self.texts:
             arm = arm.with_effect(*_of_some_size(text, robot))
         return arm, drives

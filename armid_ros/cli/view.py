@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from armid_ros.arm import ArmModel, load_model
+from armid_ros.arm import ArmModel
 from armid_ros.cli import columns, options
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import say
@@ -137,7 +137,7 @@ def _arm(bag: Path, model: Path | None, robot: OptionalRobot) -> ArmModel:
     """Return the model that is meant; without one, the bodies of the description."""
     loaded = None if robot.robot_source is None else robot.load([bag])
     if model is not None:
-        return load_model(model / 'model.yaml' if model.is_dir() else model, loaded)
+        return options.model_of(model / 'model.yaml' if model.is_dir() else model, loaded)
     return ArmModel(robot.load([bag]) if loaded is None else loaded)
 
 

@@ -137,7 +137,8 @@ def diagnose(
     recordings, validate, baseline, repairs = mended(recordings, validate, baseline, settings)
     used = choose_filters(arm, recordings, baseline, settings, rng.spawn(1)[0])
     data: Sequence[Trajectory] = trajectories(recordings, used, arm)
-    faults, notes = check_data(arm, recordings, used, [part.stretch for part in data])
+    stretches = [part.stretch for part in data]
+    faults, notes = check_data(arm, recordings, used, stretches, baseline)
     notes += repairs
     if faults:
         return _bad(given, data, faults, notes)

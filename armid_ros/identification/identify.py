@@ -14,7 +14,7 @@ from armid_ros.identification.estimators.names import Estimator, least_squares_o
 from armid_ros.identification.estimators.refine import refined
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques
 from armid_ros.identification.fitting.excited import excited
-from armid_ros.identification.fitting.halves import halves_error
+from armid_ros.identification.fitting.halves import halves_error, HalvesError
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
 from armid_ros.identification.fitting.least_squares import Method
 from armid_ros.identification.fitting.nonlinear import fit_values, FittedValues, through, torques
@@ -175,8 +175,8 @@ class Identification:
         What was asked.
     notes : tuple of str
         What a person should know: joints at rest, outliers, grouped parameters.
-    halves_error : float
-        Relative torque error when either half of the data predicts the other [%].
+    halves : HalvesError
+        Torque error when either half of the data predicts the other.
     physical : PhysicalCertificate or None
         What shows that the links are bodies, where that was asked.
     passes : int
@@ -194,7 +194,7 @@ class Identification:
     used: Conditioning
     settings: IdentificationSettings
     notes: tuple[str, ...]
-    halves_error: float
+    halves: HalvesError
     physical: PhysicalCertificate | None = None
     passes: int = 1
 
@@ -310,7 +310,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes + _unsettled(fit),
-        halves_error=halves_error(fit.problem, fit.solution.weights, fit.base.values(whole.theta)),
+        halves=halves_error(fit.problem, fit.solution.weights, fit.base.values(whole.theta)),
         physical=certificate,
         passes=fit.passes,
     )

@@ -73,7 +73,8 @@ def identification_document(
         'training': {
             'bags': list(dict.fromkeys(fit.source for fit in result.training)),
             **_score(result.training),
-            'halves_error_percent': result.halves_error,
+            'halves_error_percent': result.halves.whole,
+            'joint_halves_error_percent': _by_joint(result, result.halves.joints),
         },
         'validation': [{'bag': bag, **_score(fits)} for bag, fits in validation.items()],
         'residual_std': _by_joint(result, result.joint_std),

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.rows.checks import beyond_limits, too_short_to_tell
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
@@ -25,8 +26,6 @@ _TURNS = 4.0 * np.pi
 _DEGREE = np.pi / 180.0
 #: Steps between samples that vary by more than this share blur what is differentiated.
 _JITTER = 0.2
-#: A fit that leaves more than this share of the efforts explains little [%].
-POOR = 20.0
 
 
 @dataclass(frozen=True)
@@ -90,6 +89,8 @@ class Inspection:
             return 'Fit to be identified, as far as can be said without --robot.'
         if self.trial.refused:
             return 'armid identify refuses it.'
+        if self.trial.dead:
+            return 'armid identify calls what it makes of it unusable.'
         return (
             f'armid identify takes it: relative error {self.trial.relative_error_percent:.1f} %, '
             f'{self.trial.rank} of {self.trial.theory} parameters told apart.'
@@ -133,6 +134,7 @@ def inspect(
         *_of_motion(recording, joints, sampling),
         *_of_efforts(joints, robot, trial),
         *_of_filters(recording),
+        *(Remark('bad', text) for text in _dead(recording, robot, trial)),
     ]
     if trial is not None and trial.refused:
         found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
@@ -148,12 +150,18 @@ def inspect(
     return Inspection(recording, topics, robot, sampling, joints, trial, remarks)
 
 
+def _dead(recording: Recording, robot: Robot | None, trial: TrialFit | None) -> Iterable[str]:
+    """Say which channels are dead; without a fit, as far as positions and velocities tell."""
+    if trial is None or trial.refused:
+        return dead_encoders(robot, recording)
+    return trial.dead
+
+
 def _of_fit(trial: TrialFit) -> Iterator[Remark]:
-    error = trial.relative_error_percent
-    if error is not None and error > POOR:
+    if trial.poor:
         yield Remark(
             'doubt',
-            f'rigid body and friction leave {error:.0f} % of the efforts; look for axes or zeros '
+            f'rigid body and friction leave {", ".join(trial.poor)}; look for axes or zeros '
             'other than those of the description, another unit, or contact',
         )
 

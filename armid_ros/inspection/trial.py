@@ -4,15 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import ArmidError
-from armid_ros.identification import (
-    identify,
-    Score,
-)
+from armid_ros.identification import Identification, identify, Score
+from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
@@ -46,6 +48,10 @@ class TrialFit:
         What the identification says.
     elsewhere : tuple of str
         Joints that moved, or stood elsewhere, without being driven.
+    poor : tuple of str
+        Joints whose torque the fit hardly describes, each with its error.
+    dead : tuple of str
+        Channels that read the same though their joint moves.
 
     """
 
@@ -58,6 +64,8 @@ class TrialFit:
     scale: FloatArray | None = None
     notes: tuple[str, ...] = ()
     elsewhere: tuple[str, ...] = ()
+    poor: tuple[str, ...] = ()
+    dead: tuple[str, ...] = ()
 
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
@@ -82,9 +90,9 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     except ArmidError as refusal:
         return TrialFit(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
-    error = Score.of(result.training).relative_error_percent
+    score = Score.of(result.training)
     return TrialFit(
-        relative_error_percent=error,
+        relative_error_percent=score.relative_error_percent,
         rank=result.base.rank,
         theory=result.theory.rank,
         condition_number=result.condition_number,
@@ -92,7 +100,20 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         scale=_scale(robot, motions),
         notes=result.notes,
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
+        poor=tuple(_poor(result, score.joint_relative_error_percent)),
+        dead=(
+            *dead_encoders(robot, recording, motions),
+            *dead_channels(arm, recording, motions),
+        ),
     )
+
+
+def _poor(result: Identification, errors: FloatArray) -> Iterator[str]:
+    """Name the joints whose model would be poor; noise of a torque makes none so."""
+    beyond = beyond_noise(errors, result.training, result.used)
+    for joint, error, left in zip(result.arm.robot.joints, errors, beyond, strict=True):
+        if left > LIMITS.poor:
+            yield f'{error:.0f} % of the efforts of {joint}'
 
 
 def _scale(robot: Robot, motions: list[Motion]) -> FloatArray:

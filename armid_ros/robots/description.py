@@ -251,6 +251,11 @@ class _Reader:
                 self.finite(inertia, 'izz', where),
             ),
         )
+        if inertial.mass < 0.0:
+            raise RobotError(
+                f'{self.source}: {where} has a negative mass, {inertial.mass:g} kg; what comes '
+                'from an identification is a body with --physical'
+            )
         doubt = inertial.doubt()
         if doubt:
             self.notes.append(f'{where}: {doubt}')

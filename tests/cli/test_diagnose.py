@@ -223,3 +223,25 @@ def test_a_model_of_another_arm_is_refused(files, tmp_path):
     result = armid('diagnose', *bags, *asked, code=2)
     assert 'joints are elsewhere' in result.output
     assert not (tmp_path / 'x').exists()
+
+
+def test_a_gravity_other_than_that_of_the_model_is_refused(files, tmp_path):
+    """Nobody is told one thing by the command and another by the file without a word."""
+    urdf, model, bags = files
+    asked = ('diagnose', bags[0], '--robot', urdf, '--model', model, '--out', tmp_path / 'x')
+    said = armid(*asked, '--gravity', 'moon', code=2).output
+    assert f'{model}: its gravity is 0,0,-9.81, and --gravity says 0,0,-1.62' in said
+    assert said.strip().count('\n') == 0
+
+
+def test_a_folder_for_a_model_is_answered_with_the_file_in_it(files, tmp_path):
+    urdf, model, bags = files
+    (tmp_path / 'monday').mkdir()
+    inside = tmp_path / 'monday' / 'model.yaml'
+    for content, hint in (('', 'there is no model.yaml'), (model.read_text(), str(inside))):
+        if content:
+            inside.write_text(content)
+        asked = ('diagnose', bags[0], '--robot', urdf, '--model', tmp_path / 'monday')
+        said = armid(*asked, '--out', tmp_path / 'x', code=2).output
+        assert f'{tmp_path / "monday"}: a folder' in said
+        assert hint in said

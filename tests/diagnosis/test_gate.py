@@ -46,6 +46,47 @@ def faults(bench, recordings):
     return check_data(bench.arm, recordings, used, stretches(recordings, used))[0]
 
 
+def scaled(recordings, factor):
+    return [replace(one, tau=factor * one.tau) for one in recordings]
+
+
+@pytest.mark.parametrize(
+    ('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (57.3, 'degrees'), (1e-3, 'kN m')]
+)
+def test_a_factor_since_the_baseline_is_a_unit(bench, factor, unit):
+    """Masses that the model has wrong are wrong on both days."""
+    before, now = bench.recordings(), scaled(bench.recordings(seed=1), factor)
+    for weight in (1.0, 1e-3, 3.0):
+        arm = weighing(bench.arm, weight)
+        (said,) = faults_since(arm, now, before)
+        assert unit in said
+        assert 'convert them' in said
+
+
+@pytest.mark.parametrize('factor', [1.0, 1.1, 1.5])
+def test_a_gain_of_all_joints_since_the_baseline_is_no_unit(bench, factor):
+    before, now = bench.recordings(), scaled(bench.recordings(seed=1), factor)
+    assert not faults_since(bench.arm, now, before)
+
+
+def test_masses_in_grams_are_no_unit_of_torques_that_are_as_before(bench):
+    before, now = bench.recordings(), bench.recordings(seed=1)
+    grams = weighing(bench.arm, 1e3)
+    assert 'kN m' in faults_since(grams, now, [])[0]
+    assert not any('kN m' in said for said in faults_since(grams, now, before))
+
+
+def weighing(arm, factor):
+    """Return a model whose links weigh so many times what they are."""
+    robot = arm.robot.with_inertias(factor * arm.robot.rigid_parameters)
+    return ArmModel(robot, arm.effects, arm.values)
+
+
+def faults_since(arm, recordings, before):
+    used = conditioning(recordings, SignalSettings())
+    return check_data(arm, recordings, used, stretches(recordings, used), before)[0]
+
+
 def test_a_position_that_jumps_is_named_with_its_joint_and_time(bench):
     first, *others = bench.recordings()
     q = first.q.copy()

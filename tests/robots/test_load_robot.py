@@ -449,6 +449,12 @@ def test_a_number_that_is_not_finite_is_refused_by_name(old: str, new: str, mess
         load_robot(star(3).replace(old, new))
 
 
+def test_a_negative_mass_is_refused_with_its_link() -> None:
+    negative = link('forearm').replace('mass value="1.5"', 'mass value="-3.2"')
+    with pytest.raises(RobotError, match=r"link 'forearm' has a negative mass, -3\.2 kg"):
+        robot_from_urdf(robot(link('base', ''), negative, joint('elbow', 'base', 'forearm')))
+
+
 def test_joints_that_mimic_each_other_are_refused() -> None:
     text = star(6, 'revolute')
     for one, other in (('j2', 'j3'), ('j3', 'j2')):

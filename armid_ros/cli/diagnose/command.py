@@ -270,7 +270,7 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         If the description that it was made with is still there, and is of another arm.
 
     """
-    arm = load_model(path, robot)
+    arm = options.model_of(path, robot)
     try:
         known = load_model(path).robot
     except ArmidError:  # it was moved, or comes from a bag

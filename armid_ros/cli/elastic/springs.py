@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from armid_ros.arm import load_model
 from armid_ros.cli import options
 from armid_ros.cli.terminal import progress, say
 from armid_ros.elastic.identification.files import read_sides
@@ -34,7 +33,7 @@ def identify_springs(
 ) -> None:  # fmt: skip
     """Fit springs to bags with both encoders of any arm, and write what was found."""
     options.hold(out, SPRINGS_SCHEMA, source)
-    body = robot if model is None else load_model(model, robot).body
+    body = robot if model is None else options.model_of(model, robot).body
     if not bags:
         raise RecordingError('no bag is named; give one with encoders on both sides of the joints')
     with progress('reading') as tick:

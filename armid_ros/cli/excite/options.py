@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from armid_ros.arm import ArmModel, load_model
+from armid_ros.arm import ArmModel
 from armid_ros.cli import options
 from armid_ros.cli.excite.files import CollisionScene, WAYPOINT_RATE
 from armid_ros.effects import parse_effect
@@ -103,7 +103,7 @@ class ModelOptions:
 
     def arms(self, robot: Robot) -> tuple[ArmModel, ArmModel | None]:
         """Return the prior model, and the one to tell it from."""
-        arm = ArmModel(robot) if self.model is None else load_model(self.model, robot)
+        arm = ArmModel(robot) if self.model is None else options.model_of(self.model, robot)
         arm = options.with_effects(arm, self.effects)
         rival = None
         if self.rival is not None:

@@ -17,6 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -24,13 +25,13 @@ from armid_ros.identification.assess.hypotheses import (
     InUnit,
     OtherUnit,
     Reversed,
+    unit_of,
 )
-from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.mistakes import effort_factor, find_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
-    TORQUE_UNITS,
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
@@ -43,17 +44,6 @@ import numpy.typing as npt
 
 #: Mistakes that are of the data and of nothing that may happen to an arm.
 _OF_DATA = Exchanged | InDegrees | InUnit | Reversed
-#: What torques are that are so many times those of the model, and how near to the factor: masses
-#: of a description are off by less.
-_UNITS = {
-    57.2958: 'torques are 57.3 times what the model takes, degrees against radians: convert them',
-    **{
-        count: f'torques are in {unit} instead of N m: convert them'
-        for unit, count in TORQUE_UNITS.items()
-    },
-}
-#: A factor of torques is that of a unit if it is within this factor of it.
-_NEAR = 1.5
 #: A torque of so many times the limit of its drive is said.
 _BEYOND = 1.5
 #: Share of samples at the very extreme of a reading, above which it is clipped.
@@ -99,6 +89,7 @@ def check_data(
     recordings: Sequence[Recording],
     used: Conditioning,
     data: Sequence[Stretch],
+    before: Sequence[Recording] = (),
 ) -> tuple[list[str], list[str]]:
     """
     Look for faults of the data.
@@ -113,6 +104,8 @@ def check_data(
         Filters.
     data : sequence of Stretch
         The data in rows.
+    before : sequence of Recording
+        From when nothing was wrong: the unit of their torques is that of the model.
 
     Returns
     -------
@@ -122,13 +115,17 @@ def check_data(
         What a reader should know.
 
     """
-    mistaken = _mistaken(arm, recordings, used)
+    motions = {
+        one.source: [part.motion for part in data if part.source == one.source]
+        for one in recordings
+    }
+    blind = [x for one in recordings for x in dead_encoders(arm.body, one, motions[one.source])]
+    mistaken = blind or _mistaken(arm, recordings, used, before)
     if mistaken:
         return mistaken, []
     faults = [*_time_base(recordings, _band(used, data)), *_laws(arm, data)]
-    for recording in recordings:
-        motions = [part.motion for part in data if part.source == recording.source]
-        faults += [*_jumps(arm.robot, recording), *dead_channels(arm, recording, motions)]
+    for one in recordings:
+        faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
     faults += [] if faults else _signs(arm, recordings, data)
     notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
     notes += _described_friction(arm)
@@ -150,27 +147,47 @@ def _signs(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Stretc
     return [wrong_sign(driven)] if driven else []
 
 
-def _mistaken(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[str]:
+def _mistaken(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
+) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
     if any(one.partner is not None for one in recordings):
         return []
+    ratio = _since(arm, recordings, used, before)
+    if ratio is not None and unit_of(ratio):
+        return [
+            f'torques are in {unit_of(ratio)} if those of the baseline are in N m: convert them'
+        ]
     said: set[tuple[str, ...]] = set()
     for recording in recordings:
         mistake = find_mistake(arm.body, recording, used)
         if mistake is None:
             return []
-        said.add(tuple(_fault(one, arm.robot) for one in mistake.hypotheses))
+        said.add(tuple(_fault(one, arm.robot, ratio) for one in mistake.hypotheses))
     if len(said) != 1:
         return []
     (sentences,) = said
     return [', or '.join(sentences)] if all(sentences) else []
 
 
-def _fault(mistake: Hypothesis, robot: Robot) -> str:
+def _since(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
+) -> float | None:
+    """
+    Return by what factor torques have changed since a baseline; None where nothing tells.
+
+    Both are compared with the model, whose masses are what it has wrong on both days.
+
+    """
+    now, then = (effort_factor(arm.body, some, used) for some in (recordings, before))
+    return None if now is None or then is None else now / then
+
+
+def _fault(mistake: Hypothesis, robot: Robot, since: float | None) -> str:
     """Say what is wrong with data; empty if it is something that may happen to an arm."""
     if isinstance(mistake, OtherUnit):
-        ratios = [(mistake.factor / factor, said) for factor, said in _UNITS.items()]
-        return next((said for ratio, said in ratios if 1.0 / _NEAR < ratio < _NEAR), '')
+        unit = '' if since is not None else unit_of(mistake.factor)
+        return f'torques are in {unit} instead of N m: convert them' if unit else ''
     return mistake.sentence(robot) if isinstance(mistake, _OF_DATA) else ''
 
 

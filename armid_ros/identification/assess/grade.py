@@ -3,8 +3,8 @@
 """
 What an identification is good for, in one word, and why.
 
-The word follows the torque error on data that were not fitted, and what the recordings show to be
-wrong with them.
+The word follows the torque error on data that were not fitted, of the joint that is predicted
+worst, and what the recordings show to be wrong with them.
 
 """
 
@@ -16,11 +16,15 @@ from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+import numpy as np
 
 Word = Literal['good', 'poor', 'unusable']
 _WORDS: tuple[Word, ...] = ('good', 'poor', 'unusable')
@@ -77,8 +81,11 @@ def grade(
         Those recordings.
 
     """
+    blind = _blind(result, description, validation, [*recordings, *held_out])
+    seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
     reasons = [
-        *_mistakes(result, description, [*recordings, *held_out]),
+        *(_Reason('unusable', _sentence(text)) for texts in blind.values() for text in texts),
+        *_mistakes(result, description, seeing),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
         *_errors(result, validation),
@@ -114,6 +121,21 @@ def _mistakes(
         yield _Reason('unusable' if certain else 'poor', _sentence(text))
 
 
+def _blind(
+    result: Identification,
+    description: ArmModel,
+    validation: Mapping[str, Sequence[Fit]],
+    recordings: Sequence[Recording],
+) -> dict[str, list[str]]:
+    """Say of which recordings encoders are dead; what else they seem to show is of that."""
+    fits = _fits(result, validation)
+    said = {}
+    for recording in recordings:
+        motions = [fit.motion for fit in fits if fit.source == recording.source]
+        said[recording.source] = list(dead_encoders(description.body, recording, motions))
+    return {source: texts for source, texts in said.items() if texts}
+
+
 def _dead(
     result: Identification,
     description: ArmModel,
@@ -135,43 +157,69 @@ def _fits(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> li
 
 def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:
     for bag, fits in validation.items():
-        score = Score.of(fits)
-        error = score.relative_error_percent
-        word = by_error(error)
+        worst = _Worst.of(Score.of(fits).joint_relative_error_percent, fits, result)
+        word = by_error(worst.error)
         use = {
             'good': '',
             'poor': ': too much to compute torques with',
             'unusable': ': the model does not describe this motion',
         }
-        text = f'the predicted torque of {bag}, held out, is off by {error:.3g} %{use[word]}'
+        text = f'the predicted torque of {bag}, held out, is off by {worst.said}{use[word]}'
         yield _Reason(word, _sentence(text))
     if not validation:
         yield _halves(result)
-    fits = [fit for part in validation.values() for fit in part] or list(result.training)
-    errors = Score.of(fits).joint_relative_error_percent
-    off = [
-        f'{joint} ({error:.0f} %)'
-        for joint, error in zip(result.arm.robot.joints, errors, strict=True)
-        if error > LIMITS.unusable
-    ]
-    if off:
-        yield _Reason('good', _sentence(f'the torque is hardly predicted of {", ".join(off)}'))
+    fits = _fits_that_count(result, validation)
+    every = Score.of(fits).joint_relative_error_percent
+    noisy = every - beyond_noise(every, fits, result.used) > LIMITS.unusable
+    if np.any(noisy):
+        named = ', '.join(
+            f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
+        )
+        text = f'the torque is hardly predicted of {named}, where it is noise or friction at rest'
+        yield _Reason('good', _sentence(text))
+
+
+def _fits_that_count(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[Fit]:
+    """Return what was held out, or what was fitted where nothing was."""
+    return [fit for part in validation.values() for fit in part] or list(result.training)
+
+
+class _Worst(NamedTuple):
+    """The joint that is predicted worst: its error beyond noise [%], and its error in words."""
+
+    error: float
+    said: str
+
+    @classmethod
+    def of(cls, errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
+        """Choose it among errors of joints as shares of their torque, shape (n,) [%]."""
+        joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
+        worst = int(np.argmax(beyond))
+        said = f'{errors[worst]:.3g} %'
+        if by_error(beyond[worst]) != by_error(errors[worst]):
+            said += f' ({beyond[worst]:.3g} % without the noise)'
+        if len(joints) > 1:
+            said += f' in {joints[worst]}, the most of all joints'
+        return cls(float(beyond[worst]), said)
 
 
 def _halves(result: Identification) -> _Reason:
     """Judge by what one half of the data says of the other, where nothing was held out."""
-    training = Score.of(result.training).relative_error_percent
-    error = result.halves_error
-    word = by_error(error)
-    undetermined = error > max(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
-    if undetermined and word == 'good':
-        word = 'poor'
-    text = f'no recording was held out; halves of the data predict each other to {error:.3g} %'
-    if undetermined:
+    training = Score.of(result.training).joint_relative_error_percent
+    every = result.halves.joints
+    worst = _Worst.of(every, result.training, result)
+    word = by_error(worst.error)
+    text = f'no recording was held out; halves of the data predict each other to {worst.said}'
+    undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
+    undetermined &= beyond_noise(every, result.training, result.used) > 0.0
+    if np.any(undetermined):
+        joint = int(np.argmax(np.where(undetermined, every, 0.0)))
+        word = 'poor' if word == 'good' else word
         time = sum(float(fit.motion.t[-1] - fit.motion.t[0]) for fit in result.training)
         text += (
-            f', but the training error is {training:.2g} %: {time:.2g} s of this motion do '
-            f'not determine {result.base.rank} parameters; record longer, or move more'
+            f', but the training error of {result.arm.robot.joints[joint]} is '
+            f'{training[joint]:.2g} %: {time:.2g} s of this motion do not determine '
+            f'{result.base.rank} parameters; record longer, or move more'
         )
     return _Reason(word, _sentence(text))
 

@@ -21,9 +21,9 @@ class GradeLimits:
     Attributes
     ----------
     poor : float
-        Relative torque error on data that were not fitted [%]. Published identifications of
-        industrial arms reach 4 to 18 %; feed-forward with more is no better than a payload that
-        is not known.
+        Relative torque error of a joint on data that were not fitted [%]. Published
+        identifications of industrial arms reach 4 to 18 %; feed-forward with more is no better
+        than a payload that is not known.
     unusable : float
         The same [%]. A model with more takes less than three quarters of the torque's power:
         1 - 0.5^2. A hypothesis that leaves more explains nothing either.

@@ -31,6 +31,11 @@ DELAYS = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135, -90, -45, 45, 90, 135, 180)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
+#: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
+_STRONGEST = 24.8
+#: A factor of torques is that of a unit if it is within this factor of it: masses of a description
+#: are off by less.
+_NEAR = 1.5
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
 
@@ -43,14 +48,15 @@ class Hypothesis(ABC):
     ----------
     values : int
         Numbers that are chosen to fit the data.
-    disputable : bool
-        Whether a description with other masses would explain as much, so that a person has to
-        say which it is.
 
     """
 
     values: ClassVar[int] = 1
-    disputable: ClassVar[bool] = False
+
+    @property
+    def disputable(self) -> bool:
+        """Whether other masses would explain as much, so that a person has to say which it is."""
+        return False
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -260,10 +266,11 @@ class OtherGravity(Hypothesis):
         return OtherGravity((float(values[0]), float(values[1]), float(values[2])))
 
     def material(self, robot: Robot, limits: GradeLimits) -> bool:
-        """Whether it is too far from the description to be explained by wrong masses."""
+        """Whether it is too far from the description to be wrong masses, and may be a planet's."""
         told, found = robot.gravity, np.array(self.vector)
         size = max(float(np.linalg.norm(told)), 1.0)
-        return bool(np.linalg.norm(found - told) > limits.gravity_change * size)
+        off = float(np.linalg.norm(found - told)) > limits.gravity_change * size
+        return off and float(np.linalg.norm(found)) < _STRONGEST
 
     def sentence(self, robot: Robot) -> str:
         """Say the direction and the option that puts it right."""
@@ -280,9 +287,12 @@ class OtherGravity(Hypothesis):
 class OtherUnit(Hypothesis):
     """Efforts are a factor from N m, the same in all joints: currents, a gear ratio, a unit."""
 
-    disputable: ClassVar[bool] = True
-
     factor: float = np.nan
+
+    @property
+    def disputable(self) -> bool:
+        """Whether it is no unit, and masses may be what is wrong."""
+        return not unit_of(self.factor)
 
     def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
         """Leave the factor free."""
@@ -298,7 +308,10 @@ class OtherUnit(Hypothesis):
         return not 1.0 / limits.torque_factor < self.factor < limits.torque_factor
 
     def sentence(self, robot: Robot) -> str:
-        """Say the factor."""
+        """Say the unit, or else the factor."""
+        unit = unit_of(self.factor)
+        if unit:
+            return f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
         return (
             f'the efforts of all joints seem to be {self.factor:.2g} times the torque in N m '
             '(currents?): convert them, unless it is the masses of the description'
@@ -350,6 +363,15 @@ class Faulty(Hypothesis):
         """Say how many, and where the first is."""
         many = '' if self.count == 1 else f' (the first of {self.count})'
         return f'{self.what}{many}: leave out what is faulty, or record again'
+
+
+def unit_of(factor: float) -> str:
+    """Return the unit, or two, in which torques are that are so many times too large, or ''."""
+    known = {**TORQUE_UNITS, 'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0))}
+    off = {unit: abs(np.log(factor / count)) for unit, count in known.items()}
+    return ' or '.join(
+        unit for unit in sorted(off, key=off.__getitem__) if off[unit] < np.log(_NEAR)
+    )
 
 
 def hypotheses(robot: Robot) -> Iterator[Hypothesis]:

@@ -124,10 +124,27 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     if found is not None:
         return found
     as_recorded = _fitted(robot, slow)(AsRecorded())
-    if as_recorded is None or 100.0 * as_recorded[0].whole < LIMITS.poor:
+    if as_recorded is None or 100.0 * as_recorded[0].joints.max() < LIMITS.poor:
         return None
     changes = [one for one in tried if not isinstance(one, InUnit | OtherGravity | OtherUnit)]
     return _best(robot, changes, _fitted(robot, slow), fitted=True)
+
+
+def effort_factor(
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning
+) -> float | None:
+    """
+    Return how many times what is described the efforts of recordings are, all joints together.
+
+    Friction, offset and drive inertia of each joint are fitted beside it. None where motion is
+    too short, or the efforts do not follow the description.
+
+    """
+    slow = [motion for one in recordings for motion in _slow_motions(one, used)]
+    found = _described(robot, slow)(OtherUnit())
+    if found is None or not found[0].shared[0] > 0.0:
+        return None
+    return float(found[0].shared[0])
 
 
 def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
@@ -168,7 +185,9 @@ def _best(
     nearest = max(rows, key=lambda row: row.surplus)
     rows += _judged(robot, list(nearest.hypothesis.nearby()), judge, rival, price)
     believed = [
-        row for row in rows if row.surplus >= 1.0 and 100.0 * row.after.whole < LIMITS.unusable
+        row
+        for row in rows
+        if row.surplus >= 1.0 and 100.0 * row.after.whole(robot) < LIMITS.unusable
     ]
     if not believed:
         return None

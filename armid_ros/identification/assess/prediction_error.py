@@ -36,16 +36,26 @@ class PredictionError:
     ----------
     joints : ndarray, shape (n,)
         Of each joint, as a share of its torque.
-    whole : float
-        Of all joints together.
+    torque : ndarray, shape (n,)
+        Root mean square torque of each joint [N m or N].
     shared : ndarray, shape (k,)
         Values that all joints share, fitted to all blocks.
 
     """
 
     joints: FloatArray
-    whole: float
+    torque: FloatArray
     shared: FloatArray
+
+    def whole(self, robot: Robot) -> float:
+        """Return the error of all slides or of all other joints together, whichever is more."""
+        alike = [robot.prismatic, ~robot.prismatic]
+        left = self.joints * self.torque
+        return max(
+            float(np.linalg.norm(left[own]) / np.linalg.norm(self.torque[own]))
+            for own in alike
+            if np.any(own)
+        )
 
     def gain(self, better: PredictionError) -> float:
         """
@@ -61,7 +71,7 @@ class PredictionError:
     def least(self, other: PredictionError) -> PredictionError:
         """Return the smaller error of every joint."""
         joints = np.minimum(self.joints, other.joints)
-        return PredictionError(joints, min(self.whole, other.whole), np.empty(0))
+        return PredictionError(joints, self.torque, np.empty(0))
 
     def best_gain(self) -> float:
         """Return the largest gain that anything could have."""
@@ -117,10 +127,29 @@ def fitted_error(robot: Robot, motion: Motion) -> PredictionError:
     columns *= (weight / scale)[:, :, np.newaxis]
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1), axis=0))
     columns /= np.where(size > 0.0, size, 1.0)
+    return _error(left_of_blocks(columns, rest), scale, np.empty(0))
+
+
+def left_of_blocks(columns: FloatArray, rest: FloatArray) -> FloatArray:
+    """
+    Return what is left of rows where blocks take turns at being fitted and being predicted.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (N, n, k)
+        Of mean square one, what values are multiplied by.
+    rest : ndarray, shape (N, n)
+        What is fitted, as a share of the torque of each joint.
+
+    Returns
+    -------
+    ndarray, shape (N, n)
+
+    """
     left = np.empty_like(rest)
-    for fitted in _folds(len(motion)):
+    for fitted in _folds(len(rest)):
         left[~fitted] = _left(columns, rest, fitted)
-    return _error(left, scale, np.empty(0))
+    return left
 
 
 def _left(columns: FloatArray, rest: FloatArray, fitted: npt.NDArray[np.bool_]) -> FloatArray:
@@ -188,6 +217,4 @@ def _scale(columns: FloatArray) -> FloatArray:
 
 
 def _error(left: FloatArray, scale: FloatArray, shared: FloatArray) -> PredictionError:
-    joints = np.sqrt(np.mean(left**2, axis=0))
-    whole = np.linalg.norm(joints * scale) / np.linalg.norm(scale)
-    return PredictionError(joints, float(whole), shared)
+    return PredictionError(np.sqrt(np.mean(left**2, axis=0)), scale, shared)

@@ -11,6 +11,7 @@ gives others, and predicts the other half badly.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.rows.regression import Regression
@@ -21,9 +22,27 @@ import numpy as np
 _ROWS = 4000
 
 
+@dataclass(frozen=True)
+class HalvesError:
+    """
+    Relative torque error when either half of the data predicts the other.
+
+    Attributes
+    ----------
+    whole : float
+        Of all joints together [%].
+    joints : ndarray, shape (n,)
+        Of each joint, as a share of its own torque [%].
+
+    """
+
+    whole: float
+    joints: FloatArray
+
+
 def halves_error(
     problem: Sequence[Regression], weights: FloatArray, described: FloatArray
-) -> float:
+) -> HalvesError:
     """
     Fit the first half and predict the second, and the other way round.
 
@@ -38,8 +57,8 @@ def halves_error(
 
     Returns
     -------
-    float
-        Relative error of the predicted torque [%].
+    HalvesError
+        Of the predicted torque.
 
     """
     step = max(1, sum(len(part.tau) for part in problem) // _ROWS)
@@ -54,8 +73,12 @@ def halves_error(
     for fitted, predicted in (halves, halves[::-1]):
         change = _fit(columns[fitted], rest[fitted], tau[fitted], weight[fitted])
         left[predicted] = rest[predicted] - columns[predicted] @ change
-    length = float(np.linalg.norm(told * tau))
-    return float(100.0 * np.linalg.norm(told * left) / length) if length > 0.0 else 0.0
+    error, length = (np.linalg.norm(told * rows, axis=0) for rows in (left, tau))
+    whole = float(np.linalg.norm(length))
+    return HalvesError(
+        float(100.0 * np.linalg.norm(error) / whole) if whole > 0.0 else 0.0,
+        100.0 * np.divide(error, length, out=np.zeros_like(error), where=length > 0.0),
+    )
 
 
 def _fit(columns: FloatArray, rest: FloatArray, tau: FloatArray, weight: FloatArray) -> FloatArray:

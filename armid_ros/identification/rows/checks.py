@@ -32,7 +32,7 @@ _SHORT = 5.0
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
 _CLEAR = 0.8
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
-TORQUE_UNITS = {'N mm': 1e3, 'kN m': 1e-3}
+TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
 #: Said of torques that are absent.
 SILENT = 'the torque of every joint is constant; is effort filled in?'
 

@@ -113,11 +113,13 @@ class Contents:
         if not chunk.compression:
             if chunk.whole and len(stored) != chunk.size:
                 raise _DamagedChunk(f'{where} is damaged')
-            end = chunk.begin + min(len(stored), chunk.size)
-            return Content(self._found.data, chunk.begin, end)
+            size = min(len(stored), chunk.size)
+            self._note_cut(chunk, size)
+            return Content(self._found.data, chunk.begin, chunk.begin + size)
         if not chunk.whole:
             size = min(chunk.size, self._settings.memory_limit)
             content = partly_decompressed(stored, chunk.compression, size)
+            self._note_cut(chunk, len(content))
             return Content(content, 0, len(content))
         try:
             said = stated_size(stored, chunk.compression)
@@ -130,6 +132,14 @@ class Contents:
         except RecordingError as error:
             raise _DamagedChunk(f'{where} is damaged: {error}') from error
         return Content(content, 0, len(content))
+
+    def _note_cut(self, chunk: Chunk, read: int) -> None:
+        """Say how much is had of a chunk that the file ends within."""
+        if not chunk.whole:
+            share = 100 * read // max(chunk.size, 1)
+            self._found.damage.add(
+                f'of the chunk that begins there {read} of {chunk.size} bytes ({share} %) are read'
+            )
 
 
 def _parts(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:

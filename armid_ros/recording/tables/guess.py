@@ -117,14 +117,19 @@ def incomplete(
 
 
 def guess_time(table: Table) -> TableColumn | None:
-    """Return the column of time: named so, and increasing."""
+    """Return the column of time: named so, and increasing, or else decreasing throughout."""
+    return named_time(table, 1.0) or named_time(table, -1.0)
+
+
+def named_time(table: Table, way: float) -> TableColumn | None:
+    """Return the column that is named like a time and goes one way: up is 1, down -1, any 0."""
     scores = {}
     for column in table.columns:
         words = _words(column.bare_name)
         score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
         score += sum(OTHERWISE.get(word, 0.0) for word in words) - 0.1 * len(words)
         finite = column.values[np.isfinite(column.values)]
-        if score > 0.5 and len(finite) > 1 and np.mean(np.diff(finite) >= 0.0) > 0.9:
+        if score > 0.5 and len(finite) > 1 and np.mean(way * np.diff(finite) >= 0.0) > 0.9:
             scores[column] = score
     return max(scores, key=lambda column: scores[column]) if scores else None
 

@@ -10,7 +10,7 @@ import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.tables.guess import guess, guess_time, Incomplete, incomplete
+from armid_ros.recording.tables.guess import guess, guess_time, Incomplete, incomplete, named_time
 from armid_ros.recording.tables.patterns import choose, ChosenColumns
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
 from armid_ros.recording.tables.table import Table, TableColumn
@@ -353,14 +353,32 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     else:
         column = guess_time(table)
     if column is not None:
+        _require_forwards(table, column)
         return column, settings.time_unit or _time_unit(table, column), None
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
+        named = named_time(table, 0.0)
+        if named is not None and asked is None:
+            raise RecordingError(
+                f'{table.source}: column {named.name} goes up and down, as no time does; does '
+                'every name of the header stand above its own column?'
+            )
         raise RecordingError(
             f'{table.source}: no column of time; name it with --time, or give the samples per '
             f'second with --rate. Its columns are {table.listed()}'
         )
     return None, 's', rate
+
+
+def _require_forwards(table: Table, column: TableColumn) -> None:
+    """Refuse a time that runs backwards: sorting it would turn the motion round as well."""
+    steps = np.diff(column.values[np.isfinite(column.values)])
+    if len(steps) and np.mean(steps < 0.0) > 0.5:
+        raise RecordingError(
+            f'{table.source}: column {column.name} runs backwards, from {column.values[0]:.6g} to '
+            f'{column.values[-1]:.6g}: turn the rows round if the last was measured first, or '
+            'leave the column out with --time none --rate HZ if they are in order'
+        )
 
 
 def _time_unit(table: Table, column: TableColumn) -> str:

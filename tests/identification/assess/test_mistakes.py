@@ -7,12 +7,17 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification.assess.faulty_samples import faulty_samples
-from armid_ros.identification.assess.hypotheses import hypotheses, known_gravity
+from armid_ros.identification.assess.hypotheses import (
+    hypotheses,
+    known_gravity,
+    OtherUnit,
+    unit_of,
+)
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
-from armid_ros.robots import load_robot
+from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 import pytest
 
@@ -23,14 +28,41 @@ from ..conftest import FRICTION, multisine, recorded
 RATE = 100.0
 
 
-def recording_of(robot, seed, gravity=None, duration=20.0):
+def gantry():
+    """Return a description with a slide that carries an arm whose last joints are light."""
+    links = (
+        ('carriage', 6.0, '0.01 0 0.05', 0.05, 'floor', 'prismatic', '0 0 1', 0.6),
+        ('boom', 3.2, '0.02 0.01 0.18', 0.045, 'carriage', 'revolute', '0 1 0', 0.1),
+        ('arm', 2.1, '0 0.015 0.14', 0.02, 'boom', 'revolute', '0 1 0', 0.38),
+        ('wrist', 0.9, '0 0.004 0.04', 0.002, 'arm', 'revolute', '0 0 1', 0.3),
+        ('hand', 0.5, '0.004 0 0.05', 0.0009, 'wrist', 'revolute', '1 0 0', 0.08),
+    )
+    text = '<robot name="gantry"><link name="floor"/>'
+    joints = ('lift', 'shoulder', 'elbow', 'turn', 'roll')
+    for joint, (link, mass, centre, inertia, parent, kind, axis, z) in zip(
+        joints, links, strict=True
+    ):
+        text += (
+            f'<link name="{link}"><inertial><origin xyz="{centre}"/><mass value="{mass}"/>'
+            f'<inertia ixx="{inertia}" ixy="0" ixz="0" iyy="{inertia}" iyz="0" '
+            f'izz="{inertia}"/></inertial></link><joint name="{joint}" type="{kind}">'
+            f'<parent link="{parent}"/><child link="{link}"/><origin xyz="0 0 {z}"/>'
+            f'<axis xyz="{axis}"/><limit lower="-2" upper="2" velocity="3" effort="50"/></joint>'
+        )
+    return text + '</robot>'
+
+
+GANTRY = gantry()
+
+
+def recording_of(robot, seed, gravity=None, duration=20.0, friction=1.0):
     """Record an arm whose links are up to a fifth lighter or heavier than described."""
     rng = np.random.default_rng(seed)
     body = robot if gravity is None else robot.with_gravity(gravity)
     links = body.rigid_parameters.reshape(-1, 10) * rng.uniform(0.8, 1.2, (robot.n_joints, 1))
     arm = ArmModel(body.with_inertias(links.ravel()))
     for name, value in FRICTION.items():
-        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+        arm = arm.with_effect(make_effect(name, robot), friction * np.full(robot.n_joints, value))
     motion = multisine(robot.joints, duration, RATE, seed=100 + seed, base_hz=0.12)
     exact = recorded(arm, motion)
     noise = 0.02 * np.sqrt(np.mean(exact.tau**2, axis=0)) * rng.normal(size=exact.tau.shape)
@@ -168,7 +200,7 @@ def test_an_axis_that_points_the_other_way(robot, sound, joint):
 
 
 @pytest.mark.parametrize('joint', [0, 1, 2, 3])
-@pytest.mark.parametrize(('unit', 'factor'), [('N mm', 1e3), ('kN m', 1e-3)])
+@pytest.mark.parametrize(('unit', 'factor'), [('N mm', 1e3), ('N cm', 1e2), ('kN m', 1e-3)])
 def test_a_torque_of_one_joint_in_another_unit(robot, sound, joint, unit, factor):
     wrong = replace(sound, tau=with_column(sound.tau, joint, lambda tau: factor * tau))
     expected = f'the torque of {robot.joints[joint]} seems to be in {unit} instead of N m'
@@ -206,6 +238,46 @@ def test_currents_for_torques(robot, sound, factor):
     assert 'the efforts of all joints seem to be' in said
     stated = float(said.split('seem to be ')[1].split()[0])
     assert stated == pytest.approx(factor, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ('factor', 'unit'),
+    [(1e3, 'N mm'), (1e2, 'N cm'), (1e-3, 'kN m'), (57.3, 'N m times 57.3')],
+)
+@pytest.mark.parametrize('rubs', [1.0, 20.0])
+def test_a_unit_of_all_torques_is_no_gravity_and_no_current(robot, factor, unit, rubs):
+    """Where friction is most of a torque, gravity a thousand times as large explains the rest."""
+    recording = recording_of(robot, 1, friction=rubs)
+    wrong = replace(recording, tau=factor * recording.tau)
+    used = conditioning([wrong], SignalSettings())
+    found = find_mistake(robot, wrong, used)
+    assert [type(one) for one in found.hypotheses] == [OtherUnit]
+    assert f'the efforts of all joints seem to be in {unit}' in found.sentence(robot)
+    assert not found.hypotheses[0].disputable
+
+
+@pytest.mark.parametrize('factor', [0.5, 0.7, 1.1, 1.5, 5.0, 20.0])
+def test_a_gain_is_no_unit(factor):
+    assert unit_of(factor) == ''
+
+
+def test_names_of_two_light_joints_exchanged_beside_a_heavy_slide():
+    """Hundreds of newtons hide nothing of a joint that takes a tenth of a newton metre."""
+    robot = robot_from_urdf(GANTRY)
+    arm = ArmModel(robot)
+    for name, values in {
+        'viscous_friction': (40.0, 2.0, 1.2, 0.15, 0.08),
+        'coulomb_friction': (15.0, 1.5, 0.9, 0.2, 0.1),
+    }.items():
+        arm = arm.with_effect(make_effect(name, robot), np.array(values))
+    motion = multisine(robot.joints, 40.0, RATE, seed=3, base_hz=0.1)
+    reach = np.array([0.15, 1.0, 1.0, 1.5, 1.2])
+    q, dq, ddq = (x * reach for x in (motion.q, motion.dq, motion.ddq))
+    sound = recorded(arm, replace(motion, q=q, dq=dq, ddq=ddq))
+    assert mistake_in(robot, sound) == ''
+    mixed = replace(sound, q=exchanged(sound.q, 3, 4), tau=exchanged(sound.tau, 3, 4))
+    said = mistake_in(robot, mixed)
+    assert 'the position and torque of turn and of roll seem to be exchanged' in said
 
 
 def test_degrees(robot, sound):

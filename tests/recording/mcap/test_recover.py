@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files whose writer was killed: read as far as they go, and made whole."""
 
+import re
+
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
@@ -65,6 +67,26 @@ def test_a_file_cut_anywhere_gives_all_samples_before_the_cut(whole, tmp_path):
         assert len(list(iter_raw(cut))) == len(got)
         assert topics(cut)[0].count == len(got)
     assert before == 300
+
+
+@pytest.mark.parametrize('compression', ['none', 'zstd'])
+def test_the_share_of_a_chunk_cut_off_is_the_share_of_its_messages(
+    make_swing, tmp_path, compression
+):
+    """A chunk that is cut off is read as far as it goes, beyond the last whole record."""
+    recording = make_swing(6000)
+    write_recording(tmp_path / 'bag', recording, compression=compression, chunk_size=10**9)
+    path = tmp_path / 'bag' / 'bag_0.mcap'
+    ends, counted = chunk_ends(path)
+    largest = int(np.argmax(np.diff(ends))) + 1
+    cut = tmp_path / 'cut.mcap'
+    cut.write_bytes(path.read_bytes()[: (ends[largest - 1] + 2 * ends[largest]) // 3])
+    got = read_recording(cut, joints=JOINTS)
+    said = re.search(r'begins there (\d+) of (\d+) bytes \((\d+) %\) are read', got.report.damage)
+    read, of, percent = map(int, said.groups())
+    assert percent == 100 * read // of
+    inside = counted[largest] - counted[largest - 1]
+    assert (len(got) - counted[largest - 1]) / inside == pytest.approx(read / of, abs=0.01)
 
 
 def test_uncompressed_messages_of_a_chunk_cut_off_are_read_to_the_last(make_swing, tmp_path):

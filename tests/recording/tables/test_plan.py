@@ -229,3 +229,20 @@ def test_joints_without_a_column_are_named_where_others_have_one():
 def test_a_joint_without_positions_is_named_with_what_to_do():
     with pytest.raises(RecordingError, match=r'has no column of numbers for elbow;.*--joints'):
         plan(ramps('shoulder_pos', 'shoulder_tau', 'elbow_tau'), ColumnSettings(), JOINTS)
+
+
+@pytest.mark.parametrize('said', [{}, {'time': 't'}])
+def test_a_time_that_runs_backwards_is_refused_with_what_to_do(said):
+    """Sorted, the motion would run backwards too, and its velocities would not."""
+    backwards = table(t=np.arange(50)[::-1] / 100.0, q1=np.sin(np.arange(50.0)))
+    with pytest.raises(RecordingError, match=r'column t runs backwards, from 0\.49 to 0') as error:
+        plan(backwards, ColumnSettings(position='q1', **said))
+    assert 'turn the rows round' in str(error.value)
+    assert '--rate' in str(error.value)
+
+
+def test_a_header_in_another_order_than_its_columns_is_asked_about():
+    mixed = table(t=np.sin(np.arange(50.0)), q1=np.arange(50) / 100.0)
+    with pytest.raises(RecordingError, match='column t goes up and down') as error:
+        plan(mixed, ColumnSettings(position='q1'))
+    assert 'stand above its own column' in str(error.value)

@@ -1,0 +1,170 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Encoders that read the same though their joint moves.
+
+A joint may be locked: its reading stays the same, its velocity is zero, and its torque is what
+weight and the motion of other joints make of it. A reading that does not change by one count is
+dead where the recorded velocity goes on, or where the torque is of a motion that nobody recorded.
+Where no velocity is recorded, a joint whose torque is mostly weight that others turn is not told
+from a locked one.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.prediction_error import left_of_blocks
+from armid_ros.identification.rows.checks import REST_RANGE
+from armid_ros.identification.rows.row_noise import sensor_noise
+from armid_ros.model import inverse_dynamics, regressor
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Range of a Brownian bridge over its scale that chance exceeds once in a million (Kuiper 1960).
+_WALK = 3.0
+#: Rows of which a torque that nobody recorded the motion of is told.
+_ROWS = 600
+
+
+def dead_encoders(
+    robot: Robot | None, recording: Recording, motions: Sequence[Motion] = ()
+) -> Iterator[str]:
+    """
+    Say which positions, or velocities, stay the same while their joint moves.
+
+    Parameters
+    ----------
+    robot : Robot or None
+        The description; without one only positions and velocities are compared.
+    recording : Recording
+        As it was read.
+    motions : sequence of Motion
+        Its stretches, filtered, with torque; without any the torque is not asked.
+
+    Yields
+    ------
+    str
+        Recording, joint, reading and remedy, without a full stop.
+
+    """
+    source = recording.source or 'a recording'
+    for j, joint in enumerate(recording.joints):
+        unit = 'rad' if robot is None else robot.position_units[j]
+        start, stop, hidden = _stands(recording, j)
+        goes = _distance(recording, j, start, stop)
+        always = stop - start == len(recording)
+        t = recording.t
+        when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+        reads = f'{recording.q[start, j]:.4g} {unit}'
+        said = f'in {source} the position of {joint} stays at {reads} {when}'
+        if goes > hidden:
+            yield (
+                f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; '
+                + ('record again' if always else 'leave that time out')
+            )
+        elif always and robot is not None and _moves_unseen(robot, motions, j):
+            yield (
+                f'{said}, while its torque is not what weight and the other joints make of a '
+                'joint at rest: its encoder is dead; record again'
+            )
+    yield from _dead_velocities(recording, source)
+
+
+def _dead_velocities(recording: Recording, source: str) -> Iterator[str]:
+    """Say which velocities stay the same, if those of other joints that move do not."""
+    if recording.dq is None:
+        return
+    moves = np.ptp(recording.q, axis=0) > REST_RANGE
+    same = moves & (np.ptp(recording.dq, axis=0) == 0.0)
+    if not np.any(moves & ~same):
+        return  # a driver that does not measure velocities
+    for j in np.flatnonzero(same):
+        yield (
+            f'in {source} the velocity of {recording.joints[j]} stays at '
+            f'{recording.dq[0, j] + 0.0:.4g} throughout, while its position goes '
+            f'{np.ptp(recording.q[:, j]):.3g}: one of the two is dead; record again, or leave '
+            'velocities out if the positions are right'
+        )
+
+
+def _stands(recording: Recording, joint: int) -> tuple[int, int, float]:
+    """
+    Return where a position longest reads the same, and how far it may go unseen meanwhile.
+
+    That is a step of the encoder, and as much as a joint at rest goes.
+
+    """
+    q = recording.q[:, joint]
+    steps = np.abs(np.diff(q))
+    edges = np.flatnonzero(steps) + 1
+    bounds = np.concatenate([[0], edges, [len(q)]])
+    longest = int(np.argmax(np.diff(bounds)))
+    step = float(steps[steps > 0.0].min()) if len(edges) else 0.0
+    return int(bounds[longest]), int(bounds[longest + 1]), REST_RANGE + step
+
+
+def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
+    """
+    Return how far a recorded velocity goes beyond its mean, [rad or m].
+
+    What the integral of its white noise may reach by chance is taken off.
+
+    """
+    if recording.dq is None or stop - start < 3:
+        return 0.0
+    dq, t = recording.dq[start:stop, joint], recording.t[start:stop]
+    steps = np.diff(t)
+    way = np.concatenate([[0.0], np.cumsum(0.5 * (dq[1:] + dq[:-1]) * steps)])
+    way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
+    walk = _WALK * np.sqrt(_white(dq) * np.sum(steps**2))
+    return max(float(np.ptp(way) - walk), 0.0)
+
+
+def _moves_unseen(robot: Robot, motions: Sequence[Motion], joint: int) -> bool:
+    """
+    Return whether the torque of a joint that reads the same is none of a joint at rest.
+
+    A joint at rest takes what its links weigh and what the other joints do to them. Its friction
+    answers to that: the drive gives what is left, none at least and all at most. What is described
+    is within a factor of two, so that a joint at rest is off it by no more than it varies itself.
+    One that is off by more, and by more than noise of its sensor, is at rest where a good model of
+    that describes it, with free masses and a share of the friction of other joints.
+
+    """
+    motion = _thinned(motions)
+    if motion is None:
+        return False
+    assert motion.tau is not None
+    described, torque = inverse_dynamics(robot, motion)[:, joint], motion.tau[:, joint]
+    size, off = float(np.std(torque)), float(np.std(torque - described))
+    if not off > float(np.std(described)) + sensor_noise(robot, None)[joint]:
+        return False
+    others = [k for k in range(motion.n_joints) if k != joint]
+    rubs = motion.dq[:, others], np.sign(motion.dq[:, others])
+    columns = np.column_stack([regressor(robot, motion)[:, joint], np.ones(len(motion)), *rubs])
+    length = np.sqrt(np.mean(columns**2, axis=0))
+    columns = (columns / np.where(length > 0.0, length, 1.0))[:, np.newaxis]
+    left = left_of_blocks(columns, (torque - described)[:, np.newaxis] / size)[:, 0]
+    smooth = float(np.mean(left**2)) - _white(left)
+    return bool(100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor)
+
+
+def _white(values: FloatArray) -> float:
+    """Return the variance of white noise, of which second differences have six times as much."""
+    return float(np.mean(np.diff(values, 2) ** 2)) / 6.0
+
+
+def _thinned(motions: Sequence[Motion]) -> Motion | None:
+    """Put stretches one after the other, and keep some of the samples."""
+    parts = [motion for motion in motions if motion.tau is not None and len(motion) > 2]
+    if not parts:
+        return None
+    names = ('t', 'q', 'dq', 'ddq', 'tau')
+    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
+    step = max(1, len(arrays[0]) // _ROWS)
+    return Motion(parts[0].joints, *(array[::step] for array in arrays))
