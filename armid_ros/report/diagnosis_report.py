@@ -175,7 +175,7 @@ def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Sect
     """Return what else was looked at."""
     sections: list[Section] = []
     if diagnosis.minor:
-        sections.append(SmallPrint(diagnosis.minor, settings.everything))
+        sections.append(SmallPrint(diagnosis.minor, settings.everything, bool(diagnosis.findings)))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation, diagnosis.arm.robot)
         sections += [CandidateTable(diagnosis, settings), CouldBeSeen(sizes)]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.verdict.words import share_in_words
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import (
     digits,
@@ -17,7 +18,6 @@ from armid_ros.report.notation import (
     with_interval,
 )
 from armid_ros.report.page import render, Section
-from armid_ros.report.sections.diagnosed import share_in_words
 from armid_ros.residual import JointResidual, Residual
 from markupsafe import Markup
 import numpy as np
@@ -160,7 +160,7 @@ def _cause(finding: Finding) -> str:
     numbers = f': {listed}' if listed else ''
     rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
     doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
-    name, share = finding.name.replace('_', ' '), share_in_words(finding)
+    name, share = finding.name.replace('_', ' '), share_in_words(finding, interval=True)
     return f'{name}{where}{numbers}; explains {share}{doubt}'
 
 
