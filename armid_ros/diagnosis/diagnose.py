@@ -272,14 +272,15 @@ def _where(
     """
     Locate the gap in the data that it is measured on.
 
-    If something is named and no loss exceeds its limit, any excess counts.
+    If something is named and no loss is over its limit there, any excess in fitted data counts.
 
     """
     places = _located(explanation, explanation.reference.arm, shown, settings)
     if places or not explanation.steps:
         return places
-    residual = _residual(explanation, explanation.reference.arm, shown)
-    return locate(explanation.given, shown, residual, np.ones(explanation.given.robot.n_joints))
+    least = np.ones(explanation.given.robot.n_joints)
+    residual = explanation.reference.residual
+    return locate(explanation.given, explanation.evidence, residual, least)
 
 
 def _located(

@@ -231,7 +231,7 @@ def diagnose(
         click.echo(json_text(document))
         return
     show(result)
-    _show_extras(out, extras)
+    _show_extras(out, result, extras)
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
@@ -305,7 +305,7 @@ def _minor(finding: Finding, share: str) -> dict[str, str]:
     }
 
 
-def _show_extras(out: Path, extras: Extras) -> None:
+def _show_extras(out: Path, result: Diagnosis, extras: Extras) -> None:
     if extras.residual is not None:
         for sentence in extras.residual.sentences():
             say(sentence)
@@ -317,6 +317,7 @@ def _show_extras(out: Path, extras: Extras) -> None:
     if extras.residual is not None:
         files.append(TABLE_FILE)
     if extras.next_run is not None:
-        say(extras.next_run.sentence)
         files.append(EXPERIMENT_FILE)
+    for step in extras.steps(result):
+        say(f'next: {step}')
     say(f'{out}: {", ".join(files)}')

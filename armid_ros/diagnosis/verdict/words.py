@@ -122,8 +122,7 @@ def decide(
         first = doubtful[0]
         others = _others(first)
         one = 'it' if len(findings) == 1 else f'the {first.name.replace("_", " ")}'
-        text = f'{said} These data cannot tell {one} from {others}. {first.experiment}'
-        return Verdict('ambiguous', text)
+        return Verdict('ambiguous', f'{said} These data cannot tell {one} from {others}.')
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
 
 
