@@ -139,7 +139,10 @@ def diagnosis_report(
         pairs = [_renamed(pair, names) for pair in extras.forward]
         sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
     sections.append(
-        DataQuality([_quality(r, role, names) for role, every in read.items() for r in every])
+        DataQuality(
+            [_quality(r, role, names) for role, every in read.items() for r in every],
+            bad=diagnosis.verdict == 'bad_data',
+        )
     )
     if diagnosis.findings:
         sections.append(PatchSection(diagnosis.findings, patch))

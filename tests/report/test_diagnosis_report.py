@@ -153,6 +153,16 @@ def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
     assert '>Patch</h2>' not in quiet
 
 
+def test_bad_data_have_no_green_tick():
+    bench = Bench()
+    turned = [replace(r, tau=-r.tau) for r in bench.recordings()]
+    found = diagnose(bench.arm, turned, rng=np.random.default_rng(0))
+    assert found.verdict == 'bad_data'
+    page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
+    assert '<li class="fine">' not in page
+    assert 'What was recorded is at fault' in page
+
+
 def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):
     shown = html[html.index('<h1>') :]
     assert '/data/of' not in shown
