@@ -96,6 +96,8 @@ class ArmPicture:
         Joints, those to be pointed out last.
     base : tuple of float
         Where the arm is fixed [px].
+    above : float
+        How far names reach beyond the upper edge [px].
 
     """
 
@@ -104,6 +106,7 @@ class ArmPicture:
     sticks: tuple[Stick, ...]
     dots: tuple[Dot, ...]
     base: tuple[float, float]
+    above: float = 0.0
 
 
 def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -> ArmPicture:
@@ -143,16 +146,21 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         if np.ptp(line, axis=0).max() > _SAME
     ]
     origins = {owner: line[0] for owner, line in zip(owners, lines, strict=True)}
-    dots = [
-        _dot(place(origins[k + 1]), name, name in marked, width)
-        for k, name in enumerate(robot.joints)
-    ]
+    dots = _apart(
+        [
+            _dot(place(origins[k + 1]), name, name in marked, width)
+            for k, name in enumerate(robot.joints)
+        ]
+    )
     return ArmPicture(
         round(width, 1),
         round(float(scale * size[1]) + 2 * _EDGE, 1),
         tuple(sorted(ways, key=lambda way: way.marked)),
-        tuple(sorted(_apart(dots), key=lambda dot: dot.marked)),
+        tuple(sorted(dots, key=lambda dot: dot.marked)),
         place(origins[0]),
+        round(
+            max(0.0, _LINE - min((dot.label_y for dot in dots if dot.marked), default=_LINE)), 1
+        ),
     )
 
 

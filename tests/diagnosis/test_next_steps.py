@@ -12,7 +12,7 @@ import pytest
 LINK = (Rival('link_inertia', ('wrist',)),)
 
 
-def diagnosis(name, joints, rivals=(), verdict='named', effects=()):
+def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
     finding = Finding(name, joints, (), (), (), 0.9, (0.8, 1.0), 0.0, rivals=rivals)
     return SimpleNamespace(
         findings=(finding,),
@@ -20,6 +20,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=()):
         left=(),
         not_visible=(),
         arm=SimpleNamespace(effects=effects),
+        explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
     )
 
 
@@ -38,6 +39,13 @@ def test_a_payload_sends_a_person_to_the_hand_first():
     first, *others = next_steps(diagnosis('payload', ('wrist',)))
     assert first.startswith('Look at wrist first: the hand, the gripper, the tool')
     assert others == ['Use model.yaml in simulation and control; keep these bags to compare with.']
+
+
+def test_friction_of_a_model_without_any_is_nothing_to_look_at():
+    known = SimpleNamespace(said_as='viscous_friction')
+    first, _ = next_steps(diagnosis('viscous_friction', ('wrist',), given=(known,)))
+    assert first.startswith('Look at wrist first: the grease')
+    assert len(next_steps(diagnosis('viscous_friction', ('wrist',)))) == 1
 
 
 def test_what_may_stand_in_its_place_is_looked_at_as_well():

@@ -41,3 +41,18 @@ def test_a_joint_that_slides_leaves_no_hole():
     assert drawn.base in begins
     (way,) = [stick for stick in drawn.sticks if stick.marked and stick.x1 == stick.x2]
     assert abs(way.y1 - way.y2) > 10.0
+
+
+def test_names_above_each_other_stay_inside_the_drawing():
+    chain = ''.join(
+        f'<link name="l{k}"><inertial><mass value="1"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+        f'<joint name="j{k}" type="revolute"><parent link="{f"l{k - 1}" if k else "base"}"/>'
+        f'<child link="l{k}"/><origin xyz="0 0 {0.02 if k else 1.0}"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+        for k in range(6)
+    )
+    robot = robot_from_urdf(f'<robot name="chain"><link name="base"/>{chain}</robot>')
+    drawn = draw_arm(robot, robot.joints)
+    assert min(dot.label_y for dot in drawn.dots) < 0.0
+    assert min(dot.label_y for dot in drawn.dots) + drawn.above >= 14.0

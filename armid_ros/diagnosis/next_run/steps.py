@@ -31,7 +31,7 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
-    steps = [text for finding in findings for text in _looks(finding, diagnosis)]
+    steps = _first([text for finding in findings for text in _looks(finding, diagnosis)])
     if verdict == 'bad_data':
         steps.append('Correct the data, or the description, and diagnose again.')
     if verdict in ('unknown', 'partial'):
@@ -61,15 +61,33 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
             continue
         where = ', '.join(one.joints) or 'the whole arm'
         name = one.name.replace('_', ' ')
-        head = f'Look at {where} first' if one is own else f'If it is {name}, look at {where}'
+        head = f'Look at {where}' if one is own else f'If it is {name}, look at {where}'
         steps.append(f'{head}: {what}.')
     return steps
 
 
+def _first(looks: list[str]) -> list[str]:
+    """Say of the first thing to look at that it is the first."""
+    if not looks:
+        return []
+    head, _, what = looks[0].rpartition(':')
+    return [f'{head} first:{what}', *looks[1:]]
+
+
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
-    """Return what an effect says is to be looked at; one that is not in the catalogue as well."""
-    own = [effect.look_at for effect in diagnosis.arm.effects if effect.said_as == name]
-    return CATALOGUE[name].look_at if name in CATALOGUE else next(iter(own), '')
+    """
+    Return what an effect says is to be looked at; one that is not in the catalogue as well.
+
+    What nearly every arm has is nothing to look at where the model was given without it.
+
+    """
+    if name not in CATALOGUE:
+        return next((own.look_at for own in diagnosis.arm.effects if own.said_as == name), '')
+    kind, explanation = CATALOGUE[name], diagnosis.explanation
+    given = () if explanation is None else explanation.given.effects
+    if kind.usual and name not in {own.said_as for own in given}:
+        return ''
+    return kind.look_at
 
 
 def _records(finding: Finding, run: NextRun | None) -> list[str]:

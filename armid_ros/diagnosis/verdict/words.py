@@ -14,7 +14,7 @@ from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -251,9 +251,16 @@ def _subject(finding: Finding) -> str:
 
 
 def _values(finding: Finding) -> Iterator[str]:
-    """Yield the values of a cause, with the name where it differs from that of the one before."""
+    """
+    Yield the values of a cause, with the name where it differs from that of the one before.
+
+    Values whose interval includes zero are left to the table, unless all do.
+
+    """
     before = ''
-    for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True):
+    every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    told = [row for row in every if excludes_zero(row[1], row[2])]
+    for p, value, std in told or every:
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '
         yield f'{name}{_with_degrees(value, std, p.unit)}'
         before = p.name
