@@ -11,6 +11,7 @@ from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sections.diagnosed import Shares
 from armid_ros.report.sections.gap import GapOverlay
+from armid_ros.report.sections.story import Story
 from armid_ros.report.sources import short_names, with_names
 import numpy as np
 import pytest
@@ -134,6 +135,13 @@ def test_the_joint_where_it_lives_is_the_one_with_the_largest_bar(found):
     excess = np.maximum(gap.chi2_before - 1.0, 0.0)
     assert found.where[0].joint == found.arm.robot.joints[int(np.argmax(gap.chi2_before))]
     assert found.where[0].share_of_gap == pytest.approx(excess.max() / excess.sum(), abs=0.05)
+
+
+def test_a_gap_of_the_fitted_data_alone_is_said_to_be_one(found):
+    assert not any('that were fitted' in line for line in Story(found).rows[0][1])
+    quiet_there = replace(found.gap, chi2_before=0.9 * np.ones(2), predicted=True)
+    (_, lines), *_ = Story(replace(found, gap=quiet_there)).rows
+    assert lines[0].startswith('In the recordings that were fitted; in those that were not elbow')
 
 
 def test_what_was_added_to_the_model_is_said(found, recordings, html):

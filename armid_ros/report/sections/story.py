@@ -105,8 +105,21 @@ class Story(Section):
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
         if lines or self.diagnosis.verdict == 'consistent':
-            return lines or ['No joint has a gap.']
+            return [*self._in_fitted_alone(), *lines] or ['No joint has a gap.']
         return ['No joint is far above the floor.']
+
+    def _in_fitted_alone(self) -> list[str]:
+        """Say that a gap was located in fitted data, where others have none in its joint."""
+        gap, places = self.diagnosis.gap, self.diagnosis.where
+        if gap is None or not gap.predicted or not places:
+            return []
+        joint = places[0].joint
+        if gap.chi2_before[self.diagnosis.arm.robot.joints.index(joint)] > 1.0:
+            return []
+        return [
+            f'In the recordings that were fitted; in those that were not {joint} is below its '
+            'floor:'
+        ]
 
     def _which(self) -> list[str]:
         causes = [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
