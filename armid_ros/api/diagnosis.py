@@ -157,12 +157,7 @@ class DiagnosisResult(Shown):
                 said = with_interval(value, std, parameter.unit)
                 where = finding.place_of(parameter.joint) or 'whole arm'
                 rows.append((finding.name, where, parameter.name, said))
-        gap = self.core.gap
-        below = []
-        if gap is not None and rows:
-            below.append(f'{100 * gap.closed:.0f} % of the gap closed on data not used to fit')
-        if self.residual is not None:
-            below += self.residual.sentences()
+        below = [] if self.residual is None else list(self.residual.sentences())
         return Summary(
             self.core.summary.replace('+-', '±'),
             self.core.verdict.replace('_', ' '),

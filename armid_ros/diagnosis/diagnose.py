@@ -39,7 +39,7 @@ from armid_ros.diagnosis.verdict.gap import (
 )
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, locate, Where
-from armid_ros.diagnosis.verdict.words import decide, not_repeating, Verdict
+from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.motion import FloatArray
@@ -213,17 +213,22 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         NOISE if measured else chosen.floor_in_words,
         _as_it_is(arm, _sure(evidence, chosen), settings) if refitted else None,
         minor,
+        None if measured else _hides(names.rest, settings),
     )
+    if not found:
+        explanation = replace(explanation, reference=explanation.fitted)
     gap = measure_gap(explanation, unseen)
-    limits = evidence.limits(explanation.fitted.residual, settings)
+    shown = evidence if unseen is None else unseen
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *_unpatched(found, worse), *_doubts(chosen, word)]),
         findings=found,
         minor=minor,
-        where=_where(explanation, limits, bool(found)) or places_held(arm, resting),
-        left=locate(arm, evidence, explanation.fitted.residual, limits),
+        where=_where(explanation, shown, settings) or places_held(arm, resting),
+        left=_located(
+            explanation, explanation.fitted.arm, _shows(left, evidence, shown), settings
+        ),
         gap=gap,
         explanation=explanation.forgetting(),
         arm=plain_arm(explanation.fitted.arm) if found and not worse else asked.given,
@@ -262,12 +267,46 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
 
 
-def _where(explanation: Explanation, limits: FloatArray, named: bool) -> tuple[Where, ...]:
-    """Locate the gap; if something is named and no loss exceeds its limit, any excess counts."""
-    arm, evidence = explanation.given, explanation.evidence
+def _where(
+    explanation: Explanation, shown: Evidence, settings: DiagnosisSettings
+) -> tuple[Where, ...]:
+    """
+    Locate the gap in the data that it is measured on.
+
+    If something is named and no loss is over its limit there, any excess in fitted data counts.
+
+    """
+    places = _located(explanation, explanation.reference.arm, shown, settings)
+    if places or not explanation.steps:
+        return places
+    least = np.ones(explanation.given.robot.n_joints)
     residual = explanation.reference.residual
-    places = locate(arm, evidence, residual, limits)
-    return places or (locate(arm, evidence, residual, np.ones_like(limits)) if named else ())
+    return locate(explanation.given, explanation.evidence, residual, least)
+
+
+def _located(
+    explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
+) -> tuple[Where, ...]:
+    """Locate what an arm leaves of some data beyond the limits of the patched model."""
+    patched = _residual(explanation, explanation.fitted.arm, shown)
+    limits = shown.limits(patched, settings)
+    return locate(explanation.given, shown, _residual(explanation, arm, shown), limits)
+
+
+def _residual(explanation: Explanation, arm: ArmModel, shown: Evidence) -> Sequence[FloatArray]:
+    """Return what one of the arms of an explanation leaves of some data."""
+    if shown.data is explanation.evidence.data:
+        fits = (explanation.fitted, explanation.reference)
+        known = [fit.residual for fit in fits if fit.arm is arm]
+        if known:
+            return known[0]
+    return [part.residual(arm) for part in shown.data]
+
+
+def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence) -> Evidence:
+    """Return the data in which the worst of what is left shows, of which the sentence speaks."""
+    worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
+    return evidence if worst == 0 else unseen
 
 
 def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
@@ -320,6 +359,15 @@ def _left(
     else:
         residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
     return Excess(_excess(residual, evidence, settings) / more, f'in {where}')
+
+
+def _hides(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
+    """Return how much may change beside a misfit before what is left is a gap."""
+    evidence = explanation.evidence
+    limits = evidence.limits(explanation.fitted.residual, settings) * settings.thresholds.predicted
+    misfit = np.sqrt(np.mean([own**2 for own in evidence.sigma], axis=0))
+    share = misfit / np.maximum(evidence.torque_rms, 1e-300)
+    return Hiding(share, np.sqrt(np.maximum(limits - 1.0, 0.0)) * share)
 
 
 def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Excess:

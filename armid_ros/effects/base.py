@@ -49,8 +49,6 @@ class Effect(ABC):
 
     Examples
     --------
-    A hose that stiffens as it bends:
-
     >>> import armid_ros as ar
     >>> from armid_ros.effects import Action
     >>> from armid_ros.effects.layout import joint_columns, scatter
@@ -79,6 +77,8 @@ class Effect(ABC):
     shapes: ClassVar[tuple[Shape, ...]] = ()
     #: The experiment that shows it best, as an engineer would do it.
     shown_by: ClassVar[str] = 'faster motion'
+    #: What a person looks at on the robot before anything else is recorded.
+    look_at: ClassVar[str] = ''
     #: What a positive value means, where the name does not say it.
     sign: ClassVar[str] = ''
     #: Whether a person says it by its weight, the first quantity, and where it is.

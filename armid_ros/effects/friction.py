@@ -28,6 +28,7 @@ class ViscousFriction(Effect):
     name = 'viscous_friction'
     summary = 'torque proportional to joint velocity'
     shown_by = 'constant velocities, slow to fast, in both directions'
+    look_at = 'the grease, its temperature, the seals and the bearings'
     friction = True
     familiar = True
     nuisance = ((),)
@@ -64,6 +65,7 @@ class CoulombFriction(Effect):
     name = 'coulomb_friction'
     summary = 'constant torque against the direction of motion; holds at rest'
     shown_by = 'slow constant velocity in both directions'
+    look_at = 'the brake, the seals and the bearings, and whether it moves freely by hand'
     friction = True
     familiar = True
     nuisance = ((),)
@@ -102,6 +104,7 @@ class AsymmetricFriction(Effect):
     name = 'asymmetric_friction'
     summary = 'friction that differs between the two directions of motion'
     shown_by = 'static holds beside slow motion in both directions'
+    look_at = 'the brake, the gear, and cables that pull one way'
     friction = True
     quantities = (
         Quantity('coulomb_asymmetry', 'N m', typical=(0.005, 2.0)),
@@ -159,6 +162,7 @@ class QuadraticFriction(Effect):
     name = 'quadratic_friction'
     summary = 'friction that grows with the square of the velocity, or flattens'
     shown_by = 'constant velocities up to the limit'
+    look_at = 'what moves through air, oil or grease'
     friction = True
     familiar = True
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
@@ -193,6 +197,7 @@ class StribeckFriction(Effect):
     name = 'stribeck_friction'
     summary = 'breakaway torque beyond Coulomb friction, gone at higher velocity'
     shown_by = 'constant velocities from 0.01 to 1 rad/s in both directions'
+    look_at = 'the kind, the age and the temperature of the grease'
     friction = True
     familiar = True
     nuisance = ((0.03, 2.0), (0.1, 2.0), (0.3, 2.0))  # humps at low velocities
@@ -239,6 +244,7 @@ class ThermalFriction(Effect):
     name = 'thermal_friction'
     summary = 'viscous friction that changes while the joint warms up'
     shown_by = 'the same motion cold and after half an hour of work'
+    look_at = 'how warm the gear was, and how long the arm had worked before'
     friction = True
     quantities = (Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),)
     shapes = (Shape('warm_up_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)

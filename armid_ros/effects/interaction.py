@@ -137,6 +137,7 @@ class HumanInteraction(Attached):
     name = 'human_interaction'
     summary = 'spring and damper from a link to a person, another machine or the world'
     shown_by = 'the same motion with the contact released'
+    look_at = 'whether a person, a table or a fixture touches the arm'
     external = True
     smooth = True
     quantities = (
@@ -198,6 +199,7 @@ class InterfaceSlack(Attached):
     name = 'interface_slack'
     summary = 'spring from a link to an anchor that pulls beyond a slack only'
     shown_by = 'the same motion at two tensions of the strap'
+    look_at = 'the straps, and how tight they are'
     external = True
     smooth = True
     quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)

@@ -4,7 +4,8 @@
 An arm as sticks, from the side that shows most of it.
 
 A body is drawn from its joint to the joints that it carries; the last one to beyond its centre of
-mass. Of some poses and directions the one is taken in which the arm covers the largest area.
+mass. A joint that slides is drawn as the way from where it is fixed to where it is. Of some poses
+and directions the one is taken in which the arm covers the largest area.
 
 """
 
@@ -95,6 +96,8 @@ class ArmPicture:
         Joints, those to be pointed out last.
     base : tuple of float
         Where the arm is fixed [px].
+    above : float
+        How far names reach beyond the upper edge [px].
 
     """
 
@@ -103,6 +106,7 @@ class ArmPicture:
     sticks: tuple[Stick, ...]
     dots: tuple[Dot, ...]
     base: tuple[float, float]
+    above: float = 0.0
 
 
 def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -> ArmPicture:
@@ -135,23 +139,28 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         x, y = scale * (point - low)
         return round(left + float(x), 1), round(_EDGE + float(scale * size[1] - y), 1)
 
-    owners = [owner for owner, _, _ in _bodies(robot.model)]
+    owners = [*_slides(robot), *(owner for owner, _, _ in _bodies(robot.model))]
     ways = [
         Stick(*place(line[0]), *place(line[1]), owner > 0 and robot.joints[owner - 1] in marked)
         for owner, line in zip(owners, lines, strict=True)
         if np.ptp(line, axis=0).max() > _SAME
     ]
     origins = {owner: line[0] for owner, line in zip(owners, lines, strict=True)}
-    dots = [
-        _dot(place(origins[k + 1]), name, name in marked, width)
-        for k, name in enumerate(robot.joints)
-    ]
+    dots = _apart(
+        [
+            _dot(place(origins[k + 1]), name, name in marked, width)
+            for k, name in enumerate(robot.joints)
+        ]
+    )
     return ArmPicture(
         round(width, 1),
         round(float(scale * size[1]) + 2 * _EDGE, 1),
         tuple(sorted(ways, key=lambda way: way.marked)),
-        tuple(sorted(_apart(dots), key=lambda dot: dot.marked)),
+        tuple(sorted(dots, key=lambda dot: dot.marked)),
         place(origins[0]),
+        round(
+            max(0.0, _LINE - min((dot.label_y for dot in dots if dot.marked), default=_LINE)), 1
+        ),
     )
 
 
@@ -176,15 +185,28 @@ def _bodies(model: pin.Model) -> list[tuple[int, FloatArray, FloatArray]]:
     return lines
 
 
+def _slides(robot: Robot) -> list[int]:
+    """Return the joints that slide, as the model counts them."""
+    return [k for k, slides in enumerate(robot.prismatic, start=1) if slides]
+
+
 def _flat(robot: Robot, q: FloatArray, view: Camera) -> FloatArray:
-    """Return all lines as they are seen, shape (L, 2, 2) [m]."""
+    """Return the ways of joints that slide and all bodies as they are seen, (L, 2, 2) [m]."""
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, np.asarray(q, dtype=float))
-    space = [
+    model = robot.model
+    ways = [
+        [
+            data.oMi[model.parents[k]].act(model.jointPlacements[k].translation),
+            data.oMi[k].translation,
+        ]
+        for k in _slides(robot)
+    ]
+    bodies = [
         [data.oMi[joint].act(start), data.oMi[joint].act(end)]
         for joint, start, end in _bodies(robot.model)
     ]
-    return view.flat(np.array(space))
+    return view.flat(np.array([*ways, *bodies]))
 
 
 def _area(lines: FloatArray) -> float:

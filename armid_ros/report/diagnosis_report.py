@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
+from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
@@ -68,6 +69,8 @@ class Extras:
         Held-out recordings simulated, with the model as it was and as it is patched.
     next_run : NextRun or None
         A motion that separates names in doubt.
+    no_run : str
+        Why there is no next run, where names are in doubt.
     notes : tuple of str
         Why there is not more.
     residual : Residual or None
@@ -77,8 +80,13 @@ class Extras:
 
     forward: tuple[ForwardValidation, ...] = ()
     next_run: NextRun | None = None
+    no_run: str = ''
     notes: tuple[str, ...] = ()
     residual: Residual | None = None
+
+    def steps(self, diagnosis: Diagnosis) -> list[str]:
+        """Return what to do next, for the page and the terminal."""
+        return next_steps(diagnosis, self.next_run, self.no_run)
 
 
 def diagnosis_report(
@@ -124,14 +132,17 @@ def diagnosis_report(
         _verdict(diagnosis, names),
         *_story(diagnosis, names, extras.residual),
         *([] if extras.residual is None else [ResidualMap(extras.residual)]),
-        NextSteps([*_next_steps(diagnosis, extras.next_run), *_of_maps(extras.residual)]),
+        NextSteps([*extras.steps(diagnosis), *_of_maps(extras.residual)]),
         *_small_print(diagnosis, settings),
     ]
     if extras.forward:
         pairs = [_renamed(pair, names) for pair in extras.forward]
         sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
     sections.append(
-        DataQuality([_quality(r, role, names) for role, every in read.items() for r in every])
+        DataQuality(
+            [_quality(r, role, names) for role, every in read.items() for r in every],
+            bad=diagnosis.verdict == 'bad_data',
+        )
     )
     if diagnosis.findings:
         sections.append(PatchSection(diagnosis.findings, patch))
@@ -175,7 +186,7 @@ def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Sect
     """Return what else was looked at."""
     sections: list[Section] = []
     if diagnosis.minor:
-        sections.append(SmallPrint(diagnosis.minor, settings.everything))
+        sections.append(SmallPrint(diagnosis.minor, settings.everything, bool(diagnosis.findings)))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation, diagnosis.arm.robot)
         sections += [CandidateTable(diagnosis, settings), CouldBeSeen(sizes)]
@@ -206,21 +217,4 @@ def _of_maps(residual: Residual | None) -> list[str]:
                 f'If {one.law.text} makes sense for {one.joint}, write it as an effect of your '
                 'own and diagnose again.'
             )
-    return steps
-
-
-def _next_steps(diagnosis: Diagnosis, next_run: NextRun | None) -> list[str]:
-    steps = [] if next_run is None else [next_run.sentence]
-    steps += [finding.experiment for finding in diagnosis.findings if finding.experiment]
-    if diagnosis.verdict == 'bad_data':
-        steps.append('Correct the data, or the description, and diagnose again.')
-    if diagnosis.verdict in ('unknown', 'partial'):
-        steps += [f'Look at {w.joint}: what is left lives {w.signature}.' for w in diagnosis.left]
-    if diagnosis.verdict == 'not_repeatable':
-        steps.append('Keep people and loose parts away from the arm, and record again.')
-    if diagnosis.verdict in ('named', 'consistent'):
-        steps.append('Use model.yaml in simulation and control; keep these bags to compare with.')
-    if diagnosis.not_visible:
-        hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
-        steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
     return steps

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from pathlib import PurePath
 
+from armid_ros.diagnosis.verdict import words
 from armid_ros.robots import Robot
 
 
@@ -29,7 +30,7 @@ def digits(value: float, count: int = 2) -> str:
         return DASH
     if 10.0**count <= abs(value) < 1e5:
         return f'{value:.0f}'
-    return f'{value:#.{count}g}'.rstrip('.')
+    return f'{value:z#.{count}g}'.rstrip('.')
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
@@ -39,7 +40,7 @@ def measured(value: float, reach: float) -> tuple[str, str]:
     decimals = max(0, 1 - math.floor(math.log10(reach)))
     if decimals > 7 or max(abs(value), reach) >= 1e7:
         return f'{value:.3g}', f'{reach:.2g}'
-    return f'{value:.{decimals}f}', f'{reach:.{decimals}f}'
+    return f'{value:z.{decimals}f}', f'{reach:.{decimals}f}'
 
 
 def with_interval(value: float, std: float, unit: str) -> str:
@@ -65,8 +66,7 @@ def percent(share: float) -> str:
     """Return a share of the gap as a percentage, the digit that matters kept: '96 %', '0.4 %'."""
     if not math.isfinite(share):
         return DASH
-    size = abs(100.0 * share)
-    return f'{100.0 * share:.0f} %' if size >= 2.0 or size < 0.05 else f'{100.0 * share:.1f} %'
+    return words.percent(share)
 
 
 def probability(p: float) -> str:

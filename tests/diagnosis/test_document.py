@@ -4,13 +4,16 @@
 
 from dataclasses import replace
 import json
+from types import SimpleNamespace
 
 from armid_ros.arm import Misfit
 from armid_ros.diagnosis import diagnose, diagnosis_document
+from armid_ros.diagnosis.verdict.document import smallest_size
+from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
 
-from .conftest import Bench
+from .conftest import Bench, UPRIGHT_URDF, URDF
 
 
 def strict(found):
@@ -53,6 +56,46 @@ def test_every_field_of_the_schema_is_there(document):
     gap = document['gap']
     assert gap['before']['elbow'] > 3.0 * gap['after']['elbow']
     assert all(0.0 <= row['adjusted_p'] <= 1.0 for row in document['candidates'])
+
+
+def test_torque_has_the_unit_of_its_joint(document):
+    assert document['gap']['unit'] == 'N m'
+    assert document['gap']['units'] == {'shoulder': 'N m', 'elbow': 'N m'}
+    sliding = URDF.replace('name="shoulder" type="revolute"', 'name="shoulder" type="prismatic"')
+    bench = Bench(sliding)
+    still = replace(bench.recordings()[0], tau=np.zeros_like(bench.recordings()[0].tau))
+    gap = strict(diagnose(bench.arm, [still], rng=np.random.default_rng(0)))['gap']
+    assert (gap['unit'], gap['units']) == ('N m', {'shoulder': 'N', 'elbow': 'N m'})
+
+
+@pytest.mark.parametrize(
+    ('name', 'size', 'possible'),
+    [
+        ('backlash', 0.006, True),
+        ('backlash', 6.8e12, False),
+        ('torque_offset', 1.9e17, False),
+        ('torque_lag', 0.1, True),
+        ('torque_lag', 53.0, False),
+    ],
+)
+def test_a_size_that_no_arm_has_is_not_detectable(name, size, possible):
+    effect = CATALOGUE[name].on(Bench().robot, ('elbow',))
+    candidate = SimpleNamespace(kept=(0,), effect=effect)
+    trial = SimpleNamespace(candidate=candidate, std=[size / 5.0], resolution=[1.0])
+    found = smallest_size(trial)[1]
+    assert found == pytest.approx(size) if possible else found == np.inf
+
+
+def test_nothing_named_is_nothing_changed():
+    """A body that is fitted anew is no name: before and after are the same model."""
+    bench = Bench(UPRIGHT_URDF, (0.3, 0.2, 0.2), (0.5, 0.3, 0.3))
+    theta = bench.arm.theta.copy()
+    theta[:30] *= np.repeat([1.2, 0.8, 1.2], 10)
+    off = bench.arm.with_theta(theta)
+    found = diagnose(off, bench.recordings(), rng=np.random.default_rng(0))
+    assert found.refitted and not found.findings
+    gap = strict(found)['gap']
+    assert gap['before'] == gap['after']
 
 
 def test_a_diagnosis_of_bad_data_is_a_document_as_well():

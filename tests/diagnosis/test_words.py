@@ -12,7 +12,14 @@ from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.naming import _separating, _without_later
 from armid_ros.diagnosis.verdict.where import Excess
-from armid_ros.diagnosis.verdict.words import decide, not_repeating, sentence
+from armid_ros.diagnosis.verdict.words import (
+    decide,
+    Hiding,
+    not_repeating,
+    percent,
+    sentence,
+    share_in_words,
+)
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -41,6 +48,36 @@ def test_what_is_there_and_too_small_to_matter_is_said_beside_noise(bench):
     assert 'too small to matter. A stribeck friction in elbow explains 45 %' in summary
     beside_a_misfit = decide((), (), [closed], bench.arm, FLOOR, None, [small]).summary
     assert 'stribeck' not in beside_a_misfit
+
+
+def test_a_model_that_is_far_off_in_a_joint_says_how_much_can_hide_there(bench):
+    closed = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
+    hides = Hiding(np.array([0.01, 0.13]), np.array([0.014, 0.18]))
+    small = small_finding(bench, 0.3)
+
+    def text(minor):
+        return decide((), (), [closed], bench.arm, FLOOR, None, minor, hides).summary
+
+    hidden = (
+        'In elbow that misfit is 13 % of the torque: a change of up to 18 % of it can hide there'
+    )
+    assert text(()).endswith(f'is {FLOOR}. {hidden}.')
+    assert text([small]).endswith(f'{hidden}, such as the encoder offset of the small print.')
+    assert text([replace(small, joints=('shoulder',))]) == text(())
+
+
+def test_a_share_is_the_same_text_wherever_it_is_said(bench):
+    small = small_finding(bench, 0.3)
+    assert share_in_words(small) == '30 % of the gap'
+    assert share_in_words(small, interval=True) == '30 % of the gap (20 % to 40 %)'
+    beside = replace(small, share=0.001, of_joint=('elbow', 0.94))
+    assert share_in_words(beside) == '0.1 % of the gap, and most of what the others leave in elbow'
+    assert [percent(x) for x in (0.957, 0.004, 0.0, -1e-5)] == ['96 %', '0.4 %', '0 %', '0 %']
+
+
+def test_no_value_is_less_than_nothing_by_rounding(bench):
+    small = replace(small_finding(bench, 0.3), values=(-1e-6,), std=(0.0007,))
+    assert 'encoder offset 0.0000 +- 0.0014 rad' in sentence(small)
 
 
 def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(bench):
@@ -116,7 +153,7 @@ def test_names_that_are_one_cause_are_one_sentence(bench):
     assert said == (
         'A base tilt (tilt x 0.300 +- 0.020 rad, 17.2 degrees) and a gravity magnitude (gravity '
         'difference 0.300 +- 0.020 m/s^2) together explain 90 % of the gap. A time delay (delay '
-        '0.300 +- 0.020 s) explains less than 1 % of the gap. The rest is '
+        '0.300 +- 0.020 s) explains 0.1 % of the gap. The rest is '
         'the misfit that the model had before.'
     )
 

@@ -27,3 +27,32 @@ def test_a_joint_without_end_is_drawn_at_zero_and_others_in_the_middle_of_their_
     drawn = draw_arm(robot, ['turn'])
     assert drawn == draw_arm(robot, ['turn'], np.array([[0.0, 0.5]]))
     assert {dot.name for dot in drawn.dots} == {'turn', 'lift'}
+
+
+def test_a_joint_that_slides_leaves_no_hole():
+    """Every joint but the first lies at the end of a line that begins further in."""
+    slide = ENDLESS.replace('type="continuous"', 'type="prismatic"').replace(
+        '<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><limit lower="0" upper="1" velocity="1"/>'
+    )
+    drawn = draw_arm(robot_from_urdf(slide), ['turn'], np.array([[0.8, 0.5]]))
+    ends = {(stick.x2, stick.y2) for stick in drawn.sticks}
+    begins = {(stick.x1, stick.y1) for stick in drawn.sticks}
+    assert {(dot.x, dot.y) for dot in drawn.dots} <= ends
+    assert drawn.base in begins
+    (way,) = [stick for stick in drawn.sticks if stick.marked and stick.x1 == stick.x2]
+    assert abs(way.y1 - way.y2) > 10.0
+
+
+def test_names_above_each_other_stay_inside_the_drawing():
+    chain = ''.join(
+        f'<link name="l{k}"><inertial><mass value="1"/>'
+        '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+        f'<joint name="j{k}" type="revolute"><parent link="{f"l{k - 1}" if k else "base"}"/>'
+        f'<child link="l{k}"/><origin xyz="0 0 {0.02 if k else 1.0}"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+        for k in range(6)
+    )
+    robot = robot_from_urdf(f'<robot name="chain"><link name="base"/>{chain}</robot>')
+    drawn = draw_arm(robot, robot.joints)
+    assert min(dot.label_y for dot in drawn.dots) < 0.0
+    assert min(dot.label_y for dot in drawn.dots) + drawn.above >= 14.0

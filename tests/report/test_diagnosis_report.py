@@ -5,11 +5,13 @@
 from dataclasses import replace
 import re
 
-from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report
 from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
+from armid_ros.report.sections.diagnosed import Shares
 from armid_ros.report.sections.gap import GapOverlay
+from armid_ros.report.sections.story import Story
 from armid_ros.report.sources import short_names, with_names
 import numpy as np
 import pytest
@@ -104,6 +106,44 @@ def test_the_share_has_its_interval_wherever_it_is_said(found, html):
     assert f'floor, {digits(float(found.gap.floor[1]))} N m, is {found.baseline}' in body
 
 
+def test_one_share_is_on_the_page_and_in_the_document(found, html):
+    (finding,) = found.findings
+    share = f'{percent(finding.share)} of the gap'
+    assert found.summary.count('%') == 1 and share in found.summary
+    assert diagnosis_document(found)['effects'][0]['share'] == finding.share
+    text = re.sub('<[^>]*>', ' ', html[html.index('class="verdict') :])
+    shown = text[: text.index('Measured and modelled')]
+    assert shown.count(share) >= 2  # the sentence, and the short answers
+    assert f'{percent(finding.share)} (' in shown[shown.index('What explains the gap') :]
+    assert 'above the floor' not in text
+
+
+def test_causes_that_are_one_have_one_bar(found):
+    (finding,) = found.findings
+    twin = replace(finding, name='base_tilt', joints=(), together=(finding.name,))
+    both = replace(found, findings=(replace(finding, together=('base_tilt',)), twin))
+    rows = Shares(both).bars.rows
+    assert [label for label, _ in rows] == [
+        'quadratic friction and base tilt, elbow',
+        'the rest, the floor in it',
+    ]
+    assert sum(bar.value for _, bars in rows for bar in bars) == pytest.approx(1.0)
+
+
+def test_the_joint_where_it_lives_is_the_one_with_the_largest_bar(found):
+    gap = found.gap
+    excess = np.maximum(gap.chi2_before - 1.0, 0.0)
+    assert found.where[0].joint == found.arm.robot.joints[int(np.argmax(gap.chi2_before))]
+    assert found.where[0].share_of_gap == pytest.approx(excess.max() / excess.sum(), abs=0.05)
+
+
+def test_a_gap_of_the_fitted_data_alone_is_said_to_be_one(found):
+    assert not any('that were fitted' in line for line in Story(found).rows[0][1])
+    quiet_there = replace(found.gap, chi2_before=0.9 * np.ones(2), predicted=True)
+    (_, lines), *_ = Story(replace(found, gap=quiet_there)).rows
+    assert lines[0].startswith('In the recordings that were fitted; in those that were not elbow')
+
+
 def test_what_was_added_to_the_model_is_said(found, recordings, html):
     assert 'model.yaml is the model with quadratic friction' in html
     assert 'The model stays as it was given.' not in html
@@ -119,6 +159,16 @@ def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
     assert 'The model stays as it was given.' in quiet
     assert '>What explains the gap<' not in quiet
     assert '>Patch</h2>' not in quiet
+
+
+def test_bad_data_have_no_green_tick():
+    bench = Bench()
+    turned = [replace(r, tau=-r.tau) for r in bench.recordings()]
+    found = diagnose(bench.arm, turned, rng=np.random.default_rng(0))
+    assert found.verdict == 'bad_data'
+    page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
+    assert '<li class="fine">' not in page
+    assert 'What was recorded is at fault' in page
 
 
 def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):
@@ -147,6 +197,8 @@ def test_numbers_are_written_as_a_person_reads_them():
     assert with_interval(0.1, 0.01, 'rad') == '0.100 ± 0.020 rad (5.7 ± 1.1°)'
     assert with_interval(0.1, float('inf'), 'kg m^2') == '0.1 kg m²'
     assert with_interval(float('nan'), 1.0, 'kg') == DASH
+    assert with_interval(-1e-6, 0.0007, 'kg') == '0.0000 ± 0.0014 kg'
+    assert digits(-0.0) == '0.0'
     assert digits(1e38) == digits(float('inf')) == digits(float('nan')) == DASH
     assert [percent(x) for x in (0.957, 0.004, 0.0)] == ['96 %', '0.4 %', '0 %']
 

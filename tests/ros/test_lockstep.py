@@ -9,7 +9,7 @@ from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.nodes.lockstep import EPOCH_NS, replay_lockstep, run_lockstep
+from armid_ros.nodes.lockstep import EPOCH_NS, record_lockstep, replay_lockstep, run_lockstep
 from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -97,6 +97,22 @@ def test_a_replay_learns_the_same(first_run, robot):
     again = replay_lockstep(bag, identifier(robot), duration=result.t)
     assert again.samples == result.samples
     np.testing.assert_allclose(again.estimate.values, result.estimate.values, rtol=1e-9)
+
+
+def test_a_run_that_nobody_learns_from_gives_the_same_samples(
+    first_run, truth, robot, excitation, tmp_path
+):
+    sensors = Sensors(torque_noise=0.05)
+    arm = SimulatedArm(truth, rng=np.random.default_rng(2), sensors=sensors)
+    told = []
+    asked = {'rate': RATE, 'approach': APPROACH, 'on_progress': told.append}
+    record_lockstep(arm, excitation, tmp_path / 'bag', **asked)
+    first, alone = (
+        read_recording(bag, joints=robot.joints) for bag in (first_run[0], tmp_path / 'bag')
+    )
+    np.testing.assert_array_equal(first.q, alone.q)
+    np.testing.assert_array_equal(first.tau, alone.tau)
+    assert told == sorted(told) and told[-1] == 1.0
 
 
 def test_another_run_gives_the_same_samples(first_run, truth, robot, excitation, tmp_path):

@@ -22,7 +22,6 @@ from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
-from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
@@ -159,7 +158,7 @@ def tell_story(
     changed = truth.with_effect(hidden.effect, hidden.values)
     recordings = []
     for name, run in zip(_RUNS, runs, strict=True):
-        recordings.append(_recorded(out / name, changed, known, run, sensors, rng, rate))
+        recordings.append(_recorded(out / name, changed, run, sensors, rng, rate))
     with progress('diagnosing') as tick:
         found = diagnose(
             known,
@@ -284,23 +283,16 @@ def _excitations(arm: ArmModel, rng: np.random.Generator) -> list[Excitation]:
 def _recorded(
     bag: Path,
     arm: ArmModel,
-    known: ArmModel,
     run: Excitation,
     sensors: Sensors,
     rng: np.random.Generator,
     rate: float,
 ) -> Recording:
     """Run an arm over topics, and read what was recorded."""
-    from armid_ros.nodes.lockstep import run_lockstep
+    from armid_ros.nodes.lockstep import record_lockstep
 
     with progress(f'recording {bag.name}') as tick:
-        run_lockstep(
-            SimulatedArm(arm, rng=rng, sensors=sensors),
-            run,
-            OnlineIdentifier(known, rng=np.random.default_rng(0)),
-            bag,
-            topics=('joint_states', 'robot_description', 'joint_trajectory'),
-            rate=rate,
-            on_progress=lambda now: tick(now.t / now.duration),
+        record_lockstep(
+            SimulatedArm(arm, rng=rng, sensors=sensors), run, bag, rate=rate, on_progress=tick
         )
-    return read_recording(bag, joints=known.robot.joints)
+    return read_recording(bag, joints=arm.robot.joints)

@@ -16,6 +16,7 @@ from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
 from armid_ros.diagnosis.verdict.document import SCHEMA
+from armid_ros.diagnosis.verdict.words import share_in_words
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
@@ -26,7 +27,6 @@ from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, with_interval
-from armid_ros.report.sections.diagnosed import share_in_words
 from armid_ros.residual import require_libraries, TABLE_FILE
 from armid_ros.robots import Robot
 import click
@@ -257,7 +257,7 @@ def diagnose(
         click.echo(json_text(document))
         return
     show(result)
-    _show_extras(out, extras)
+    _show_extras(out, result, extras)
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
@@ -293,8 +293,9 @@ def show(result: Diagnosis) -> None:
         print_rows(rows, as_json=False, right=('value, 95 %',))
     if result.minor:
         say('small print: there beyond chance, but too small or not borne out by other data')
-        rows = [_minor(finding) for finding in result.minor]
-        print_rows(rows, as_json=False, right=('share of the gap', 'p'))
+        share = 'share of the gap' if result.findings else 'share of what is left'
+        rows = [_minor(finding, share) for finding in result.minor]
+        print_rows(rows, as_json=False, right=(share, 'p'))
     for note in result.notes:
         say(f'note: {note}')
 
@@ -318,19 +319,19 @@ def _share(finding: Finding) -> str:
     """Say how much of the gap a cause is."""
     where = ', '.join(finding.joints) or 'the whole arm'
     name = finding.name.replace('_', ' ')
-    return f'  {name} of {where}: {share_in_words(finding)}'
+    return f'  {name} of {where}: {share_in_words(finding, interval=True)}'
 
 
-def _minor(finding: Finding) -> dict[str, str]:
+def _minor(finding: Finding, share: str) -> dict[str, str]:
     return {
         'effect': finding.name.replace('_', ' '),
         'joints': ', '.join(finding.joints) or 'whole arm',
-        'share of the gap': percent(finding.share),
+        share: percent(finding.share),
         'p': probability(finding.p),
     }
 
 
-def _show_extras(out: Path, extras: Extras) -> None:
+def _show_extras(out: Path, result: Diagnosis, extras: Extras) -> None:
     if extras.residual is not None:
         for sentence in extras.residual.sentences():
             say(sentence)
@@ -342,6 +343,7 @@ def _show_extras(out: Path, extras: Extras) -> None:
     if extras.residual is not None:
         files.append(TABLE_FILE)
     if extras.next_run is not None:
-        say(extras.next_run.sentence)
         files.append(EXPERIMENT_FILE)
+    for step in extras.steps(result):
+        say(f'next: {step}')
     say(f'{out}: {", ".join(files)}')

@@ -119,7 +119,7 @@ def make_extras(result: Diagnosis, case: DiagnosisCase, seed: int, tick: Tick) -
         extras = replace(extras, forward=simulated, notes=(*extras.notes, *left_out, *why))
     tick(1.0, 'next run')
     run, why = _tried('a next run', lambda: next_run(result, np.random.default_rng(seed)))
-    return replace(extras, next_run=run, notes=(*extras.notes, *why))
+    return replace(extras, next_run=run, no_run='; '.join(why))
 
 
 def _learned(result: Diagnosis, seed: int) -> Extras:

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.next_run.separation import Doubt, Load, NOTHING, Separation
 from armid_ros.diagnosis.verdict.finding import Diagnosis
 from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
@@ -41,8 +41,6 @@ EXPERIMENT_FILE = 'experiment.yaml'
 #: Names are separated beyond doubt at this many standard deviations: no payload is asked for
 #: where a motion alone does it, and no motion is designed where a template does.
 _SURE = 5.0
-#: ... and not at all below this many.
-_NOTHING = 1.0
 #: Standard deviations above which their number means nothing: noise is not known so well.
 _CERTAIN = 30.0
 #: Pairs of names in a sentence.
@@ -84,19 +82,13 @@ class NextRun:
     @property
     def sentence(self) -> str:
         """Return what to do and what it would show, in words, the least separated pair first."""
-        separated = sorted((s for s in self.separations if s.z >= _NOTHING), key=lambda one: one.z)
-        alike = [one for one in self.separations if one.z < _NOTHING]
+        separated = sorted((s for s in self.separations if s.told), key=lambda one: one.z)
         parts = [
             f'it should tell {one.name} from {one.rival} by {_many(one.z)} standard deviations'
             for one in separated[:_SAID]
         ]
         if len(separated) > _SAID:
             parts.append(f'and {len(separated) - _SAID} more pairs of names by more')
-        parts += [
-            f'no motion alone tells {one.name} from {one.rival} (this one by {one.z:.1f} standard '
-            'deviations)'
-            for one in alike
-        ]
         again = ''
         if self.load is not None:
             again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
@@ -175,7 +167,7 @@ def next_run(
     if plain:
         best = max(plain, key=lambda run: run.worth)
         runs += _designed(diagnosis, doubts, best, collision, rng)
-    telling = [run for run in runs if any(one.z >= _NOTHING for one in run.separations)]
+    telling = [run for run in runs if any(one.told for one in run.separations)]
     if runs and not telling:
         pairs = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
         raise TrajectoryError(f'none of the planned motions tells {pairs}'.replace('_', ' '))
@@ -209,7 +201,7 @@ class _Run:
 def _in_order(runs: Sequence[_Run]) -> list[_Run]:
     """Return runs, best first; those with a payload last if a motion alone separates as much."""
     most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
-    wanted = np.where(most < _NOTHING, 0.0, np.minimum(most, _SURE))
+    wanted = np.where(most < NOTHING, 0.0, np.minimum(most, _SURE))
     plain = [run for run in runs if not run.template.loaded]
     enough = any(all(p.z >= z for p, z in zip(r.separations, wanted, strict=True)) for r in plain)
     return sorted(runs, key=lambda run: (enough and run.template.loaded, -run.worth))
@@ -255,7 +247,7 @@ def _designed(
     rng: np.random.Generator,
 ) -> list[_Run]:
     """Return a motion like the best template, designed for the pair that is separated least."""
-    doubtful = [k for k, pair in enumerate(best.separations) if _NOTHING <= pair.z < _SURE]
+    doubtful = [k for k, pair in enumerate(best.separations) if NOTHING <= pair.z < _SURE]
     if not doubtful:
         return []
     nearest = min(doubtful, key=lambda k: best.separations[k].power)

@@ -27,6 +27,8 @@ from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin
 
+#: A run does not tell names apart by less than so many standard deviations.
+NOTHING = 1.0
 #: Samples per second at which a motion is evaluated [Hz]; its noise is that of the rows.
 _RATE = 50.0
 #: Periods that are recorded.
@@ -99,6 +101,11 @@ class Separation:
     def z(self) -> float:
         """Return the standard deviations between the two."""
         return float(np.sqrt(self.power))
+
+    @property
+    def told(self) -> bool:
+        """Whether the run tells the two apart at all."""
+        return self.z >= NOTHING
 
     @staticmethod
     def of(

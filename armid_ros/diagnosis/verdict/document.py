@@ -14,14 +14,13 @@ import math
 from typing import Any
 
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.trial import IDENTIFIABLE, Trial
+from armid_ros.diagnosis.search.trial import IDENTIFIABLE, ROUNDING, Trial
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
-import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
 #: Candidates that are listed.
@@ -110,19 +109,22 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
     def table(values: FloatArray) -> dict[str, float]:
         return {joint: float(v) for joint, v in zip(joints, values, strict=True)}
 
+    units = diagnosis.arm.robot.torque_units
+    of_what = {
+        'unit': 'N m' if 'N m' in units else units[0],
+        'units': dict(zip(joints, units, strict=True)),
+    }
     if gap is None:
-        empty = np.zeros(0)
-        nothing = dict.fromkeys(empty.tolist(), 0.0)
         return {
-            'unit': 'N m',
-            'before': nothing,
-            'after': nothing,
-            'noise_floor': nothing,
+            **of_what,
+            'before': {},
+            'after': {},
+            'noise_floor': {},
             'closed_fraction': 0.0,
             'data': 'none',
         }
     return {
-        'unit': 'N m',
+        **of_what,
         'before': table(gap.before),
         'after': table(gap.after),
         'noise_floor': table(gap.floor),
@@ -215,12 +217,32 @@ class Detectable:
 
 
 def smallest_size(trial: Trial) -> tuple[int, float]:
-    """Return the first identifiable parameter of a candidate, and its smallest detectable size."""
+    """
+    Return the first identifiable parameter of a candidate, and its smallest detectable size.
+
+    The size is inf where it is larger than the parameter can be.
+
+    """
     rows = zip(trial.candidate.kept, trial.std, trial.resolution, strict=True)
     for index, std, resolution in rows:
-        if resolution > IDENTIFIABLE:
-            return index, _SHOWS * float(std)
+        size = _SHOWS * float(std)
+        if resolution > IDENTIFIABLE and _possible(trial.candidate.effect, index, size):
+            return index, size
     return trial.candidate.kept[0], float('inf')
+
+
+def _possible(effect: Effect, index: int, size: float) -> bool:
+    """
+    Return whether a parameter can be as large as a size.
+
+    It cannot be beyond its bounds. Where the largest value that arms have would show less than
+    rounding errors do, the motion does not show the effect at all.
+
+    """
+    lower, upper = effect.bounds()
+    typical = effect.quantities[index % len(effect.quantities)].typical
+    largest = typical[1] if typical else 1.0
+    return bool(size <= max(upper[index], -lower[index]) and ROUNDING * size < largest)
 
 
 def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectable, ...]:

@@ -226,8 +226,20 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
 
 
 def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
+    """Say which experiment separates a name in some joints from a rival."""
+    return f'To separate {two_names(name, joints, rival)}: {shown_best(name, joints, rival)}.'
+
+
+def two_names(name: str, joints: Sequence[str], rival: Rival) -> str:
+    """Return a name and its rival in words, with their joints."""
+    own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
+    own = '' if own == other else own
+    return f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
+
+
+def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
     """
-    Say which experiment separates a name in some joints from a rival.
+    Return the recordings that show a name and its rival best.
 
     No motion separates a payload from the link that carries it: it has to be taken off.
 
@@ -236,8 +248,4 @@ def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
     carried = [kind for kind in both if kind.comes_and_goes and kind.changes_body]
     one_body = set(joints) == set(rival.joints) and all(kind.changes_body for kind in both)
     kinds = carried if one_body and carried else both
-    shown = dict.fromkeys([kind.shown_by for kind in kinds] or [Effect.shown_by])
-    own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
-    own = '' if own == other else own
-    names = f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
-    return f'To separate {names}: {"; or ".join(shown)}.'
+    return '; or '.join(dict.fromkeys([kind.shown_by for kind in kinds] or [Effect.shown_by]))

@@ -14,7 +14,7 @@ from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -47,6 +47,24 @@ class Verdict:
     summary: str
 
 
+@dataclass(frozen=True)
+class Hiding:
+    """
+    What may hide beside the misfit of a model.
+
+    Attributes
+    ----------
+    misfit : ndarray, shape (n,)
+        The misfit of each joint, as a share of its torque; both root mean square.
+    change : ndarray, shape (n,)
+        The largest change that does not open a gap, in the same measure.
+
+    """
+
+    misfit: FloatArray
+    change: FloatArray
+
+
 def decide(
     findings: Sequence[Finding],
     strange: Sequence[str],
@@ -55,6 +73,7 @@ def decide(
     floor_in_words: str,
     as_it_is: Excess | None = None,
     minor: Sequence[Finding] = (),
+    hides: Hiding | None = None,
 ) -> Verdict:
     """
     Decide the verdict.
@@ -75,6 +94,8 @@ def decide(
         The same of the given model, where its body and known effects were fitted anew.
     minor : sequence of Finding
         The small print, the most important first.
+    hides : Hiding or None
+        What may hide beside the floor where that is a misfit.
 
     """
     worst = max(left, key=lambda one: float(one.ratio.max()))
@@ -90,7 +111,9 @@ def decide(
         if open_gap:
             text = f'Something is missing: {rest}. {_unexplained(minor)}'
             return Verdict('unknown', text)
-        return Verdict('consistent', _consistent(floor_in_words, as_it_is, minor, arm.robot))
+        text = _consistent(floor_in_words, as_it_is, minor, arm.robot)
+        hidden = [] if hides is None else [_could_hide(hides, minor, arm.robot)]
+        return Verdict('consistent', ' '.join([text, *hidden]))
     said = _sentences(findings)
     if open_gap:
         return Verdict('partial', f'{said} There is more: {rest}.')
@@ -99,8 +122,7 @@ def decide(
         first = doubtful[0]
         others = _others(first)
         one = 'it' if len(findings) == 1 else f'the {first.name.replace("_", " ")}'
-        text = f'{said} These data cannot tell {one} from {others}. {first.experiment}'
-        return Verdict('ambiguous', text)
+        return Verdict('ambiguous', f'{said} These data cannot tell {one} from {others}.')
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
 
 
@@ -123,6 +145,18 @@ def _consistent(
     return ' '.join([text, *small])
 
 
+def _could_hide(hides: Hiding, minor: Sequence[Finding], robot: Robot) -> str:
+    """Say how large a change may be in the joint of the largest misfit before it shows."""
+    worst = int(np.argmax(hides.misfit))
+    joint = robot.joints[worst]
+    like = [one.name.replace('_', ' ') for one in minor if joint in one.joints]
+    such = f', such as the {like[0]} of the small print' if like else ''
+    return (
+        f'In {joint} that misfit is {percent(hides.misfit[worst])} of the torque: a change of up '
+        f'to {percent(hides.change[worst])} of it can hide there{such}.'
+    )
+
+
 def _unexplained(minor: Sequence[Finding]) -> str:
     """Say that no cause explains a gap, and what explains most of it where something does."""
     if not minor or minor[0].share < SAID:
@@ -139,35 +173,61 @@ def _larger(ratio: float) -> str:
 
 def sentence(finding: Finding) -> str:
     """Say in a sentence what a cause is and how much it explains."""
-    joint, share = finding.of_joint
-    if joint:
-        taken = f'{100.0 * share:.0f} % of what the rest leaves in {joint}'
-        return f'{_subject(finding)} explains {taken}.'
-    return f'{_subject(finding)} explains {_share(finding)} of the gap.'
+    return f'{_subject(finding)} explains {share_in_words(finding)}.'
+
+
+def share_in_words(finding: Finding, interval: bool = False) -> str:
+    """
+    Return the share of the gap that a cause takes, and the joint that needs it though it is small.
+
+    Parameters
+    ----------
+    finding : Finding
+        The cause.
+    interval : bool
+        Whether with its 95 % interval.
+
+    """
+    text = f'{percent(finding.share)} of the gap'
+    if interval:
+        low, high = (percent(end) for end in finding.share_interval)
+        text += f' ({low} to {high})'
+    joint, taken = finding.of_joint
+    if not joint:
+        return text
+    how_much = 'most' if taken > 0.5 else 'part'
+    return f'{text}, and {how_much} of what the others leave in {joint}'
+
+
+def percent(share: float) -> str:
+    """Return a share as a percentage, the digit that matters kept: '96 %', '0.4 %'."""
+    size = abs(100.0 * share)
+    return f'{100.0 * share:z.0f} %' if size >= 2.0 or size < 0.05 else f'{100.0 * share:.1f} %'
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
     """Say in sentences what was named; names that are one cause share one."""
     said: list[str] = []
-    done: set[str] = set()
-    for one in findings:
-        if one.name in done:
-            continue
-        group = [one, *(other for other in findings if other.name in one.together)]
-        done.update(other.name for other in group)
+    for group in by_cause(findings):
         if len(group) == 1:
-            said.append(sentence(one))
+            said.append(sentence(group[0]))
             continue
         first, *others = (_subject(other) for other in group)
         subjects = ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
-        said.append(f'{subjects} together explain {_share(one)} of the gap.')
+        said.append(f'{subjects} together explain {share_in_words(group[0])}.')
     return ' '.join(said)
 
 
-def _share(finding: Finding) -> str:
-    """Return the share of a cause in percent."""
-    share = min(max(finding.share, 0.0), 1.0)
-    return f'{100.0 * share:.0f} %' if share >= SAID else 'less than 1 %'
+def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
+    """Return findings, those together that are one cause and have their share in common."""
+    groups: list[list[Finding]] = []
+    done: set[str] = set()
+    for one in findings:
+        if one.name not in done:
+            group = [one, *(other for other in findings if other.name in one.together)]
+            done.update(other.name for other in group)
+            groups.append(group)
+    return groups
 
 
 def _subject(finding: Finding) -> str:
@@ -191,9 +251,16 @@ def _subject(finding: Finding) -> str:
 
 
 def _values(finding: Finding) -> Iterator[str]:
-    """Yield the values of a cause, with the name where it differs from that of the one before."""
+    """
+    Yield the values of a cause, with the name where it differs from that of the one before.
+
+    Values whose interval includes zero are left to the table, unless all do.
+
+    """
     before = ''
-    for p, value, std in zip(finding.parameters, finding.values, finding.std, strict=True):
+    every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    told = [row for row in every if excludes_zero(row[1], row[2])]
+    for p, value, std in told or every:
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '
         yield f'{name}{_with_degrees(value, std, p.unit)}'
         before = p.name
@@ -294,4 +361,4 @@ def _as_sure(value: float, std: float) -> str:
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'
     decimals = max(0, 1 - int(np.floor(np.log10(wide))))
-    return f'{value:.{decimals}f} +- {wide:.{decimals}f}'
+    return f'{value:z.{decimals}f} +- {wide:.{decimals}f}'

@@ -87,6 +87,8 @@ class DataQuality(Section):
         Training data first.
     robot : Robot or None
         Gives joints and units, where repeatability is shown.
+    bad : bool
+        Whether the verdict is that the data are at fault, however well they were read.
 
     """
 
@@ -95,6 +97,7 @@ class DataQuality(Section):
 
     recordings: Sequence[RecordingQuality]
     robot: Robot | None = None
+    bad: bool = False
 
     @property
     def repeating(self) -> list[tuple[str, float, list[tuple[str, str, str, float]]]]:

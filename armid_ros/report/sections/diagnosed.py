@@ -12,6 +12,7 @@ from typing import ClassVar
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.where import Where
+from armid_ros.diagnosis.verdict.words import by_cause
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Series
@@ -20,15 +21,6 @@ from armid_ros.report.page import Section
 
 #: Joints that are shown.
 _MOST = 3
-
-
-def share_in_words(finding: Finding) -> str:
-    """Return how much a cause takes of the gap, or of what the others leave in its joint."""
-    joint, share = finding.of_joint
-    if joint:
-        return f'{percent(share)} of what the rest leaves in {joint}'
-    low, high = (percent(end) for end in finding.share_interval)
-    return f'{percent(finding.share)} of the gap ({low} to {high})'
 
 
 @dataclass(frozen=True)
@@ -51,15 +43,18 @@ class Shares(Section):
     @property
     def bars(self) -> BarChart:
         """One bar a cause, and one for the rest, in per cent of the gap."""
-        rows = []
-        for one in self.diagnosis.findings:
+        rows, taken = [], 0.0
+        for group in by_cause(self.diagnosis.findings):
+            one = group[0]
             where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
+            names = ' and '.join(other.name.replace('_', ' ') for other in group)
             low, high = one.share_interval
             text = f'{percent(one.share)} ({percent(low)} to {percent(high)})'
-            bar = Bar(max(one.share, 0.0), 'after', text)
-            rows.append((f'{one.name.replace("_", " ")}, {where}', [bar]))
-        rest = max(1.0 - sum(max(one.share, 0.0) for one in self.diagnosis.findings), 0.0)
-        rows.append(('the rest', [Bar(rest, 'floor', percent(rest))]))
+            share = max(one.share, 0.0)
+            taken += share
+            rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
+        rest = max(1.0 - taken, 0.0)
+        rows.append(('the rest, the floor in it', [Bar(rest, 'floor', percent(rest))]))
         return BarChart(rows, '', full=1.0)
 
     @property
@@ -157,6 +152,8 @@ class SmallPrint(Section):
         What is there beyond chance, and too small or not borne out by other data.
     patched : bool
         Whether it was added to the model all the same.
+    named : bool
+        Whether the headline names anything.
 
     """
 
@@ -165,6 +162,12 @@ class SmallPrint(Section):
 
     minor: Sequence[Finding]
     patched: bool = False
+    named: bool = False
+
+    @property
+    def share(self) -> str:
+        """Head of the column of shares: no gap is open where nothing was named."""
+        return 'Share of the gap' if self.named else 'Share of what is left'
 
     @property
     def rows(self) -> list[tuple[str, str, str, str, str]]:

@@ -12,7 +12,7 @@ from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.motion import FloatArray
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Role, Series, thinned
-from armid_ros.report.notation import digits, percent, torque_unit
+from armid_ros.report.notation import digits, torque_unit
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
 import numpy as np
@@ -69,16 +69,6 @@ class GapBars(Section):
     def where(self) -> str:
         """Return what it was measured on."""
         return 'recordings that were not used' if self.gap.predicted else self.gap.data
-
-    @property
-    def more(self) -> bool:
-        """Whether anything is gone of it."""
-        return self.patched and self.gap.closed > 0.0
-
-    @property
-    def closed(self) -> str:
-        """Share of the squares of the gap that is gone."""
-        return percent(self.gap.closed)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.verdict.words import share_in_words
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import (
     digits,
@@ -17,7 +18,6 @@ from armid_ros.report.notation import (
     with_interval,
 )
 from armid_ros.report.page import render, Section
-from armid_ros.report.sections.diagnosed import share_in_words
 from armid_ros.residual import JointResidual, Residual
 from markupsafe import Markup
 import numpy as np
@@ -105,8 +105,21 @@ class Story(Section):
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
         if lines or self.diagnosis.verdict == 'consistent':
-            return lines or ['No joint has a gap.']
+            return [*self._in_fitted_alone(), *lines] or ['No joint has a gap.']
         return ['No joint is far above the floor.']
+
+    def _in_fitted_alone(self) -> list[str]:
+        """Say that a gap was located in fitted data, where others have none in its joint."""
+        gap, places = self.diagnosis.gap, self.diagnosis.where
+        if gap is None or not gap.predicted or not places:
+            return []
+        joint = places[0].joint
+        if gap.chi2_before[self.diagnosis.arm.robot.joints.index(joint)] > 1.0:
+            return []
+        return [
+            f'In the recordings that were fitted; in those that were not {joint} is below its '
+            'floor:'
+        ]
 
     def _which(self) -> list[str]:
         causes = [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
@@ -160,7 +173,7 @@ def _cause(finding: Finding) -> str:
     numbers = f': {listed}' if listed else ''
     rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
     doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
-    name, share = finding.name.replace('_', ' '), share_in_words(finding)
+    name, share = finding.name.replace('_', ' '), share_in_words(finding, interval=True)
     return f'{name}{where}{numbers}; explains {share}{doubt}'
 
 

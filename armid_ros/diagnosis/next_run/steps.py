@@ -1,0 +1,102 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What to do after a diagnosis: go and look at the robot, then record what tells names apart.
+
+A planned run and the experiments that show effects best are one piece of advice: an experiment is
+asked for only where no planned motion tells the two names.
+
+"""
+
+from __future__ import annotations
+
+from armid_ros.diagnosis.next_run.plan import NextRun
+from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
+from armid_ros.diagnosis.verdict.naming import shown_best, two_names
+from armid_ros.effects import CATALOGUE
+
+
+def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '') -> list[str]:
+    """
+    Return what to do, in sentences, in the order in which a person would do it.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        What was found.
+    run : NextRun or None
+        The run that was planned.
+    no_run : str
+        Why none was, if one was wanted.
+
+    """
+    findings, verdict = diagnosis.findings, diagnosis.verdict
+    steps = _first([text for finding in findings for text in _looks(finding, diagnosis)])
+    if verdict == 'bad_data':
+        steps.append('Correct the data, or the description, and diagnose again.')
+    if verdict in ('unknown', 'partial'):
+        steps += [f'Look at {w.joint}: what is left lives {w.signature}.' for w in diagnosis.left]
+    if verdict == 'not_repeatable':
+        steps.append('Keep people and loose parts away from the arm, and record again.')
+    if run is not None:
+        steps.append(run.sentence)
+    elif no_run:
+        steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
+    steps += [text for finding in findings for text in _records(finding, run)]
+    if verdict in ('named', 'consistent'):
+        steps.append('Use model.yaml in simulation and control; keep these bags to compare with.')
+    if diagnosis.not_visible:
+        hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
+        steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
+    return steps
+
+
+def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
+    """Say what to look at on the robot: for a cause, and for each that may stand in its place."""
+    steps = []
+    own = Rival(finding.name, finding.joints)
+    for one in (own, *finding.rivals):
+        what = _look_at(one.name, diagnosis)
+        if not what:
+            continue
+        where = ', '.join(one.joints) or 'the whole arm'
+        name = one.name.replace('_', ' ')
+        head = f'Look at {where}' if one is own else f'If it is {name}, look at {where}'
+        steps.append(f'{head}: {what}.')
+    return steps
+
+
+def _first(looks: list[str]) -> list[str]:
+    """Say of the first thing to look at that it is the first."""
+    if not looks:
+        return []
+    head, _, what = looks[0].rpartition(':')
+    return [f'{head} first:{what}', *looks[1:]]
+
+
+def _look_at(name: str, diagnosis: Diagnosis) -> str:
+    """
+    Return what an effect says is to be looked at; one that is not in the catalogue as well.
+
+    What nearly every arm has is nothing to look at where the model was given without it.
+
+    """
+    if name not in CATALOGUE:
+        return next((own.look_at for own in diagnosis.arm.effects if own.said_as == name), '')
+    kind, explanation = CATALOGUE[name], diagnosis.explanation
+    given = () if explanation is None else explanation.given.effects
+    if kind.usual and name not in {own.said_as for own in given}:
+        return ''
+    return kind.look_at
+
+
+def _records(finding: Finding, run: NextRun | None) -> list[str]:
+    """Say what else to record of the likeliest rival, unless the planned run tells it apart."""
+    told = () if run is None else [(s.name, s.rival) for s in run.separations if s.told]
+    tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'
+    return [
+        f'If {tried} {two_names(finding.name, finding.joints, rival)}, record what shows them '
+        f'best: {shown_best(finding.name, finding.joints, rival)}.'
+        for rival in finding.rivals[:1]
+        if (finding.name, rival.name) not in told
+    ]

@@ -1,0 +1,79 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What to do next is one piece of advice: look at the robot, then record what tells names."""
+
+from types import SimpleNamespace
+
+from armid_ros.diagnosis.next_run.steps import next_steps
+from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.effects import CATALOGUE
+import pytest
+
+LINK = (Rival('link_inertia', ('wrist',)),)
+
+
+def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
+    finding = Finding(name, joints, (), (), (), 0.9, (0.8, 1.0), 0.0, rivals=rivals)
+    return SimpleNamespace(
+        findings=(finding,),
+        verdict=verdict,
+        left=(),
+        not_visible=(),
+        arm=SimpleNamespace(effects=effects),
+        explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
+    )
+
+
+def planned(rival, told):
+    pair = SimpleNamespace(name='payload', rival=rival, told=told)
+    return SimpleNamespace(sentence='Run it.', separations=(pair,))
+
+
+@pytest.mark.parametrize('name', [n for n, kind in CATALOGUE.items() if not kind.learned])
+def test_every_effect_says_what_to_look_at(name):
+    what = CATALOGUE[name].look_at
+    assert what and not what.endswith('.') and ':' not in what
+
+
+def test_a_payload_sends_a_person_to_the_hand_first():
+    first, *others = next_steps(diagnosis('payload', ('wrist',)))
+    assert first.startswith('Look at wrist first: the hand, the gripper, the tool')
+    assert others == ['Use model.yaml in simulation and control; keep these bags to compare with.']
+
+
+def test_friction_of_a_model_without_any_is_nothing_to_look_at():
+    known = SimpleNamespace(said_as='viscous_friction')
+    first, _ = next_steps(diagnosis('viscous_friction', ('wrist',), given=(known,)))
+    assert first.startswith('Look at wrist first: the grease')
+    assert len(next_steps(diagnosis('viscous_friction', ('wrist',)))) == 1
+
+
+def test_what_may_stand_in_its_place_is_looked_at_as_well():
+    steps = next_steps(diagnosis('payload', ('wrist',), LINK, 'ambiguous'))
+    assert steps[1].startswith('If it is link inertia, look at wrist: ')
+    assert steps[2] == (
+        'If looking does not tell payload from link inertia of wrist, record what shows them '
+        'best: the same motion with and without the tool.'
+    )
+
+
+def test_a_run_that_tells_the_names_is_the_only_recording_that_is_asked_for():
+    doubt = diagnosis('payload', ('wrist',), LINK, 'ambiguous')
+    told = next_steps(doubt, planned('link_inertia', True))
+    assert told[-1] == 'Run it.'
+    alike = next_steps(doubt, planned('link_inertia', False))
+    assert alike[-2] == 'Run it.'
+    assert alike[-1].startswith('If neither looking nor that run tells payload from link inertia')
+
+
+def test_why_there_is_no_run_is_said_once():
+    doubt = diagnosis('payload', ('wrist',), LINK, 'ambiguous')
+    steps = next_steps(doubt, None, 'there is not a next run: none of the motions tells them')
+    assert steps[2] == 'There is not a next run: none of the motions tells them.'
+
+
+def test_an_effect_of_ones_own_says_it_as_well():
+    hose = SimpleNamespace(said_as='hose', look_at='the clamps of the hose')
+    found = diagnosis('hose', ('elbow',), effects=(hose,))
+    assert next_steps(found)[0] == 'Look at elbow first: the clamps of the hose.'
+    assert len(next_steps(diagnosis('hose', ('elbow',)))) == 1
