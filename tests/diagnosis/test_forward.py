@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causes are taken one by one; a way that is gone twice is looked along once."""
 
+from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search import explain
 from armid_ros.diagnosis.search.candidates import as_given
@@ -67,3 +68,18 @@ def test_a_shape_that_was_taken_is_no_cause_in_another_shape(bench):
     assert ('torque_ripple', ('elbow',)) not in [
         one.candidate.key[:2] for one in way.last.look.ranking
     ]
+
+
+def test_what_is_to_be_explained_does_not_depend_on_what_the_model_lacks_in_every_motion(search):
+    """The values of a discrepancy share standard parameters with offsets: a base has their sum."""
+    evidence = search.evidence
+    discrepancy = Discrepancy.over(evidence.data, np.array([0.3, 0.3]))
+    arm, library = search.question.arm, search.settings.library
+    beside = as_given(arm, evidence.data, 4, library, [discrepancy])
+    rounds = [
+        explain.Search(question, evidence, search.settings).first_place().look.here
+        for question in (search.question, beside)
+    ]
+    assert rounds[1].nuisance.discrepancy
+    assert not rounds[0].nuisance.discrepancy
+    assert rounds[1].power == pytest.approx(rounds[0].power, rel=1e-3)

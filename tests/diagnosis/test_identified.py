@@ -6,19 +6,31 @@ from dataclasses import replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis import diagnose, known_misfit
-from armid_ros.diagnosis.data.baseline import excited, Identified
+from armid_ros.diagnosis.data.baseline import described_precision, excited, Identified
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE
+from armid_ros.effects.load import described_spread
 from armid_ros.identification import identify, SignalSettings
 from armid_ros.identification.output import identification_document
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.signals import conditioning
 import numpy as np
 import pytest
+
+
+@pytest.fixture
+def data(bench):
+    recordings = bench.recordings()
+    return trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm)
+
+
+@pytest.fixture
+def discrepancy(data):
+    return Discrepancy.over(data, np.array([0.3, 0.1]))
 
 
 def told_of(found):
@@ -36,11 +48,8 @@ def test_base_parameters_are_as_sure_as_they_were_identified(bench):
     assert not np.any(prior.of_change.matrix)
 
 
-def test_what_was_not_identified_is_as_sure_as_its_description(bench):
-    recordings = bench.recordings()
-    data = trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm)
+def test_what_was_not_identified_is_as_sure_as_its_description(bench, data, discrepancy):
     size = len(bench.arm.parameters)
-    discrepancy = Discrepancy.over(data, np.array([0.3, 0.1]))
     arm = memoized_arm(bench.arm.with_effect(discrepancy))
     base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
     prior = Identified(1e12 * np.eye(size)).prior(arm, base)
@@ -72,6 +81,24 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     alone = fit(bench.arm, named, evidence, None).estimate.std[0]
     assert found.estimate.std[0] > 1.2 * alone
     assert np.mean(np.abs(errors) < 2.0) >= 0.9
+
+
+def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench, discrepancy):
+    """A precision of zero is the limit of a variance without end."""
+    arm = bench.arm.with_effect(CATALOGUE['torque_offset'].on(bench.robot, bench.robot.joints))
+    arm = memoized_arm(arm.with_effect(discrepancy))
+    base = arm.base_parameters(np.random.default_rng(0))
+    size, more = len(bench.arm.parameters), discrepancy.spread(bench.robot)
+    body = described_spread(bench.robot).ravel()
+    friction = np.abs(bench.arm.theta[len(body) :])
+    offsets = np.full(2, 1e4)
+    spread = np.concatenate([body, friction, offsets, more])
+    assert len(spread) == len(arm.parameters) == size + 2 + len(more)
+    expected = np.linalg.inv((base.grouping * spread**2) @ base.grouping.T)
+    scale = 1.0 / np.sqrt(np.diag(expected))
+    error = (described_precision(base, arm) - expected) * np.outer(scale, scale)
+    known = scale < 1e3
+    np.testing.assert_allclose(error[np.ix_(known, known)], 0.0, atol=1e-4)
 
 
 @pytest.mark.parametrize('seed', [0, 1])

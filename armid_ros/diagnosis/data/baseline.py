@@ -31,6 +31,8 @@ from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
+import scipy.linalg
 
 #: A column of which the other free columns leave less than this share of its length is grouped.
 EXCITED = 1e-4
@@ -128,13 +130,25 @@ def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
 
     """
     spread = _described_spread(arm)
-    described = ~np.any((base.grouping != 0.0) & np.isinf(spread), axis=1)
-    finite = np.where(np.isfinite(spread), spread, 0.0)
-    grouped = base.grouping[described] * finite
-    covariance = grouped @ grouped.T
-    precision = np.zeros((base.rank, base.rank))
-    precision[np.ix_(described, described)] = np.linalg.pinv(covariance, hermitian=True)
-    return precision
+    told = np.isfinite(spread)
+    return _precision(base, told, np.diag(spread[told] ** 2))
+
+
+def _precision(
+    base: BaseParameters, told: npt.NDArray[np.bool_], covariance: FloatArray
+) -> FloatArray:
+    """
+    Return the precision of base parameters, (r, r), of standard ones of which some are untold.
+
+    An untold one, of infinite variance, leaves what it does not act on: a precision of zero along
+    its column of the grouping.
+
+    """
+    seen = (
+        scipy.linalg.null_space(base.grouping[:, ~told].T) if not told.all() else np.eye(base.rank)
+    )
+    within = seen.T @ base.grouping[:, told]
+    return np.asarray(seen @ scaled_inverse(within @ covariance @ within.T) @ seen.T)
 
 
 def _described_spread(arm: ArmModel) -> FloatArray:
@@ -167,11 +181,7 @@ class Identified:
         precision = np.diag(_described_spread(arm) ** -2.0)
         precision[:size, :size] += self.information
         told = np.diag(precision) > 0.0
-        known = ~np.any(base.grouping[:, ~told] != 0.0, axis=1)
-        grouping = base.grouping[known][:, told]
-        covariance = grouping @ scaled_inverse(precision[np.ix_(told, told)]) @ grouping.T
-        described = np.zeros((base.rank, base.rank))
-        described[np.ix_(known, known)] = scaled_inverse(covariance)
+        described = _precision(base, told, scaled_inverse(precision[np.ix_(told, told)]))
         return Prior((), (), (), described)
 
 

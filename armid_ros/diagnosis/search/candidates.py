@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise, product
 
 from armid_ros.arm import ArmModel
@@ -94,10 +95,14 @@ def frees_body(base: BaseParameters | None, arm: ArmModel) -> bool:
 
 
 def as_given(
-    arm: ArmModel, data: Sequence[Trajectory], most: int, library: Sequence[str]
+    arm: ArmModel,
+    data: Sequence[Trajectory],
+    most: int,
+    library: Sequence[str],
+    beside: Sequence[Effect] = (),
 ) -> Question:
-    """Ask what a model lacks whose given values are right."""
-    nuisance_arm, unknown = with_friction(arm, library)
+    """Ask what a model lacks whose given values are right; see `fitted_anew`."""
+    arm, nuisance_arm, unknown = _arms(arm, library, beside)
     return Question(
         arm,
         _without_values(arm, data),
@@ -115,6 +120,7 @@ def fitted_anew(
     library: Sequence[str],
     rng: np.random.Generator,
     held: Sequence[int] = (),
+    beside: Sequence[Effect] = (),
 ) -> Question:
     """
     Ask what a model lacks of which only the structure is believed: all values are fitted anew.
@@ -133,12 +139,26 @@ def fitted_anew(
         Draws the states from which base parameters are found.
     held : sequence of int
         Parameters of the arm that stay as they are, so that a change of them is a candidate.
+    beside : sequence of Effect
+        What is fitted as well, with values of zero: only what is none of the others counts as it.
 
     """
-    nuisance_arm, unknown = with_friction(arm, library)
+    arm, nuisance_arm, unknown = _arms(arm, library, beside)
     base = _excited(arm, data, rng, held)
-    nuisance_base = base if nuisance_arm is arm else _excited(nuisance_arm, data, rng, held)
+    nuisance_base = base if not unknown else _excited(nuisance_arm, data, rng, held)
     return Question(arm, base, nuisance_arm, nuisance_base, unknown, most)
+
+
+def _arms(
+    arm: ArmModel, library: Sequence[str], beside: Sequence[Effect]
+) -> tuple[ArmModel, ArmModel, tuple[Effect, ...]]:
+    """Return an arm with more effects, the same with unknown friction before them, and that."""
+    fuller, unknown = with_friction(arm, library)
+    if beside:
+        arm, fuller = (
+            memoized_arm(reduce(ArmModel.with_effect, beside, a)) for a in (arm, fuller)
+        )
+    return arm, fuller if unknown else arm, unknown
 
 
 def _excited(

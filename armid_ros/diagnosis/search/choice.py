@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline, Identified
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
@@ -36,6 +35,7 @@ from armid_ros.diagnosis.search.explanation import (
 )
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import Effect
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -218,25 +218,29 @@ class Explainer:
         unseen: Evidence | None = None,
     ) -> Explanation:
         """Explain what has changed, beside what any model of the arm gets wrong."""
-        arm, settings = self.arm, self.settings
+        settings = self.settings
         data = [*self.prepared.data, *(() if known is None else known.data)]
         discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit)
-        question = self._since_then(memoized_arm(arm.with_effect(discrepancy)), data, known)
+        question = self._since_then(data, known, [discrepancy])
         baseline = known if isinstance(known, Baseline) else None
         found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)
-        return found.in_arm(self._since_then(arm, data, known))
+        return found.in_arm(self._since_then(data, known))
 
     def _since_then(
-        self, arm: ArmModel, data: Sequence[Trajectory], known: Baseline | Identified | None
+        self,
+        data: Sequence[Trajectory],
+        known: Baseline | Identified | None,
+        beside: Sequence[Effect] = (),
     ) -> Question:
         """Ask what has changed in an arm whose body and friction are as they were known."""
-        library, most = self.settings.library, 2 * self.settings.thresholds.few_causes
+        arm, library = self.arm, self.settings.library
+        most = 2 * self.settings.thresholds.few_causes
         if known is None:
-            return replace(as_given(arm, data, most, library), since=True)
-        free = fitted_anew(arm, data, most, library, self.rng)
+            return replace(as_given(arm, data, most, library, beside), since=True)
+        free = fitted_anew(arm, data, most, library, self.rng, beside=beside)
         assert free.base is not None and free.nuisance_base is not None
         prior = nuisance_prior = known.prior(free.arm, free.base)
-        if free.nuisance_arm is not arm:
+        if free.unknown:
             nuisance_prior = known.prior(free.nuisance_arm, free.nuisance_base)
         return replace(free, prior=prior, nuisance_prior=nuisance_prior, since=True)
 

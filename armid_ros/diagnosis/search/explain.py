@@ -149,8 +149,7 @@ class Search:
         if not self.question.most:
             return Way(tuple(start), None, None)
         steps = [one.step for one in start]
-        named, values = [one.named for one in start], [one.values for one in start]
-        first = self._fitted_place(named, values, None)
+        first = self.first_place(start)
         way = self._way(first, steps, 0.0)
         assert way.last is not None
         width = way.last.look.width
@@ -159,6 +158,12 @@ class Search:
         if any(undecided(step.trial, step.ranking, here) for step in found):
             way = self._way(first, steps, width)
         return way
+
+    def first_place(self, start: Sequence[Accepted] = ()) -> Place:
+        """Fit the causes to start with, and look at all others."""
+        return self._fitted_place(
+            [one.named for one in start], [one.values for one in start], None
+        )
 
     def _way(self, place: Place, steps: Sequence[Step], width: float) -> Way:
         """Accept causes from a node on; a lead of less than ``width`` squares decides nothing."""
@@ -196,10 +201,9 @@ class Search:
         where = [
             names.index((p.name, p.joint)) for one in asked for p in one.parameters(arm.robot)
         ]
-        here = place.look.here
+        here, values = place.look.here, _base_values(place.current, base)
         for column in sorted(np.flatnonzero(np.isin(base.independent, where)), reverse=True):
-            value = place.current.arm.theta[base.independent[column]]
-            here = here.without(int(column), float(value))
+            here = here.without(int(column), float(values[column]))
         assert way.first is not None
         here = replace(here, total=max(way.first.total, float(np.sum(here.residual**2))))
         found: list[Accepted] = []
@@ -295,11 +299,17 @@ def _discrepancy(current: Fitted, base: BaseParameters | None) -> tuple[tuple[in
     if base is None:
         return ()
     names = {quantity.name for quantity in Discrepancy.quantities}
+    values = _base_values(current, base)
     return tuple(
-        (place, float(current.arm.theta[column]))
+        (place, float(values[place]))
         for place, column in enumerate(base.independent)
         if base.standard[column].name in names
     )
+
+
+def _base_values(fitted: Fitted, base: BaseParameters) -> FloatArray:
+    """Return the values of the base parameters, which standard ones share, shape (r,)."""
+    return base.values(fitted.arm.theta[: len(base.standard)])
 
 
 def _offsets(friction: Sequence[Accepted]) -> list[Effect]:
@@ -337,12 +347,13 @@ def _friction(
     view = View.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
+    values = _base_values(fitted, base)
     alive = []
     for effect in question.unknown:
         parameter = effect.parameters(arm.robot)[0]
         column = names.index((parameter.name, parameter.joint))
         if column in where:
-            alive.append((effect, where[column], float(fitted.arm.theta[column])))
+            alive.append((effect, where[column], float(values[where[column]])))
     least = retrial.settings.thresholds.misfit_share if question.since else None
     gone: list[int] = []
     tried: list[Trial] = []

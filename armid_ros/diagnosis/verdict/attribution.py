@@ -203,7 +203,7 @@ class Names:
         Return what is given of the names of an explanation.
 
         Where recordings cannot tell a change from another motion's misfit, names have to explain
-        most of the gap in which they were found.
+        most of the gap, in the recordings that they were found in or in those that were not used.
 
         """
         thresholds = settings.thresholds
@@ -215,7 +215,8 @@ class Names:
         steps = names.stated.steps
         if not (chosen.untested and steps):
             return names
-        if attribute(names.stated, None).share(range(len(steps))) > thresholds.open_share:
+        gaps = names.shares, attribute(names.stated, None)
+        if any(gap.share(range(len(steps))) > thresholds.open_share for gap in gaps):
             return names
         rest, stated = (one.with_nothing_named() for one in (names.rest, names.stated))
         return cls(rest, stated, shares_of(stated, unseen, settings))

@@ -367,6 +367,8 @@ class Faulty(Hypothesis):
 
 def unit_of(factor: float) -> str:
     """Return the unit, or two, in which torques are that are so many times too large, or ''."""
+    if factor <= 0.0:
+        return ''
     known = {**TORQUE_UNITS, 'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0))}
     off = {unit: abs(np.log(factor / count)) for unit, count in known.items()}
     return ' or '.join(
