@@ -218,14 +218,21 @@ def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
 
 
 @pytest.mark.parametrize(
-    ('untested', 'share', 'stays'), [('', 0.2, True), ('ask', 0.6, True), ('ask', 0.4, False)]
+    ('untested', 'share', 'own', 'stays'),
+    [
+        ('', 0.2, 0.2, True),
+        ('ask', 0.6, 0.2, True),
+        ('ask', 0.2, 0.6, True),
+        ('ask', 0.4, 0.4, False),
+    ],
 )
 def test_what_nothing_tells_from_a_misfit_has_to_take_most_of_the_gap(
-    monkeypatch, untested, share, stays
+    monkeypatch, untested, share, own, stays
 ):
-    """Without recordings of both days another motion's misfit looks like a small change."""
+    """Of that of unused recordings, or of its own: another motion's misfit is a small change."""
     for name, stub in (
         ('shares_of', lambda named, *others: named),
+        ('attribute', lambda named, unseen: Named(((own, False),))),
         ('smallest', lambda *arguments: None),
     ):
         monkeypatch.setattr(attribution, name, stub)
