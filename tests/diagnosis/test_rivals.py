@@ -75,6 +75,15 @@ def test_a_load_is_at_the_end_of_an_arm_where_it_may_be(bench):
     assert likeliest([inside], {}, here) is inside
 
 
+@pytest.mark.parametrize(('power', 'wanted'), [(1e4, True), (4e4, False)])
+def test_what_the_values_of_the_leading_cause_cost_is_no_lead(bench, power, wanted):
+    """Each costs a share of what is to be explained, and a person counts for ten more."""
+    gains = 100.0 + np.random.default_rng(0).normal(size=36)
+    person = Known(bench, 'human_interaction', 1.4 * gains, 8.0)
+    spring = Known(bench, 'joint_spring', gains)
+    assert beaten(spring, person, asked(power, True)) == wanted
+
+
 def test_of_two_that_happen_the_lead_decides(bench):
     gains = 10.0 + np.random.default_rng(0).normal(size=36)
     gain, rotor = Known(bench, 'torque_gain', gains), Known(bench, 'rotor_inertia', 0.85 * gains)

@@ -283,9 +283,16 @@ def cost(trial: Trial, settings: DiagnosisSettings) -> float:
 
 
 def beaten(other: Trial, first: Trial, here: Round) -> bool:
-    """Return whether one trial is so far behind another that it is no rival."""
+    """
+    Return whether one trial is so far behind another that it is no rival.
+
+    A lead is what is left of it when the values of both are paid for.
+
+    """
     thresholds = here.settings.thresholds
-    squares, z = lead(first, other)
+    gains, z = lead(first, other)
+    squares = (worth(first, here) - worth(other, here)) * here.currency
+    z *= squares / gains if gains else 0.0
     if squares <= here.width:
         return False
     often = frequency(other, here) is Frequency.OFTEN and not other.candidate.effect.external
