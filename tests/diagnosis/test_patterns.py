@@ -11,7 +11,6 @@ ANGLE = 0.02
 
 #: Ways in which the decision is not right yet.
 A_PAYLOAD = 'a payload that could be there explains what links of an arm in a plane are off by'
-OFFSETS = 'offsets that are fitted beside every cause take a small tilt'
 
 
 def names(found):
@@ -85,7 +84,6 @@ def tilted(bench):
     return 9.81 * np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)])
 
 
-@pytest.mark.xfail(strict=True, reason=OFFSETS)
 def test_turned_gravity_is_the_zero_of_the_first_encoder_or_a_tilt(bench, other):
     found = other(bench.robot.with_gravity(tilted(bench)))
     assert names(found) <= {'encoder_offset', 'base_tilt'}
@@ -93,7 +91,6 @@ def test_turned_gravity_is_the_zero_of_the_first_encoder_or_a_tilt(bench, other)
     assert max(np.abs(finding.values)) == pytest.approx(ANGLE, abs=0.001)
 
 
-@pytest.mark.xfail(strict=True, reason='directions that no data show make the tilt a richer cause')
 def test_a_planar_arm_cannot_tell_a_tilt_from_the_zero_of_its_first_encoder(bench, other):
     found = other(bench.robot.with_gravity(tilted(bench)))
     assert names(found) == {'encoder_offset', 'base_tilt'}
