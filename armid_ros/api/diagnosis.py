@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import json
 from pathlib import Path
-from typing import Any, Literal, TYPE_CHECKING
+from typing import Any, Literal, TYPE_CHECKING, TypeGuard
 
 from armid_ros.api.arguments import (
     arm_of,
@@ -247,7 +247,7 @@ def diagnose(
     """
     if residual is not None:
         require_libraries()
-    model, misfit = _believed(arm, effects)
+    model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
     looked_at, held_out = (recordings_of(group, model.robot) for group in (recordings, validate))
     if baseline is None:
         before = _since(arm, model, [*looked_at, *held_out])
@@ -260,7 +260,7 @@ def diagnose(
         looked_at,
         validate=held_out,
         baseline=before,
-        misfit=None if before else misfit,
+        misfit=None if before else _misfit(arm, model),
         settings=DiagnosisSettings(signals=SignalSettings(cutoff, decimation)),
         rng=generator(rng),
     )
@@ -268,15 +268,11 @@ def diagnose(
     return DiagnosisResult(result, model, tuple(looked_at), tuple(held_out), learned)
 
 
-def _believed(
-    arm: RobotLike | IdentificationResult, effects: str
-) -> tuple[ArmModel, Misfit | None]:
-    """Return a model, and what it left when it was identified, where that is known."""
+def _misfit(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
+    """Return what a model left when it was identified, where that is known."""
     if isinstance(arm, IdentificationResult):
-        return arm.arm, arm.misfit
-    model = arm_of(arm, effects)
-    written = isinstance(arm, (str, Path)) and is_model(arm)
-    return model, read_misfit(str(arm), model) if written else None
+        return arm.misfit
+    return read_misfit(arm, model) if _is_written(arm) else None
 
 
 def _since(
@@ -285,7 +281,7 @@ def _since(
     """Return what a model was identified from; nothing if some of it is looked at."""
     if isinstance(arm, IdentificationResult):
         found = [*arm.recordings, *arm.held_out]
-    elif isinstance(arm, (str, Path)) and is_model(arm):
+    elif _is_written(arm):
         found = recordings_of(identified_from(arm), model.robot)
     else:
         return []
@@ -295,3 +291,7 @@ def _since(
 
 def _same(one: Recording, other: Recording) -> bool:
     return bool(np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q))
+
+
+def _is_written(arm: RobotLike) -> TypeGuard[str | Path]:
+    return isinstance(arm, (str, Path)) and is_model(arm)

@@ -244,3 +244,10 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
     shown = gap.overlays
     assert len(torque.x) > 10
     assert any(torque.x[-1] == pytest.approx(one.trajectory.t[-1], abs=0.1) for one in shown)
+
+
+def test_the_page_says_from_which_size_each_effect_would_show(html):
+    section = html[html.index('id="what-could-have-been-seen"') :]
+    assert 'Shows from' in section
+    assert 'Not detectable with this motion in' in section
+    assert '<td class="name">torque ripple</td>' in section

@@ -185,7 +185,6 @@ class Explainer:
     def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
         arm, prepared = self.arm, self.prepared
-        self.tell(0.2, 'what has changed')
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
         usual = float(np.median([part.period_recorded for part in baseline.data]))
@@ -219,6 +218,7 @@ class Explainer:
     ) -> Explanation:
         """Explain what has changed, beside what any model of the arm gets wrong."""
         settings = self.settings
+        self.tell(0.2, 'what has changed')
         data = [*self.prepared.data, *(() if known is None else known.data)]
         discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit)
         question = self._since_then(data, known, [discrepancy])

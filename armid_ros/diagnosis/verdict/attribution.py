@@ -215,8 +215,8 @@ class Names:
         steps = names.stated.steps
         if not (chosen.untested and steps):
             return names
-        gaps = names.shares, attribute(names.stated, None)
-        if any(gap.share(range(len(steps))) > thresholds.open_share for gap in gaps):
+        every, most = range(len(steps)), thresholds.open_share
+        if names.shares.share(every) > most or attribute(names.stated, None).share(every) > most:
             return names
         rest, stated = (one.with_nothing_named() for one in (names.rest, names.stated))
         return cls(rest, stated, shares_of(stated, unseen, settings))
