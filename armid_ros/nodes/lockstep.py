@@ -141,9 +141,7 @@ def run_lockstep(
 
     """
     with Stage(domain) as stage:
-        plant = stage.add(
-            SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
-        )
+        plant = stage.add_plant(arm, start_ns, rate)
         learner = stage.add(OnlineIdentifierNode, identifier)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
         publisher = stage.add_publisher(arm, excitation, approach)
@@ -184,9 +182,7 @@ def record_lockstep(
 
     """
     with Stage(domain) as stage:
-        plant = stage.add(
-            SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
-        )
+        plant = stage.add_plant(arm, EPOCH_NS, rate)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
         publisher = stage.add_publisher(arm, excitation, approach)
         stage.start(plant, publisher, recorder)
@@ -303,6 +299,12 @@ class Stage:
                     'blocked?'
                 )
             self._executor.spin_once(timeout_sec=0.1)
+
+    def add_plant(self, arm: SimulatedArm, start_ns: int, rate: float) -> SimulatedArmNode:
+        """Add a simulated arm, which moves on when it is told to."""
+        return self.add(
+            SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
+        )
 
     def add_publisher(
         self, arm: SimulatedArm, excitation: Excitation, approach: float
