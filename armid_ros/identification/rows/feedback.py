@@ -42,7 +42,8 @@ def laws_of_controllers(
     """
     Say that the torque of every joint that is driven is a law of position and direction alone.
 
-    Of a single joint among others it is the model that is wrong: its inertia was not told.
+    Of a single joint among others it is the model that is wrong: its inertia was not told. Where
+    the motion is too short to ask about most joints, a few of them say nothing of a controller.
 
     Parameters
     ----------
@@ -56,14 +57,16 @@ def laws_of_controllers(
     Returns
     -------
     tuple of str
-        A sentence for each such joint, with the remedy; none if any of them obeys no law.
+        A sentence for each such joint, with the remedy; none if any of them obeys no law, or as
+        many cannot be asked.
 
     """
     assert motion.tau is not None
     still = np.zeros_like(motion.q)
     weight = regressor(robot, replace(motion, dq=still, ddq=still))
     needed = inverse_dynamics(robot, motion)
-    said = []
+    said: list[str] = []
+    silent = 0
     for joint, name in enumerate(robot.joints):
         rows = told[:, joint] & ~_turning(motion.dq[:, joint])
         tau = motion.tau[rows, joint]
@@ -71,6 +74,7 @@ def laws_of_controllers(
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
         left, lacking = (_left(law, torque[rows, joint]) for torque in (motion.tau, needed))
         if left is None or lacking is None:
+            silent += 1
             continue
         size = float(np.sqrt(np.mean(tau**2)))
         if size < _DRIVEN * float(np.sqrt(np.mean(needed[rows, joint] ** 2))):
@@ -84,7 +88,7 @@ def laws_of_controllers(
             'Something else moves the arm, or body and friction cannot be told apart: record '
             'the arm while it follows a trajectory'
         )
-    return tuple(said)
+    return tuple(said) if len(said) > silent else ()
 
 
 def _turning(dq: FloatArray) -> npt.NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
+from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
@@ -46,6 +47,17 @@ def test_an_arm_that_is_guided_while_its_weight_is_held_is_refused_by_both(arm, 
 
 def test_one_joint_whose_inertia_a_model_has_not_learned_is_no_law(arm, structure):
     identify(structure, [commanded(arm, held, joints=1)], rng=np.random.default_rng(0))
+
+
+def test_a_joint_says_nothing_of_a_controller_where_the_others_cannot_be_asked(arm):
+    robot = arm.robot
+    motion = multisine(robot.joints, 20.0, 200.0, seed=4, base_hz=0.3)
+    motion = motion.with_torque(held(robot, motion))
+    every = np.ones(motion.q.shape, dtype=bool)
+    assert len(laws_of_controllers(robot, motion, every)) == robot.n_joints
+    resting = every.copy()
+    resting[10:, 1:] = False
+    assert laws_of_controllers(robot, motion, resting) == ()
 
 
 @pytest.mark.parametrize('heavier', [0.2, 1.0, 5.0])
