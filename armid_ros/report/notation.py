@@ -28,7 +28,7 @@ def digits(value: float, count: int = 2) -> str:
     """Return a number with significant digits, zeros kept: '2.0', not '2'; 178, not 1.8e+02."""
     if not abs(value) < _NO_NUMBER:
         return DASH
-    if 10.0**count <= abs(value) < 1e5:
+    if 10.0**count <= abs(value) < 1e7:
         return f'{value:.0f}'
     return f'{value:z#.{count}g}'.rstrip('.')
 

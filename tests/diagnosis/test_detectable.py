@@ -9,11 +9,19 @@ from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
 
+#: Whatever is told from noise matters.
+EVERYTHING = DiagnosisSettings(material=0.0)
+
+
+def asked(bench, recordings):
+    """Diagnose recordings in which all that is told from noise matters."""
+    return diagnose(bench.arm, recordings, settings=EVERYTHING, rng=np.random.default_rng(0))
+
 
 @pytest.fixture(scope='module')
 def sizes(bench):
     """Return the smallest sizes that show in recordings in which nothing is hidden."""
-    found = diagnose(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+    found = asked(bench, bench.recordings())
     assert found.verdict == 'consistent'
     rows = diagnosis_document(found)['detectable']
     return {(row['name'], tuple(row['joints'])): row for row in rows}
@@ -38,8 +46,7 @@ def test_the_size_that_shows_is_right_within_a_factor_of_four(bench, sizes, name
     size = sizes[name, ('elbow',)]['min_detectable']
     for factor, there in ((0.25, False), (4.0, True)):
         hidden = bench.recordings(hide(factor * size), seed=5)
-        settings = DiagnosisSettings(material=0.0)
-        found = diagnose(bench.arm, hidden, settings=settings, rng=np.random.default_rng(0))
+        found = asked(bench, hidden)
         names = {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
         assert (name in names) is there, f'{factor} times {size:.3g}: {found.summary}'
 
@@ -57,17 +64,26 @@ def test_of_what_data_do_not_tell_apart_no_size_is_stated(bench):
 
 def test_smooth_motion_shows_a_joint_only_if_it_is_softer(bench):
     slow = [replace(bench.recordings(seed=seed)[0], source=f'slow {seed}') for seed in range(3)]
-    found = diagnose(bench.arm, slow, rng=np.random.default_rng(0))
+    found = asked(bench, slow)
     assert found.verdict == 'consistent'
     rows = diagnosis_document(found)['detectable']
     size = {(row['name'], tuple(row['joints'])): row['min_detectable'] for row in rows}
     fast = bench.recordings()
-    quick = diagnose(bench.arm, fast, rng=np.random.default_rng(0))
+    quick = asked(bench, fast)
     faster = {
         (row['name'], tuple(row['joints'])): row['min_detectable']
         for row in diagnosis_document(quick)['detectable']
     }
     assert faster['joint_elasticity', ('elbow',)] < size['joint_elasticity', ('elbow',)] / 3.0
+
+
+def test_a_size_that_is_small_print_is_not_said_to_show(bench, sizes):
+    found = diagnose(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
+    rows = diagnosis_document(found)['detectable']
+    least = {(row['name'], tuple(row['joints'])): row['min_detectable'] for row in rows}
+    at = 'torque_gain', ('elbow',)
+    assert sizes[at]['min_detectable'] < 0.002
+    assert least[at] == pytest.approx(0.01, rel=0.1)
 
 
 def test_every_effect_of_the_catalogue_is_listed(sizes):

@@ -82,7 +82,7 @@ def test_a_size_that_no_arm_has_is_not_detectable(name, size, possible):
     effect = CATALOGUE[name].on(Bench().robot, ('elbow',))
     candidate = SimpleNamespace(kept=(0,), effect=effect)
     trial = SimpleNamespace(candidate=candidate, std=[size / 5.0], resolution=[1.0])
-    found = smallest_size(trial)[1]
+    found = smallest_size(trial, np.zeros(1))[1]
     assert found == pytest.approx(size) if possible else found == np.inf
 
 

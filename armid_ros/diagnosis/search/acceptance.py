@@ -163,20 +163,18 @@ def changed(trial: Trial, here: Round) -> bool:
 
 
 def surely_changed(trial: Trial, here: Round) -> bool:
-    """
-    Return whether the permutation test is significant: such a change may be below the misfit.
+    """Return whether the permutation test is significant: the change may be below the misfit."""
+    return can_be_sure(here) and _seldom(*_showing_more(trial, here), here)
 
-    It cannot be where there are too few divisions.
 
-    """
+def can_be_sure(here: Round) -> bool:
+    """Return whether there are so many divisions that the permutation test can be significant."""
     if here.before is None:
         return False
     first = count_recordings(here.before.prior.data)
     second = count_recordings(here.evidence.data)
     second += 0 if here.before.later is None else len(here.before.later.residual)
-    if not _seldom(0, min(count_divisions(first, second), _DIVISIONS), here):
-        return False
-    return _seldom(*_showing_more(trial, here), here)
+    return _seldom(0, min(count_divisions(first, second), _DIVISIONS), here)
 
 
 def _seldom(more: int, divisions: int, here: Round) -> bool:

@@ -18,6 +18,7 @@ from armid_ros.diagnosis.data.rows import (
 )
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
+    can_be_sure,
     changed,
     explains_itself,
     inside,
@@ -157,8 +158,9 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     here = replace(here, total=total, power=float(power.sum()), known=known)
     seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
-    survey = _survey(candidates, ranking, total, len(seen))
-    ranking, here = _with_refined_shapes(ranking, replace(here, tried=max(len(seen), 1)))
+    here = replace(here, tried=max(len(seen), 1))
+    survey = _survey(candidates, ranking, here)
+    ranking, here = _with_refined_shapes(ranking, here)
     ranking, there, closing = _examined(ranking, here)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
     passing = tuple(_passing(ranking, closing, here))
@@ -224,18 +226,26 @@ def _touched(trial: Trial, here: Round) -> tuple[int, ...]:
     return tuple(np.flatnonzero(np.any(here.own(trial.candidate), axis=(0, 2))).tolist())
 
 
-def _survey(
-    candidates: Sequence[Candidate], ranking: Sequence[Trial], total: float, tried: int
-) -> Survey:
+def _survey(candidates: Sequence[Candidate], ranking: Sequence[Trial], here: Round) -> Survey:
+    assert here.total is not None
     visible = {trial.candidate.effect.said_as for trial in ranking}
     seen = {trial.candidate.key[:2] for trial in ranking}
+    whole = 0.0 if can_be_sure(here) else here.settings.thresholds.misfit_share
+    least = here.evidence.least_squares(here.settings, whole)
     return Survey(
         tuple(ranking),
+        tuple(_material_sizes(trial, least, here) for trial in ranking),
         frozenset(candidate.effect.said_as for candidate in candidates) - visible,
-        total,
-        tried,
+        here.total,
+        here.tried,
         tuple(dict.fromkeys(g.key[:2] for g in candidates if g.key[:2] not in seen)),
     )
+
+
+def _material_sizes(trial: Trial, least: FloatArray, here: Round) -> FloatArray:
+    """Return the sizes of values, (p,), that make the least squares (n,) in one of the joints."""
+    made = np.sum(here.own(trial.candidate) ** 2, axis=0) * trial.visible**2
+    return np.asarray(np.sqrt(np.min(least[:, np.newaxis] / np.maximum(made, 1e-300), axis=0)))
 
 
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:

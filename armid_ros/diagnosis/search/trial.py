@@ -314,6 +314,8 @@ class Survey:
     ----------
     ranking : tuple of Trial
         All visible candidates in their best shape, best first.
+    material : tuple of ndarray, each (p,)
+        Size of each value of these from which on it is material.
     hidden : frozenset of str
         Names of effects of which no candidate is visible beyond the nuisance columns.
     total : float
@@ -330,6 +332,7 @@ class Survey:
     """
 
     ranking: tuple[Trial, ...]
+    material: tuple[FloatArray, ...]
     hidden: frozenset[str]
     total: float
     tried: int

@@ -14,13 +14,14 @@ import math
 from typing import Any
 
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.trial import IDENTIFIABLE, ROUNDING, Trial
+from armid_ros.diagnosis.search.trial import IDENTIFIABLE, ROUNDING, Survey, Trial
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
+import numpy as np
 
 SCHEMA = 'armid/diagnosis/1'
 #: Candidates that are listed.
@@ -152,21 +153,21 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     if survey is None:
         return []
     return [
-        _candidate(trial, survey.total, survey.tried)
-        for trial in survey.ranking[:_MOST_CANDIDATES]
-    ]
+        _candidate(trial, least, survey)
+        for trial, least in zip(survey.ranking, survey.material, strict=True)
+    ][:_MOST_CANDIDATES]
 
 
-def _candidate(trial: Trial, total: float, tried: int) -> dict[str, Any]:
+def _candidate(trial: Trial, least: FloatArray, survey: Survey) -> dict[str, Any]:
     return {
         'name': trial.candidate.effect.said_as,
         'joints': list(trial.candidate.effect.joints),
-        'share': min(trial.gain / max(total, 1e-300), 1.0),
+        'share': min(trial.gain / max(survey.total, 1e-300), 1.0),
         'held_out_gain': trial.gain,
         'replicated_in': trial.replicated,
         'visible_fraction': trial.visible,
-        'min_detectable': _finite(smallest_size(trial)[1]),
-        'adjusted_p': min(1.0, trial.p * tried),
+        'min_detectable': _finite(smallest_size(trial, least)[1]),
+        'adjusted_p': min(1.0, trial.p * survey.tried),
     }
 
 
@@ -216,16 +217,17 @@ class Detectable:
     visible: float
 
 
-def smallest_size(trial: Trial) -> tuple[int, float]:
+def smallest_size(trial: Trial, material: FloatArray) -> tuple[int, float]:
     """
     Return the first identifiable parameter of a candidate, and its smallest detectable size.
 
-    The size is inf where it is larger than the parameter can be.
+    It is told from noise, and material beside the misfit of the model: larger than the sizes
+    ``material``, (p,). It is inf where it is larger than the parameter can be.
 
     """
-    rows = zip(trial.candidate.kept, trial.std, trial.resolution, strict=True)
-    for index, std, resolution in rows:
-        size = _SHOWS * float(std)
+    rows = zip(trial.candidate.kept, trial.std, trial.resolution, material, strict=True)
+    for index, std, resolution, least in rows:
+        size = max(_SHOWS * float(std), float(least))
         if resolution > IDENTIFIABLE and _possible(trial.candidate.effect, index, size):
             return index, size
     return trial.candidate.kept[0], float('inf')
@@ -251,9 +253,11 @@ def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectabl
     if survey is None:
         return ()
     rows = []
-    for trial in (*survey.ranking, *survey.nuisance):
+    always = [np.zeros(trial.candidate.size) for trial in survey.nuisance]
+    trials = (*survey.ranking, *survey.nuisance)
+    for trial, material in zip(trials, (*survey.material, *always), strict=True):
         effect = trial.candidate.effect
-        index, size = smallest_size(trial)
+        index, size = smallest_size(trial, material)
         parameter = effect.parameters(robot)[index]
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
     rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]
