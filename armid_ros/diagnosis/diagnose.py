@@ -42,7 +42,6 @@ from armid_ros.diagnosis.verdict.where import Excess, locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -211,7 +210,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         [*left, *resting],
         arm,
         NOISE if measured else chosen.floor_in_words,
-        _as_it_is(arm, _sure(evidence, chosen), settings) if refitted else None,
+        _excess(arm, _sure(evidence, chosen), settings) if refitted else None,
         minor,
         None if measured else _hides(names.rest, settings),
     )
@@ -288,19 +287,8 @@ def _located(
     explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
     """Locate what an arm leaves of some data beyond the limits of the patched model."""
-    patched = _residual(explanation, explanation.fitted.arm, shown)
-    limits = shown.limits(patched, settings)
-    return locate(explanation.given, shown, _residual(explanation, arm, shown), limits)
-
-
-def _residual(explanation: Explanation, arm: ArmModel, shown: Evidence) -> Sequence[FloatArray]:
-    """Return what one of the arms of an explanation leaves of some data."""
-    if shown.data is explanation.evidence.data:
-        fits = (explanation.fitted, explanation.reference)
-        known = [fit.residual for fit in fits if fit.arm is arm]
-        if known:
-            return known[0]
-    return [part.residual(arm) for part in shown.data]
+    patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
+    return locate(explanation.given, shown, left, shown.limits(patched, settings))
 
 
 def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence) -> Evidence:
@@ -335,30 +323,16 @@ def _excesses(
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
     usual = 1.0 if chosen.measured else more  # a misfit varies from motion to motion
-    left = [_left(rest, _sure(evidence, chosen), settings, 'the recordings', usual)]
+    arm = rest.fitted.arm
+    left = [_excess(arm, _sure(evidence, chosen), settings, usual)]
     parts = [evidence]
     if unseen is not None:
-        sure = _sure(unseen, chosen)
-        left.append(_left(rest, sure, settings, 'recordings that were not used', more))
+        where = 'recordings that were not used'
+        left.append(_excess(arm, _sure(unseen, chosen), settings, more, where))
         parts.append(unseen)
     if settings.partner is not None:
         return left, []
-    arm = rest.fitted.arm
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
-
-
-def _left(
-    explanation: Explanation,
-    evidence: Evidence,
-    settings: DiagnosisSettings,
-    where: str,
-    more: float,
-) -> Excess:
-    if evidence.data is explanation.evidence.data:
-        residual = explanation.fitted.residual
-    else:
-        residual = tuple(part.residual(explanation.fitted.arm) for part in evidence.data)
-    return Excess(_excess(residual, evidence, settings) / more, f'in {where}')
 
 
 def _hides(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
@@ -370,16 +344,17 @@ def _hides(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
     return Hiding(share, np.sqrt(np.maximum(limits - 1.0, 0.0)) * share)
 
 
-def _as_it_is(arm: ArmModel, evidence: Evidence, settings: DiagnosisSettings) -> Excess:
-    residual = [part.residual(arm) for part in evidence.data]
-    return Excess(_excess(residual, evidence, settings), 'in the recordings')
-
-
 def _excess(
-    residual: Sequence[FloatArray], evidence: Evidence, settings: DiagnosisSettings
-) -> FloatArray:
-    """Return the loss of each joint over its limit, up to which it is no gap, shape (n,)."""
-    return evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
+    arm: ArmModel,
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+    more: float = 1.0,
+    where: str = 'the recordings',
+) -> Excess:
+    """Return the loss that an arm leaves over so many times the limit up to which it is no gap."""
+    residual = evidence.residuals(arm)
+    ratio = evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
+    return Excess(ratio / more, f'in {where}')
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

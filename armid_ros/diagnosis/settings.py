@@ -44,7 +44,7 @@ class Thresholds:
         0.8 in half of the joints of 14 arms.
     exchanged : float
         Share of the divisions of all recordings that may show as much of a change as the days do.
-        Where there are so many of them that one is less than that, smaller changes are told, too.
+        Where there are so many of them that one is less than that, smaller changes are seen, too.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print; recordings hardly show causes that take less than this share of what they
@@ -63,10 +63,10 @@ class Thresholds:
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float
         Level, of all joints together, up to which what is left counts as noise that two periods
-        tell so well: of a thousand healthy arms one is `unknown`.
+        measure so well: of a thousand healthy arms one is `unknown`.
     predicted : float
-        Factor by which squares may be larger on motions that were not used: values that others
-        told are not exact there, and a misfit is another one.
+        Factor by which squares may be larger on motions that were not used: values that other data
+        gave are not exact there, and a misfit is another one.
     open_share : float
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
         there, however little that is of the gap of the arm; and of the whole gap that a cause

@@ -25,7 +25,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
 
 
 def planned(rival, told):
-    pair = SimpleNamespace(name='payload', rival=rival, told=told)
+    pair = SimpleNamespace(name='payload', rival=rival, distinct=told)
     return SimpleNamespace(sentence='Run it.', separations=(pair,))
 
 

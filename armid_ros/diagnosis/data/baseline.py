@@ -130,12 +130,12 @@ def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
 
     """
     spread = _described_spread(arm)
-    told = np.isfinite(spread)
-    return _precision(base, told, np.diag(spread[told] ** 2))
+    known = np.isfinite(spread)
+    return _precision(base, known, np.diag(spread[known] ** 2))
 
 
 def _precision(
-    base: BaseParameters, told: npt.NDArray[np.bool_], covariance: FloatArray
+    base: BaseParameters, known: npt.NDArray[np.bool_], covariance: FloatArray
 ) -> FloatArray:
     """
     Return the precision of base parameters, (r, r), of standard ones of which some are untold.
@@ -145,9 +145,11 @@ def _precision(
 
     """
     seen = (
-        scipy.linalg.null_space(base.grouping[:, ~told].T) if not told.all() else np.eye(base.rank)
+        scipy.linalg.null_space(base.grouping[:, ~known].T)
+        if not known.all()
+        else np.eye(base.rank)
     )
-    within = seen.T @ base.grouping[:, told]
+    within = seen.T @ base.grouping[:, known]
     return np.asarray(seen @ scaled_inverse(within @ covariance @ within.T) @ seen.T)
 
 
@@ -180,8 +182,8 @@ class Identified:
         size = len(self.information)
         precision = np.diag(_described_spread(arm) ** -2.0)
         precision[:size, :size] += self.information
-        told = np.diag(precision) > 0.0
-        described = _precision(base, told, scaled_inverse(precision[np.ix_(told, told)]))
+        known = np.diag(precision) > 0.0
+        described = _precision(base, known, scaled_inverse(precision[np.ix_(known, known)]))
         return Prior((), (), (), described)
 
 
@@ -217,13 +219,13 @@ class Baseline:
         base, columns = excited(arm, arm.base_parameters(rng), data)
         held = described_precision(base, arm)
         informative = np.concatenate([part.informative for part in data])
-        left = np.concatenate(residual)
+        rest = np.concatenate(residual)
         w = np.concatenate(columns)
         informative[:, ~informative.any(axis=0)] = True  # of a joint that never moved, all rows
-        scale = np.sqrt(np.mean(left**2, axis=0, where=informative))
+        scale = np.sqrt(np.mean(rest**2, axis=0, where=informative))
         weight = informative / np.maximum(scale, 1e-12)
         rows = w * weight[:, :, np.newaxis]
-        aim = left * weight
+        aim = rest * weight
         fold = fold_rows(data)
         folds = range(int(fold.max()) + 1)
         own = [np.einsum('rnp,rnq->pq', rows[fold == k], rows[fold == k]) for k in folds]
@@ -231,11 +233,11 @@ class Baseline:
         whole = np.linalg.lstsq(sum(own) + held, sum(to), rcond=1e-10)[0]
         for k in folds:
             others = np.linalg.lstsq(sum(own) - own[k] + held, sum(to) - to[k], rcond=1e-10)[0]
-            left[fold == k] += w[fold == k] @ (whole - others)
-        predicted = np.sqrt(np.mean(left**2, axis=0, where=informative))
+            rest[fold == k] += w[fold == k] @ (whole - others)
+        predicted = np.sqrt(np.mean(rest**2, axis=0, where=informative))
         counts = np.array([informative[fold == k].sum(axis=0) for k in folds])
         sums = np.array(
-            [np.sum(left[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds]
+            [np.sum(rest[fold == k] ** 2, axis=0, where=informative[fold == k]) for k in folds]
         )
         worst = np.max(sums / np.maximum(counts, 1), axis=0)
         return cls(
@@ -254,10 +256,10 @@ class Baseline:
 
         """
         rows = Evidence.over_noise(self.data, [np.ones_like(self.misfit)] * len(self.data))
-        left = rows.power(self.residual)
+        power = rows.power(self.residual)
         torque = np.maximum(rows.torque_rms**2, 1e-300)
-        whole = (rows.count @ left) / max(float(rows.count @ torque), 1e-300)
-        return float(np.sqrt(whole)), np.sqrt(left / torque)
+        whole = (rows.count @ power) / max(float(rows.count @ torque), 1e-300)
+        return float(np.sqrt(whole)), np.sqrt(power / torque)
 
     def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
         """

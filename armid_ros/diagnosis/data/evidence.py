@@ -96,6 +96,10 @@ class Evidence:
             squares += np.sum(rows**2, axis=0, where=part.informative)
         return np.asarray(squares / np.maximum(self.count, 1.0))
 
+    def residuals(self, arm: ArmModel) -> list[FloatArray]:
+        """Return measured torques minus those of an arm, each (M, n) [N m]."""
+        return [part.residual(arm) for part in self.data]
+
     def weighted(self, rows: Sequence[FloatArray]) -> Iterator[FloatArray]:
         """Yield weighted rows (M, n) or (M, n, P) of each trajectory, zero if uninformative."""
         return weighted_rows(rows, self.data, self.sigma)
@@ -253,7 +257,7 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
 
 
 def _difference(
-    trajectory: Trajectory, left: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
+    trajectory: Trajectory, residual: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """
     Return the difference of two periods in one joint, and at which samples it is informative.
@@ -263,7 +267,7 @@ def _difference(
 
     """
     motion = trajectory.motion
-    difference = left[first + lag, joint] - left[first, joint]
+    difference = residual[first + lag, joint] - residual[first, joint]
     t = (motion.t[first] - motion.t[first].mean()) / max(np.ptp(motion.t[first]), 1e-9)
     dq = motion.dq[first, joint]
     drifting = np.column_stack([np.ones_like(t), t, dq, t * dq])

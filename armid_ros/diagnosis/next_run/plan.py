@@ -82,7 +82,7 @@ class NextRun:
     @property
     def sentence(self) -> str:
         """Return what to do and what it would show, in words, the least separated pair first."""
-        separated = sorted((s for s in self.separations if s.told), key=lambda one: one.z)
+        separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
         parts = [
             f'it should tell {one.name} from {one.rival} by {_many(one.z)} standard deviations'
             for one in separated[:_SAID]
@@ -167,7 +167,7 @@ def next_run(
     if plain:
         best = max(plain, key=lambda run: run.worth)
         runs += _designed(diagnosis, doubts, best, collision, rng)
-    telling = [run for run in runs if any(one.told for one in run.separations)]
+    telling = [run for run in runs if any(one.distinct for one in run.separations)]
     if runs and not telling:
         pairs = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
         raise TrajectoryError(f'none of the planned motions tells {pairs}'.replace('_', ' '))

@@ -103,7 +103,7 @@ class Separation:
         return float(np.sqrt(self.power))
 
     @property
-    def told(self) -> bool:
+    def distinct(self) -> bool:
         """Whether the run tells the two apart at all."""
         return self.z >= NOTHING
 
@@ -140,10 +140,10 @@ class Separation:
         powers = []
         for rival in _shapes(doubt.rival, motion, diagnosis.arm):
             columns = _stack([a.columns_of(rival, motion) for a in arms], weight)
-            left = columns - basis @ (basis.T @ columns)
+            remainder = columns - basis @ (basis.T @ columns)
             scale = np.linalg.norm(columns, axis=0)
-            visible = np.linalg.norm(left, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
-            own = _basis(left[:, visible])
+            visible = np.linalg.norm(remainder, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
+            own = _basis(remainder[:, visible])
             powers.append(float(np.sum((rest - own @ (own.T @ rest)) ** 2)))
         return Separation(named.said_as, doubt.rival.said_as, min(powers))
 
@@ -243,8 +243,8 @@ def _basis(columns: FloatArray) -> FloatArray:
     columns = columns[:, length > 0.0] / length[length > 0.0]
     if not columns.shape[1]:
         return columns
-    left, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, size > _DEPENDENT * size[0]])
+    basis, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(basis[:, size > _DEPENDENT * size[0]])
 
 
 def _shapes(rival: Effect, motion: Motion, arm: ArmModel) -> Iterator[Effect]:

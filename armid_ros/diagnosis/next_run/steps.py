@@ -92,11 +92,11 @@ def _look_at(name: str, diagnosis: Diagnosis) -> str:
 
 def _records(finding: Finding, run: NextRun | None) -> list[str]:
     """Say what else to record of the likeliest rival, unless the planned run tells it apart."""
-    told = () if run is None else [(s.name, s.rival) for s in run.separations if s.told]
+    separated = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
     tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'
     return [
         f'If {tried} {two_names(finding.name, finding.joints, rival)}, record what shows them '
         f'best: {shown_best(finding.name, finding.joints, rival)}.'
         for rival in finding.rivals[:1]
-        if (finding.name, rival.name) not in told
+        if (finding.name, rival.name) not in separated
     ]

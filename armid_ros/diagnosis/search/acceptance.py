@@ -198,8 +198,8 @@ def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
     free = here.free.reshape(-1, len(nuisance.free))
     known = nuisance.prior + NormalEquations.of_rows(free, here.problem.y.ravel())
     if later is not None:
-        for columns, left in zip(later.free, later.residual, strict=True):
-            known = known + NormalEquations.of_rows(columns, left)
+        for columns, residual in zip(later.free, later.residual, strict=True):
+            known = known + NormalEquations.of_rows(columns, residual)
     return showing_more(first, second, known, trial.candidate.precision)
 
 
@@ -268,11 +268,11 @@ def _before(trial: Trial, here: Round) -> list[Rows]:
     candidate = trial.candidate
     own = here.before.baseline.columns(here.work.arm, candidate.effect, candidate.kept)
     result, start = [], 0
-    for columns, left in prior.recordings(change):
-        free = np.zeros((len(left), len(here.nuisance.free)))
+    for columns, residual in prior.recordings(change):
+        free = np.zeros((len(residual), len(here.nuisance.free)))
         free[:, : columns.shape[1]] = columns
-        result.append(Rows(free, own[start : start + len(left)], left))
-        start += len(left)
+        result.append(Rows(free, own[start : start + len(residual)], residual))
+        start += len(residual)
     return result
 
 

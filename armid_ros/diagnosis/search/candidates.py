@@ -261,13 +261,17 @@ def candidates(
     kinds: Sequence[Kind],
 ) -> Candidates:
     """Compute the columns of every effect that was not named yet."""
-    arm, left, data = memoized_arm(fitted.arm), _left(fitted, evidence), evidence.data
+    arm, unexplained, data = (
+        memoized_arm(fitted.arm),
+        _unexplained(fitted, evidence),
+        evidence.data,
+    )
     taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
     candidates: list[Candidate] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]
     start = 0
     for effect, members in candidate_effects(arm.robot, kinds):
-        for whole, singles in shaped(effect, members, arm, left):
+        for whole, singles in shaped(effect, members, arm, unexplained):
             for block, part in zip(blocks, data, strict=True):
                 block.append(part.columns(arm, whole))
             for single in singles:
@@ -280,7 +284,7 @@ def candidates(
     return Candidates(tuple(candidates), tuple(np.concatenate(block, axis=2) for block in blocks))
 
 
-def _left(fitted: Fitted, evidence: Evidence) -> Unexplained:
+def _unexplained(fitted: Fitted, evidence: Evidence) -> Unexplained:
     """Return the residual of a fitted arm, with its motion, weights and nuisance columns."""
     data = evidence.data
     motions = [part.motion for part in data]
@@ -301,13 +305,13 @@ def refine(
     problem: Problem,
     projection: Projection,
     candidate: Candidate,
-    left: FloatArray,
+    residual: FloatArray,
     work: Workspace,
 ) -> tuple[Candidate, FloatArray]:
     """
     Refine the shape of a candidate by variable projection; return it with its columns.
 
-    The nuisance columns are projected out of the residual ``left`` already.
+    The nuisance columns are projected out of the residual already.
 
     """
     effect, kept = candidate.effect, candidate.kept
@@ -322,7 +326,7 @@ def refine(
             except ModelError:
                 return 0.0  # not possible: no gain
             weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
-            own, aim = projection.products(weighted), weighted.T @ left.ravel()
+            own, aim = projection.products(weighted), weighted.T @ residual.ravel()
             values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
             if len(kept) == 1:  # an impossible value is no gain
                 values = np.clip(values, lower, upper)

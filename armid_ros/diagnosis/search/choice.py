@@ -362,14 +362,14 @@ def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings)
 
     """
     evidence = first.evidence
-    left, fitted = first.fitted.residual, anew.fitted.residual
-    after, least = evidence.chi2_per_row(left), evidence.chi2_per_row(fitted)
+    given, fitted = first.fitted.residual, anew.fitted.residual
+    after, least = evidence.chi2_per_row(given), evidence.chi2_per_row(fitted)
     more = freedom(anew, settings) - freedom(first, settings)
     alike = settings.thresholds.same_fit * least
     if more >= 0.0:
         alike = alike + evidence.matters(settings)
         if not evidence.assumed:
-            alike = np.maximum(alike, evidence.limits(left, settings))
+            alike = np.maximum(alike, evidence.limits(given, settings))
     if np.all(after <= alike):
         return True
     if at_floor(anew, settings):

@@ -169,13 +169,13 @@ class Search:
         """Accept causes from a node on; a lead of less than ``width`` squares decides nothing."""
         first, taken = place.look.survey, list(steps)
         named, values = list(place.named), list(place.values)
-        for left in range(self.question.most, 0, -1):
+        for remaining in range(self.question.most, 0, -1):
             step = place.look.step(width)
             if step is None:
                 break
             taken.append(step)
             named, values = self._and_named(place, step)
-            if left > 1:
+            if remaining > 1:
                 place = self._after(place, step)
                 named, values = list(place.named), list(place.values)
         rows = zip(named, taken, values, strict=True)
@@ -290,8 +290,8 @@ class Search:
         there = with_values_of(current, arm, unseen, base, prior)
         rank = len(current.change)
         pairs = zip(there.residual, there.columns, strict=True)
-        left = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
-        return replace(before, later=Later.of(unseen, there.columns, left))
+        residual = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
+        return replace(before, later=Later.of(unseen, there.columns, residual))
 
 
 def _discrepancy(current: Fitted, base: BaseParameters | None) -> tuple[tuple[int, float], ...]:

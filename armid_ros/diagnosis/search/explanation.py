@@ -220,7 +220,7 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
         except IdentificationError:
             continue
         changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
-        residual = tuple(part.residual(changed) for part in evidence.data)
+        residual = tuple(evidence.residuals(changed))
         bodily = replace(fitted, arm=changed, residual=residual)
         allowed = np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)
         if np.all(evidence.chi2_per_row(residual) <= allowed):
@@ -240,9 +240,9 @@ def _triangle(explanation: Explanation, values: FloatArray) -> tuple[FloatArray,
     """
     fitted, rank, evidence = explanation.fitted, len(values), explanation.evidence
     blocks = []
-    for columns, left in zip(fitted.columns, fitted.residual, strict=True):
+    for columns, own_residual in zip(fitted.columns, fitted.residual, strict=True):
         own = columns[:, :, :rank]
-        target = left + own @ values
+        target = own_residual + own @ values
         blocks.append(np.concatenate([own, target[:, :, np.newaxis]], axis=2))
     factors = [
         scipy.linalg.qr(rows.reshape(-1, rank + 1), mode='r')[0][: rank + 1]
@@ -250,8 +250,8 @@ def _triangle(explanation: Explanation, values: FloatArray) -> tuple[FloatArray,
     ]
     prior = explanation.prior
     if prior is not None:
-        own, left = prior.columns, prior.residual - prior.columns @ fitted.change
-        factors.append(np.column_stack([own, left + own @ values]))
+        own, own_residual = prior.columns, prior.residual - prior.columns @ fitted.change
+        factors.append(np.column_stack([own, own_residual + own @ values]))
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
     parts = [*evidence.data, *(() if prior is None else prior.data)]
     return np.asarray(whole), float(sum(part.informative.sum() for part in parts))

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
 from armid_ros.diagnosis.search.trial import Named
 from armid_ros.errors import ModelError
@@ -173,7 +172,7 @@ def with_values_of(
 
     """
     state = Patch(arm, found.named, found.values, np.zeros(0 if base is None else base.rank))
-    residual = _residuals(state, evidence.data)
+    residual = evidence.residuals(state.model)
     columns = [patch_columns(state, part, base) for part in evidence.data]
     held = _prior_of_change(_described(base, arm, prior), prior)
     return _fitted(state, residual, columns, held, found.estimate)
@@ -246,21 +245,21 @@ def _settled(
     """
     data = evidence.data
 
-    def loss_of(patch: Patch, left: Sequence[FloatArray]) -> float:
+    def loss_of(patch: Patch, residual: Sequence[FloatArray]) -> float:
         change = patch.change
         away = change @ known.matrix @ change - 2.0 * known.vector @ change
-        return _loss(left, evidence) + float(away)
+        return _loss(residual, evidence) + float(away)
 
-    residual = _residuals(state, data)
+    residual = evidence.residuals(state.model)
     loss = loss_of(state, residual)
     columns = [patch_columns(state, part, base) for part in data]
     for _ in range(rounds):
         moved, after, expected = state, residual, loss
         for step in _steps(state, columns, residual, evidence, known):
             trial = state.moved(step, base)
-            left = _residuals(trial, data)
-            if loss_of(trial, left) < loss:
-                moved, after = trial, left
+            tried = evidence.residuals(trial.model)
+            if loss_of(trial, tried) < loss:
+                moved, after = trial, tried
                 expected = loss_of(trial, _expected(residual, columns, step))
                 break
         new = loss_of(moved, after)
@@ -303,18 +302,13 @@ def _expected(
     """Return the residual after a step if torques were linear in all fitted parameters."""
     size = len(step)
     return [
-        left - (block.reshape(-1, size) @ step).reshape(left.shape)
-        for left, block in zip(residual, columns, strict=True)
+        own - (block.reshape(-1, size) @ step).reshape(own.shape)
+        for own, block in zip(residual, columns, strict=True)
     ]
 
 
-def _residuals(state: Patch, data: Sequence[Trajectory]) -> list[FloatArray]:
-    model = state.model
-    return [part.residual(model) for part in data]
-
-
 def _loss(residual: Sequence[FloatArray], evidence: Evidence) -> float:
-    return float(sum(np.sum(left**2) for left in evidence.weighted(residual)))
+    return float(sum(np.sum(own**2) for own in evidence.weighted(residual)))
 
 
 def _step(
@@ -326,11 +320,11 @@ def _step(
     """Return the weighted least-squares step under a prior; zero where it is not identifiable."""
     size = columns[0].shape[2]
     own, aim = np.zeros((size, size)), np.zeros(size)
-    lefts = evidence.weighted(residual)
-    for block, left in zip(evidence.weighted(columns), lefts, strict=True):
+    residuals = evidence.weighted(residual)
+    for block, own_residual in zip(evidence.weighted(columns), residuals, strict=True):
         flat = block.reshape(-1, size)
         own += flat.T @ flat
-        aim += flat.T @ left.ravel()
+        aim += flat.T @ own_residual.ravel()
     known = len(prior.vector)
     own[:known, :known] += prior.matrix
     aim[:known] += prior.vector
@@ -367,8 +361,8 @@ def _covariance(
     precision[: len(described), : len(described)] = described
     rows = zip(evidence.data, evidence.weighted(columns), evidence.weighted(residual), strict=True)
     problem = [
-        Regression(part.at_rows.with_torque(left), block, part.informative, part.source)
-        for part, block, left in rows
+        Regression(part.at_rows.with_torque(own), block, part.informative, part.source)
+        for part, block, own in rows
     ]
     problem += more
     stacked = np.concatenate(
@@ -380,11 +374,13 @@ def _covariance(
     if not len(kept):
         return covariance
     problem = [part.restrict(kept) for part in problem]
-    told = np.concatenate([part.informative for part in problem]).astype(float)
-    left = np.concatenate([part.target for part in problem]) * told
+    informative = np.concatenate([part.informative for part in problem]).astype(float)
+    target = np.concatenate([part.target for part in problem]) * informative
     try:
         basis = informative_basis(stacked[:, kept].T @ stacked[:, kept])
-        products = noise_products(problem, left, told, basis) + precision[np.ix_(kept, kept)]
+        products = (
+            noise_products(problem, target, informative, basis) + precision[np.ix_(kept, kept)]
+        )
     except (np.linalg.LinAlgError, ValueError) as error:
         raise ModelError(f'the patched model cannot be fitted: {error}') from error
     bread = basis @ basis.T

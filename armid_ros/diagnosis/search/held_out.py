@@ -340,10 +340,10 @@ def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray
 
     """
     result = np.zeros(len(fitted.estimate.values))
-    left = prior.residual - prior.columns @ fitted.change
+    residual = prior.residual - prior.columns @ fitted.change
     for own, values, (places, _) in zip(fitted.named, fitted.values, fitted.places, strict=True):
         kept = list(own.kept)
-        pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), left])
+        pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), residual])
         pair -= prior.columns @ prior.nearest(pair)
         size = np.maximum(np.abs(values[kept]), 1e-300)
         scaled = pair[:, :-1] * size

@@ -213,8 +213,8 @@ def _joint_by_joint(
         return []
     parts = max(found, key=lambda group: sum(worth(trial, here) for trial in group))
     cross, square = (sum(getattr(t, name) for t in parts) for name in ('cross', 'square'))
-    told = np.concatenate([trial.resolution for trial in parts])
-    whole = replace(parts[0], cross=cross, square=square, resolution=told)
+    resolution = np.concatenate([trial.resolution for trial in parts])
+    whole = replace(parts[0], cross=cross, square=square, resolution=resolution)
     simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
     if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
         return []

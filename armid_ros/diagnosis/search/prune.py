@@ -91,18 +91,25 @@ class View:
         return held_out(self.problem, free, [], prior)[1]
 
     @property
-    def first(self) -> int:
-        """The first column of a name."""
-        return int(self.fitted.columns[0].shape[2]) - len(self.fitted.estimate.values)
+    def fitted_columns(self) -> int:
+        """Number of the columns that were fitted."""
+        return int(self.fitted.columns[0].shape[2])
 
     def columns(self, name: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the columns of the values of a name, and those of its shapes."""
-        values, shapes = self.fitted.places[name]
-        return tuple(self.first + k for k in values), tuple(self.first + k for k in shapes)
+        """Return the columns of the values of a name, fitted or further, and of its shapes."""
+        fitted = len(self.fitted.named)
+        if name < fitted:
+            first = self.fitted_columns - len(self.fitted.estimate.values)
+            values, shapes = self.fitted.places[name]
+            return tuple(first + k for k in values), tuple(first + k for k in shapes)
+        sizes = [len(one.kept) for one in self.more[: name - fitted + 1]]
+        stop = self.fitted_columns + sum(sizes)
+        return tuple(range(stop - sizes[-1], stop)), ()
 
     def value(self, column: int) -> float:
-        """Return the fitted value of a column of a name."""
-        return float(self.fitted.estimate.values[column - self.first])
+        """Return the fitted value of a column of a name; zero of further ones."""
+        place = column - self.fitted_columns
+        return float(self.fitted.estimate.values[place]) if place < 0 else 0.0
 
     def without(
         self, columns: Sequence[int], values: Sequence[float], gone: Sequence[int] = ()
@@ -157,22 +164,14 @@ class View:
         return Again(trial, problem, Nuisance(free, prior), float(power.sum()))
 
     def trial_of(self, name: int) -> Again:
-        """Try a name as if it were a candidate now, jointly with the others."""
-        own = self.fitted.named[name]
+        """Try a name as if it were a candidate now, jointly with those that were fitted."""
+        own = (*self.fitted.named, *self.more)[name]
         columns, shapes = self.columns(name)
+        further = range(self.fitted_columns, self.problem.x.shape[2])
+        gone = [*shapes, *(c for c in further if c not in columns)]
         span = slice(0, len(columns))
         candidate = Candidate(own.effect, span, own.kept, self.fitted.arm.robot)
-        return self.trial(candidate, columns, [self.value(c) for c in columns], shapes)
-
-    def trial_of_more(self, name: int) -> Again:
-        """Try an effect that was not fitted jointly with those that were."""
-        first = int(self.fitted.columns[0].shape[2])
-        start = first + sum(len(one.kept) for one in self.more[:name])
-        own = self.more[name]
-        span = range(start, start + len(own.kept))
-        others = [c for c in range(first, self.problem.x.shape[2]) if c not in span]
-        candidate = Candidate(own.effect, slice(0, len(span)), own.kept, self.fitted.arm.robot)
-        return self.trial(candidate, span, [0.0] * len(span), others)
+        return self.trial(candidate, columns, [self.value(c) for c in columns], gone)
 
 
 def columns_of(own: Named, arm: ArmModel, part: Trajectory) -> FloatArray:
@@ -280,7 +279,7 @@ class Retrial:
         view = View.of(fitted, self.evidence, [one.named for one in dropped])
         found: dict[int, Trial] = {}
         for k, one in enumerate(dropped):
-            again = view.trial_of_more(k)
+            again = view.trial_of(len(fitted.named) + k)
             if again.trial is not None and self.stands(one.step, again):
                 found[k] = again.trial
         if not found:

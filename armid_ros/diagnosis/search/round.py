@@ -82,9 +82,9 @@ class Later:
     ) -> Later:
         """Weight columns (M, n, f) and residuals (M, n) of trajectories."""
         free = [rows.reshape(-1, rows.shape[2]) for rows in evidence.weighted(columns)]
-        left = [rows.ravel() for rows in evidence.weighted(residual)]
+        rest = [rows.ravel() for rows in evidence.weighted(residual)]
         return cls(
-            evidence, _by_recording(evidence.data, free), _by_recording(evidence.data, left)
+            evidence, _by_recording(evidence.data, free), _by_recording(evidence.data, rest)
         )
 
     def own(self, arm: ArmModel, candidate: Candidate) -> list[FloatArray]:
@@ -151,7 +151,7 @@ class Before:
             axis=1,
         )
         precision = np.concatenate([candidate.precision for candidate in candidates])
-        left = self.prior.residual - self.prior.columns @ self.change
+        residual = self.prior.residual - self.prior.columns @ self.change
         size, known = own.shape[1], self.prior.columns.shape[1]
         whole = size + len(nuisance.free)
         matrix, vector = np.zeros((whole, whole)), np.zeros(whole)
@@ -159,7 +159,7 @@ class Before:
         matrix[:size, :size] = own.T @ own + np.diag(precision)
         matrix[:size, size : size + known] = own.T @ self.prior.columns
         matrix[size : size + known, :size] = matrix[:size, size : size + known].T
-        vector[:size] = own.T @ left
+        vector[:size] = own.T @ residual
         return NormalEquations(matrix, vector)
 
 
@@ -262,10 +262,10 @@ class Round:
         """Return residual, blocks, columns of a candidate and nuisance columns of all rows."""
         return self.problem.y, self.problem.block, self.own(candidate), self.free
 
-    def gaps(self, left: FloatArray) -> npt.NDArray[np.bool_]:
+    def gaps(self, residual: FloatArray) -> npt.NDArray[np.bool_]:
         """Return in which joints a residual (R, n) is a gap, shape (n,)."""
-        rows = self.evidence.split(left, self.problem.weight)
-        return self.problem.chi2_per_row(left) > self.evidence.limits(rows, self.settings)
+        rows = self.evidence.split(residual, self.problem.weight)
+        return self.problem.chi2_per_row(residual) > self.evidence.limits(rows, self.settings)
 
 
 def worth(trial: Trial, here: Round) -> float:

@@ -99,17 +99,17 @@ def _left_out(explanation: Explanation) -> Attribution:
     arm = explanation.reference.arm
     columns = [view.columns(k)[0] for k in range(len(named))]
     shapes = [c for k in range(len(named)) for c in view.columns(k)[1]]
-    left = list(range(len(named)))
+    remaining = list(range(len(named)))
     taken = np.zeros((len(named), 0))
     order: list[int] = []
     whole: FloatArray | None = None
-    while left:
+    while remaining:
         best: tuple[float, int, FloatArray] | None = None
-        asked = [c for k in left for c in columns[k]]
+        asked = [c for k in remaining for c in columns[k]]
         values = [view.value(c) for c in asked]
         problem, free, prior = view.without(asked, values, shapes)
         start, candidates = 0, []
-        for k in left:
+        for k in remaining:
             span = slice(start, start + len(columns[k]))
             candidates.append(Candidate(named[k].effect, span, named[k].kept, arm.robot))
             start = span.stop
@@ -118,16 +118,16 @@ def _left_out(explanation: Explanation) -> Attribution:
         if not taken.size:
             taken = np.zeros((len(named), len(power)))
         by_column = {trial.candidate.columns.start: trial for trial in trials}
-        for k, candidate in zip(left, candidates, strict=True):
+        for k, candidate in zip(remaining, candidates, strict=True):
             trial = by_column.get(candidate.columns.start)
             if trial is not None and (best is None or trial.gain > best[0]):
                 best = trial.gain, k, trial.gains
         if best is None:
-            order += left
+            order += remaining
             break
         _, k, taken[best[1]] = best
         order.append(k)
-        left.remove(k)
+        remaining.remove(k)
     if whole is None:
         whole = view.power
     return Attribution(tuple(order), whole, taken.reshape(len(named), len(whole)))
@@ -142,7 +142,7 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
 
     """
     arms = [explanation.reference.arm, *_staircase(explanation, order)]
-    residuals = [[part.residual(arm) for part in unseen.data] for arm in arms]
+    residuals = [unseen.residuals(arm) for arm in arms]
     squares = [unseen.block_squares(rows) for rows in residuals]
     taken = np.zeros((len(order), len(squares[0])))
     denied = []

@@ -221,8 +221,8 @@ def smallest_size(trial: Trial, material: FloatArray) -> tuple[int, float]:
     """
     Return the first identifiable parameter of a candidate, and its smallest detectable size.
 
-    It is told from noise, and material beside the misfit of the model: larger than the sizes
-    ``material``, (p,). It is inf where it is larger than the parameter can be.
+    It differs from noise, and is no less than the sizes ``material``, (p,). It is inf where it is
+    larger than the parameter can be.
 
     """
     rows = zip(trial.candidate.kept, trial.std, trial.resolution, material, strict=True)

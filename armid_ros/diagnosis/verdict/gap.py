@@ -62,8 +62,11 @@ def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
         _overlay(part, sigma, before, after)
         for part, sigma in zip(evidence.data, evidence.sigma, strict=True)
     ]
-    left = [[o.measured - o.before for o in overlays], [o.measured - o.after for o in overlays]]
-    power = [evidence.power(rows) for rows in left]
+    residuals = [
+        [o.measured - o.before for o in overlays],
+        [o.measured - o.after for o in overlays],
+    ]
+    power = [evidence.power(rows) for rows in residuals]
     floor = evidence.power([np.broadcast_to(o.sigma, o.measured.shape) for o in overlays])
     beyond = [np.maximum(own - floor, 0.0) / np.maximum(floor, 1e-24) for own in power]
     gap = beyond[0] > _A_GAP
@@ -72,7 +75,7 @@ def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
         np.sqrt(power[0]),
         np.sqrt(power[1]),
         np.sqrt(floor),
-        evidence.chi2_per_row(left[0]),
+        evidence.chi2_per_row(residuals[0]),
         float(np.clip(closed, 0.0, 1.0)),
         unseen is not None,
         tuple(overlays),
@@ -100,13 +103,15 @@ def harmed(
 def _worse(
     before: ArmModel, after: ArmModel, evidence: Evidence, settings: DiagnosisSettings
 ) -> npt.NDArray[np.bool_]:
-    left = [[part.residual(arm) for part in evidence.data] for arm in (before, after)]
-    had, has = (evidence.block_squares(rows) for rows in left)
+    residuals = [evidence.residuals(arm) for arm in (before, after)]
+    had, has = (evidence.block_squares(rows) for rows in residuals)
     more = has - had
     spread = more.std(axis=0, ddof=1) * np.sqrt(len(more))
     total = more.sum(axis=0)
     floor = np.maximum(had.sum(axis=0), evidence.count)
-    gap = evidence.chi2_per_row(left[1]) > evidence.as_good(settings) + evidence.matters(settings)
+    gap = evidence.chi2_per_row(residuals[1]) > evidence.as_good(settings) + evidence.matters(
+        settings
+    )
     surely = (total > settings.thresholds.surely * spread) & (total > _SLIGHTLY * floor)
     by_far = total > (settings.thresholds.same_fit - 1.0) * floor
     return np.asarray((surely | by_far) & gap)
@@ -137,7 +142,7 @@ def held(
         Thresholds.
 
     """
-    residual = [part.residual(arm) for part in evidence.data]
+    residual = evidence.residuals(arm)
     surely = settings.thresholds.surely
     excess = standing(arm, evidence, residual, surely)
     if before is not None:
@@ -147,9 +152,9 @@ def held(
     return Excess(excess, _BESIDE)
 
 
-def places_held(arm: ArmModel, left: Sequence[Excess]) -> tuple[Where, ...]:
+def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
     """Return the joints that are held, the worst first."""
-    excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in left)], axis=0)
+    excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
     whole = float(beyond.sum())
@@ -178,12 +183,12 @@ def standing(
         return np.zeros(joints)
     squares, time = np.zeros((2, joints))
     usual = np.maximum(evidence.torque_rms, 1e-300)
-    for part, left, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
+    for part, own, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
         most = _HELD * friction.largest(arm.load(part.at_rows))
-        louder = np.maximum(np.abs(part.torque - left) / usual, 1.0)
+        louder = np.maximum(np.abs(part.torque - own) / usual, 1.0)
         period = float(part.t[1] - part.t[0])
         shortest = max(REST_TIME, 1.0 / part.used.cutoff_hz)
-        lasting = uniform_filter1d(left, max(round(shortest / period), 1), axis=0)
+        lasting = uniform_filter1d(own, max(round(shortest / period), 1), axis=0)
         beyond = (lasting / (most + surely * sigma * louder)) ** 2
         more = ~part.informative & (most > 0.0) & (beyond > 1.0)
         time += period * more.sum(axis=0)

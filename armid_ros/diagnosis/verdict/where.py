@@ -111,7 +111,7 @@ def locate(
     total = max(float(beyond.sum()), 1e-300)
     rows = [_quantities(arm, part) for part in data]
     informative = np.concatenate([part.informative for part in data])
-    left = np.concatenate(residual)
+    stacked = np.concatenate(residual)
     result = []
     for joint in np.argsort(-beyond):
         if beyond[joint] <= 0.0:
@@ -127,7 +127,7 @@ def locate(
         }
         for name in rows[0]:
             values = np.concatenate([row[name][:, joint] for row in rows])
-            axes.append(_axis(name, units.get(name, torque), values[use], left[use, joint]))
+            axes.append(_axis(name, units.get(name, torque), values[use], stacked[use, joint]))
         axes.sort(key=lambda axis: -axis.share)
         name = arm.robot.joints[joint]
         share = float(beyond[joint] / total)
@@ -149,14 +149,14 @@ def _quantities(arm: ArmModel, part: Trajectory) -> dict[str, FloatArray]:
     }
 
 
-def _axis(name: str, unit: str, x: FloatArray, left: FloatArray) -> Axis:
+def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
     edges = np.quantile(x, np.linspace(0.0, 1.0, _BINS + 1))
     index = np.clip(np.searchsorted(edges, x, side='right') - 1, 0, _BINS - 1)
     counts = np.bincount(index, minlength=_BINS)
     safe = np.maximum(counts, 1)
-    means = np.bincount(index, left, _BINS) / safe
+    means = np.bincount(index, residual, _BINS) / safe
     centres = np.bincount(index, x, _BINS) / safe
-    power = float(np.sum(left**2))
+    power = float(np.sum(residual**2))
     share = float(np.sum(counts * means**2)) / power if power > 0.0 else 0.0
     filled = counts > 0
     return Axis(name, unit, read_only(centres[filled]), read_only(means[filled]), share)

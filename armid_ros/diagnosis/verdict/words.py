@@ -259,8 +259,8 @@ def _values(finding: Finding) -> Iterator[str]:
     """
     before = ''
     every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
-    told = [row for row in every if excludes_zero(row[1], row[2])]
-    for p, value, std in told or every:
+    not_zero = [row for row in every if excludes_zero(row[1], row[2])]
+    for p, value, std in not_zero or every:
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '
         yield f'{name}{_with_degrees(value, std, p.unit)}'
         before = p.name

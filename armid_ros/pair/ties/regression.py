@@ -207,7 +207,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
         fitted,
         arm=patched,
         estimate=Estimate(fitted.estimate.parameters, values, covariance * np.outer(wider, wider)),
-        residual=tuple(part.residual(patched) for part in explanation.evidence.data),
+        residual=tuple(explanation.evidence.residuals(patched)),
     )
 
 
