@@ -98,13 +98,11 @@ RULES = {
     'small names that close a gap stay': Rule(('verdict.attribution._opens',), no),
     'names that other data deny go': Rule(('verdict.attribution.denies',), no),
     'needless names go': Rule(('search.explain.pruned',), all_names),
-    'a small lead decides nothing': Rule(('search.explain.undecided',), no),
     'the simplest that closes the gap': Rule(('search.look.likeliest',), first),
     'what contains a cause is no rival': Rule(('search.look.says_no_more',), no),
     'compared beside what each was': Rule(('search.look._compared',), as_they_are),
     'most of one joint matters': Rule(('search.look._open_squares',), nowhere),
     'small changes do not matter': Rule(('search.look.material',), yes),
-    'noise explains no noise': Rule(('search.look.made_of_noise',), no),
     'the body stays as given': Rule(('search.choice._as_good',), no),
     'deviations from part to part': Rule(
         ('search.explain.widened', 'search.explanation.widened'), as_fitted

@@ -77,12 +77,6 @@ class Thresholds:
         joint is worse, or held, beyond them.
     same : float
         Share, in squares, by which torques of causes differ that are one in other words.
-    smooth_share : float
-        A cause that takes less than this share of its squares without the noise of positions
-        beyond the band of the motion is made of that noise.
-    below_noise : float
-        What is made of the measured torque and leaves less than this share of its noise explains
-        torque with itself.
     one_period : float
         Power of the difference of two periods at low frequency over that at high frequency from
         which something happened in one of them only: 3.6 at the most in 60 sets of the laboratory
@@ -115,8 +109,6 @@ class Thresholds:
     open_share: float = 0.5
     surely: float = 3.0
     same: float = 1e-3
-    smooth_share: float = 0.1
-    below_noise: float = 0.8
     one_period: float = 8.0
     one_period_on_average: float = 3.5
     few_causes: int = 4

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
 from armid_ros.diagnosis.search.choice import few_recordings, WRITTEN_MISFIT
-from armid_ros.diagnosis.search.explain import Search
 from armid_ros.diagnosis.search.explanation import Chosen
 from armid_ros.diagnosis.verdict import attribution
 from armid_ros.identification import identify
@@ -45,23 +44,6 @@ def test_a_change_beside_it_is(bench):
     (first, *others) = asked(bench, before, after, new).findings
     assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
     assert first.values[0] == pytest.approx(1.2, abs=4.0 * first.std[0])
-
-
-def test_what_was_there_already_is_no_measure_of_a_lead(bench, monkeypatch):
-    ways, forward = [], Search.forward
-
-    def kept(search, start=()):
-        ways.append(forward(search, start))
-        return ways[-1]
-
-    def with_drag(motion, tau):
-        return hose(motion, tau) + np.array([0.0, 1.2]) * np.sign(motion.dq)
-
-    monkeypatch.setattr(Search, 'forward', kept)
-    before = bench.recordings(hose, seed=1)
-    asked(bench, before, *(bench.recordings(with_drag, seed=seed) for seed in (2, 3)))
-    look = ways[-1].last.look
-    assert look.width < 0.4 * max(trial.gain for trial in look.ranking)
 
 
 def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):

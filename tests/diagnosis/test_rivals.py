@@ -53,7 +53,7 @@ class Known:
 
 
 def asked(power, since):
-    return SimpleNamespace(currency=power, width=0.0, since=since, settings=DiagnosisSettings())
+    return SimpleNamespace(currency=power, since=since, settings=DiagnosisSettings())
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
-from armid_ros.effects.timing import smoothed
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.data_faults import Stretch
 from armid_ros.identification.rows.period import find_period
@@ -98,11 +97,6 @@ class Trajectory:
     def reduce(self, values: FloatArray) -> FloatArray:
         """Filter and decimate samples (N, ...) to rows (M, ...)."""
         return decimate(values, self.used)
-
-    @cached_property
-    def smooth(self) -> Trajectory:
-        """Return the trajectory with positions limited to the band of the motion."""
-        return replace(self, motion=smoothed(self.motion))
 
     @cached_property
     def at_rows(self) -> Motion:
@@ -312,11 +306,6 @@ class Workspace:
         """Return the columns of an effect in rows, shape (R, n, p)."""
         blocks = [part.columns(self.arm, effect) for part in self.data]
         return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
-
-    def smooth_columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return the columns without the noise of positions beyond the band of the motion."""
-        smooth = tuple(part.smooth for part in self.data)
-        return replace(self, data=smooth).columns(effect, kept)
 
     def torque_echo(
         self, effect: Effect, kept: Sequence[int], noise: Sequence[FloatArray]

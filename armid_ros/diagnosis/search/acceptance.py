@@ -69,35 +69,6 @@ def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
     return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
 
 
-def made_of_noise(trial: Trial, here: Round) -> bool:
-    """
-    Return whether a candidate explains noise of positions with that noise.
-
-    Noise of positions beyond the band of the motion enters the accelerations that the model is
-    given, and so the residual, and columns that are derived from accelerations. Columns without it
-    gain little in that case.
-
-    """
-    effect, kept, work = trial.candidate.effect, trial.candidate.kept, here.work
-    smooth = work.smooth_columns(effect, kept) * here.problem.weight[:, :, np.newaxis]
-    least = here.settings.thresholds.smooth_share * _taken(here.own(trial.candidate), here)
-    return _taken(smooth, here) < least
-
-
-def explains_itself(trial: Trial, here: Round) -> bool:
-    """
-    Return whether a candidate leaves less than the noise of the torque that makes its columns.
-
-    Where the model lacks most of a torque, any function of the measured torque explains the
-    residual, noise included.
-
-    """
-    own = here.projection.rest(here.own(trial.candidate))
-    after = here.problem.chi2_per_row(here.residual - own @ trial.values)
-    before = np.minimum(here.problem.chi2_per_row(here.residual), here.evidence.noise_share)
-    return bool(np.any(after < here.settings.thresholds.below_noise * before))
-
-
 def without_echo(trial: Trial, here: Round) -> Trial:
     """
     Return a trial without the gain that is due to noise of the torque; itself if that is nothing.
@@ -117,14 +88,6 @@ def without_echo(trial: Trial, here: Round) -> Trial:
     np.add.at(blocks, here.problem.block, rows)
     made = np.sum(blocks * trial.fold_values[trial.fold], axis=1)
     return replace(trial, cross=trial.cross - made)
-
-
-def _taken(columns: FloatArray, here: Round) -> float:
-    """Return the squares of the residual that weighted columns (R, n, p) explain in sample."""
-    flat = columns.reshape(-1, columns.shape[2])
-    own, aim = here.projection.products(flat), flat.T @ here.residual.ravel()
-    values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
-    return float(2.0 * values @ aim - values @ own @ values)
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ and those that matter are named in the end.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import Baseline
@@ -26,7 +26,7 @@ from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
 from armid_ros.diagnosis.search.held_out import widened
 from armid_ros.diagnosis.search.look import Look, look_at
 from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial, View
-from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round, undecided
+from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round
 from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
@@ -83,7 +83,7 @@ def explain(
 
 @dataclass(frozen=True)
 class Place:
-    """A node of the search: the accepted causes, the fit with them, and a look at all others."""
+    """A place of the search: the accepted causes, the fit with them, and a look at all others."""
 
     named: tuple[Named, ...]
     values: tuple[FloatArray, ...]
@@ -91,7 +91,6 @@ class Place:
     found: Candidates
     before: Before | None
     look: Look
-    next: dict[Hashable, Place] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ class Way:
     first : Survey or None
         What the first look at all candidates showed.
     last : Place or None
-        The node of the last look.
+        The place of the last look.
     change : ndarray, shape (r,), or None
         Change of the base parameters of the arm in the last fit.
 
@@ -148,38 +147,27 @@ class Search:
         """Accept causes in addition to those to start with as long as any passes."""
         if not self.question.most:
             return Way(tuple(start), None, None)
-        steps = [one.step for one in start]
-        first = self.first_place(start)
-        way = self._way(first, steps, 0.0)
-        assert way.last is not None
-        width = way.last.look.width
-        here = replace(first.look.here, total=None, before=None, width=width)
-        found = [one.step for one in way.taken[len(start) :]]
-        if any(undecided(step.trial, step.ranking, here) for step in found):
-            way = self._way(first, steps, width)
-        return way
+        place = self.first_place(start)
+        first, steps = place.look.survey, [one.step for one in start]
+        named, values = place.named, place.values
+        for remaining in range(self.question.most, 0, -1):
+            step = place.look.step()
+            if step is None:
+                break
+            steps.append(step)
+            one = _of(step, self.question)
+            named, values = (*place.named, one.named), (*place.values, one.values)
+            if remaining > 1:
+                place = self._after(place, step, named, values)
+                named, values = place.named, place.values
+        rows = zip(named, steps, values, strict=True)
+        return Way(tuple(Accepted(*row) for row in rows), first, place, place.current.change)
 
     def first_place(self, start: Sequence[Accepted] = ()) -> Place:
         """Fit the causes to start with, and look at all others."""
         return self._fitted_place(
             [one.named for one in start], [one.values for one in start], None
         )
-
-    def _way(self, place: Place, steps: Sequence[Step], width: float) -> Way:
-        """Accept causes from a node on; a lead of less than ``width`` squares decides nothing."""
-        first, taken = place.look.survey, list(steps)
-        named, values = list(place.named), list(place.values)
-        for remaining in range(self.question.most, 0, -1):
-            step = place.look.step(width)
-            if step is None:
-                break
-            taken.append(step)
-            named, values = self._and_named(place, step)
-            if remaining > 1:
-                place = self._after(place, step)
-                named, values = list(place.named), list(place.values)
-        rows = zip(named, taken, values, strict=True)
-        return Way(tuple(Accepted(*row) for row in rows), first, place, place.current.change)
 
     def in_place_of(self, friction: Sequence[Accepted], way: Way) -> list[Accepted]:
         """
@@ -219,31 +207,25 @@ class Search:
             others = tuple(one for one in others if one.key != taken.key)
         return found
 
-    def _after(self, place: Place, step: Step) -> Place:
-        """Return the node after a step."""
+    def _after(
+        self, place: Place, step: Step, named: Sequence[Named], values: Sequence[FloatArray]
+    ) -> Place:
+        """Return the place after a step, with the names that there are then, and their values."""
         candidate = step.trial.candidate
-        way = candidate.key, candidate.effect.shape
-        if way not in place.next:
-            named, values = self._and_named(place, step)
-            if candidate.effect.linear:
-                arm = place.current.arm
-                before = None if place.before is None else place.before.and_columns(arm, candidate)
-                here = place.look.here
-                nuisance = here.nuisance.and_columns(candidate)
-                here = replace(here, nuisance=nuisance, before=before, known=None)
-                others = tuple(one for one in place.found.candidates if one.key != candidate.key)
-                found = replace(place.found, candidates=others)
-                look = look_at(others, here)
-                after = replace(place, found=found, before=before, look=look, next={})
-                place.next[way] = replace(after, named=tuple(named), values=tuple(values))
-            else:
-                total, change = place.look.survey.total, place.current.change
-                place.next[way] = self._fitted_place(named, values, total, change)
-        return place.next[way]
-
-    def _and_named(self, place: Place, step: Step) -> tuple[list[Named], list[FloatArray]]:
-        one = _of(step, self.question)
-        return [*place.named, one.named], [*place.values, one.values]
+        if not candidate.effect.linear:
+            return self._fitted_place(named, values, place.look.survey.total, place.current.change)
+        arm, here = place.current.arm, place.look.here
+        before = None if place.before is None else place.before.and_columns(arm, candidate)
+        nuisance = here.nuisance.and_columns(candidate)
+        others = tuple(one for one in place.found.candidates if one.key != candidate.key)
+        return replace(
+            place,
+            named=tuple(named),
+            values=tuple(values),
+            found=replace(place.found, candidates=others),
+            before=before,
+            look=look_at(others, replace(here, nuisance=nuisance, before=before, known=None)),
+        )
 
     def _fitted_place(
         self,

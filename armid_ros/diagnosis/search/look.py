@@ -20,9 +20,7 @@ from armid_ros.diagnosis.search.acceptance import (
     acceptable,
     can_be_sure,
     changed,
-    explains_itself,
     inside,
-    made_of_noise,
     material,
     surely_changed,
     without_echo,
@@ -39,7 +37,6 @@ from armid_ros.diagnosis.search.round import (
     rarity,
     Round,
     says_no_more,
-    what_happens_first,
     worth,
 )
 from armid_ros.diagnosis.search.trial import Candidate, Key, Step, Survey, Trial
@@ -86,34 +83,19 @@ class Look:
     ranking: tuple[Trial, ...]
     here: Round
 
-    @property
-    def width(self) -> float:
-        """
-        Largest gain of any candidate of this look: a lead of less decides nothing.
-
-        With a baseline it is the largest gain of a change, as what was there already is no measure
-        of one.
-
-        """
-        if self.here.before is None:
-            found: list[Trial | None] = list(self.survey.ranking)
-        else:
-            found = [_changes([trial], self.here)[0] for trial in self.ranking[:_COMPARED]]
-        return max((trial.gain for trial in found if trial is not None), default=0.0)
-
-    def step(self, width: float = 0.0) -> Step | None:
+    def step(self) -> Step | None:
         """
         Return the step that accepts the best candidate that has changed; None if none passes.
 
         A candidate that gains as much stays a rival of it, whether the permutation test says that
-        it has changed or not. A lead of less than `width` squares decides nothing.
+        it has changed or not.
 
         """
-        here = self.here.within(width)
+        here = self.here
         ahead = list(takewhile(lambda trial: not changed(trial, here), self.passing))
         if len(ahead) == len(self.passing):
             return None
-        passing = what_happens_first(self.passing[len(ahead) :], here)
+        passing = list(self.passing[len(ahead) :])
         parts = _joint_by_joint(passing, self.ranking, here)
         if parts:
             where = _touched(parts[0], here)
@@ -127,7 +109,9 @@ class Look:
         rivals = [
             trial
             for trial in tied
-            if trial is not winner and not says_no_more(trial, winner, here)
+            if trial is not winner
+            and not beaten(trial, winner, here)
+            and not says_no_more(trial, winner, here)
         ]
         best = {trial.candidate.effect.name: trial for trial in reversed(rivals)}
         likely = sorted(
@@ -412,11 +396,6 @@ def _passing(ranking: Sequence[Trial], closing: dict[Key, bool], here: Round) ->
     """Return the candidates that may be accepted, best first."""
     result: list[Trial] = []
     for trial in ranking:
-        if trial.candidate.key not in closing or made_of_noise(trial, here):
-            continue
-        fair = without_echo(trial, here)
-        if fair is not trial and explains_itself(trial, here):
-            continue
-        if acceptable(fair, here):
+        if trial.candidate.key in closing and acceptable(without_echo(trial, here), here):
             result.append(trial)
     return result

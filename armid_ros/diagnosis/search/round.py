@@ -191,8 +191,6 @@ class Round:
         Candidates that were tried, every shape for itself.
     before : Before or None
         Recordings from when nothing was wrong.
-    width : float
-        Largest gain of any candidate on what nothing explains: a lead of less decides nothing.
     known : Products or None
         Products of the nuisance columns, common to all trials of the round.
 
@@ -206,7 +204,6 @@ class Round:
     total: float | None = None
     tried: int = 1
     before: Before | None = None
-    width: float = 0.0
     known: Products | None = None
     power: float = 1.0
     since: bool = False
@@ -238,10 +235,6 @@ class Round:
     def residual(self) -> FloatArray:
         """Residual without its projection on the nuisance columns, shape (R, n)."""
         return self.projection.rest(self.problem.y)
-
-    def within(self, width: float) -> Round:
-        """Return the round in which a lead of less than ``width`` squares decides nothing."""
-        return self if width == self.width else replace(self, width=width)
 
     def without(self, place: int, value: float) -> Round:
         """Return the round without a nuisance column; its torque is added to the residual."""
@@ -293,7 +286,7 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     gains, z = lead(first, other)
     squares = (worth(first, here) - worth(other, here)) * here.currency
     z *= squares / gains if gains else 0.0
-    if squares <= here.width:
+    if squares <= 0.0:
         return False
     often = frequency(other, here) is Frequency.OFTEN and not other.candidate.effect.external
     if frequency(first, here) > Frequency.OFTEN and often:
@@ -318,19 +311,6 @@ def frequency(trial: Trial, here: Round) -> Frequency:
     return Frequency.SELDOM if seldom else Frequency.OFTEN
 
 
-def what_happens_first(passing: Sequence[Trial], here: Round) -> list[Trial]:
-    """Return trials, best first, but one that never changes behind an equivalent one that may."""
-    first, *others = passing
-    if frequency(first, here) is Frequency.NEVER:
-        for other in others:
-            happens = (
-                frequency(other, here) < Frequency.NEVER and not other.candidate.effect.external
-            )
-            if happens and not beaten(other, first, here) and contains(first, other, here):
-                return [other, first, *(trial for trial in others if trial is not other)]
-    return list(passing)
-
-
 def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -> Trial:
     """
     Return the simplest of the tied causes that leave no gap, or the best where each leaves one.
@@ -338,18 +318,18 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -
     Of several that are as good it is the commonest.
 
     One cause that explains everything is preferred to two that do it together, and one that
-    changes often to one that never or seldom does.
+    changes often to one that never or seldom does. What does not exclude a cause that seldom
+    changes may be excluded by another one that often does.
 
     """
     of_arm = [frequency(trial, here) for trial in tied if not trial.candidate.effect.external]
     least = min(of_arm, default=Frequency.NEVER)
-    tied = [trial for trial in tied if frequency(trial, here) <= least]
-    if len(tied) == 1:
-        return tied[0]
+    first, *others = (trial for trial in tied if frequency(trial, here) <= least)
+    tied = [first, *(trial for trial in others if not beaten(trial, first, here))]
     able = [trial for trial in tied if closing[trial.candidate.key]]
     if able:
         return simplest(able, here)
-    return simplest([t for t in tied if t.gain >= (1.0 - ROUNDING) * tied[0].gain], here)
+    return simplest([t for t in tied if t.gain >= (1.0 - ROUNDING) * first.gain], here)
 
 
 def _usual(trial: Trial) -> bool:
@@ -373,15 +353,8 @@ def simplest(tied: Sequence[Trial], here: Round) -> Trial:
     least = min(cost(trial, here.settings) for trial in tied)
     simple = [t for t in tied if cost(t, here.settings) < least + 0.5]
     most = max(trial.gain for trial in simple)
-    close = max(here.settings.thresholds.tie * most, here.width)
-    return min((t for t in simple if t.gain >= most - close), key=rarity)
-
-
-def undecided(first: Trial, ranking: Sequence[Trial], here: Round) -> bool:
-    """Return whether a cause was accepted for a lead over a likelier one that decides nothing."""
-    close = [t for t in ranking if t.gain > 0.0 and 0.0 <= first.gain - t.gain <= here.width]
-    own = round(cost(first, here.settings)), rarity(first)
-    return any((round(cost(t, here.settings)), rarity(t)) < own for t in close)
+    close = (1.0 - here.settings.thresholds.tie) * most
+    return min((t for t in simple if t.gain >= close), key=rarity)
 
 
 def rarity(trial: Trial) -> float:
