@@ -55,6 +55,12 @@ _ASSUMED = (
     'nothing repeats in some recordings: their noise is assumed from what rows differ by from '
     'their neighbours; two equal periods would measure it'
 )
+#: Fault where predicting no torque at all would be better.
+_NO_MODEL = (
+    'the model leaves {:.3g} times the torque of the baseline itself, more than no model would: '
+    'it is that of another arm, or has other units; identify the arm from the baseline, and give '
+    'that model'
+)
 #: Error where a partner was set and its ties would be left out.
 _ALONE = (
     'the settings have a partner, and nothing explains ties to it: call diagnose_beside of '
@@ -148,6 +154,8 @@ def diagnose(
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
+    if known is not None and known.errors[0] > 1.0:
+        return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
     asked = _Asked(arm, given, prepared, known, validate, settings, rng, tell)
     if settings.partner is not None and tied is not None:
         tell(0.2, f'ties to {settings.partner.source}')
@@ -238,6 +246,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
+        doubt=chosen.doubt,
     )
 
 

@@ -165,6 +165,14 @@ def test_a_model_of_another_arm_is_doubted(bench):
     assert 'is it the model' not in found.summary
 
 
+def test_a_model_that_is_worse_than_none_is_refused(bench):
+    heavy = bench.arm.with_theta(np.r_[3.0 * bench.robot.rigid_parameters, bench.arm.theta[20:]])
+    days = [bench.recordings(seed=3), bench.recordings(seed=4)]
+    found = diagnose(heavy, days[1], baseline=days[0], rng=np.random.default_rng(0))
+    assert found.verdict == 'bad_data'
+    assert 'more than no model would' in found.summary
+
+
 @pytest.mark.parametrize(
     ('since', 'remedy'),
     [(0, 'record with the joint held still'), (1000, 'leave that time out')],

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What to do next is one piece of advice: look at the robot, then record what tells names."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.effects import CATALOGUE
+from armid_ros.estimate import ParameterName
 import pytest
 
 LINK = (Rival('link_inertia', ('wrist',)),)
@@ -19,6 +21,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
         verdict=verdict,
         left=(),
         not_visible=(),
+        doubt='',
         arm=SimpleNamespace(effects=effects),
         explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
     )
@@ -39,6 +42,25 @@ def test_a_payload_sends_a_person_to_the_hand_first():
     first, *others = next_steps(diagnosis('payload', ('wrist',)))
     assert first.startswith('Look at wrist first: the hand, the gripper, the tool')
     assert others == ['Use model.yaml in simulation and control; keep these bags to compare with.']
+
+
+def test_the_centre_of_a_load_is_said_where_it_is_determined():
+    units = ('kg', 'kg m', 'kg m', 'kg m')
+    names = [ParameterName(n, 'wrist', u) for n, u in zip('mxyz', units, strict=True)]
+    found = diagnosis('payload', ('wrist',))
+    load = replace(found.findings[0], parameters=tuple(names), weighs=True)
+    values, std = (0.3, -0.054, 0.0, 0.003), (0.003, 0.0006, 0.0006, 0.0006)
+    found.findings = (replace(load, values=values, std=std),)
+    place = 'the load is centred at (-0.1800 +- 0.0039, 0.0000 +- 0.0039, 0.0100 +- 0.0039) m'
+    assert place in next_steps(found)[0]
+    found.findings = (replace(load, values=values, std=(0.3, *std[1:])),)
+    assert 'centred' not in next_steps(found)[0]
+
+
+def test_a_model_that_is_poor_itself_is_not_to_be_used():
+    found = diagnosis('payload', ('wrist',))
+    found.doubt = 'In the baseline itself the model leaves 30 % of the torque of the arm.'
+    assert next_steps(found)[-1].startswith('Identify the arm anew')
 
 
 def test_friction_of_a_model_without_any_is_nothing_to_look_at():

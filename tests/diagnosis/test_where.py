@@ -39,3 +39,13 @@ def test_a_spring_is_in_proportion_to_position_in_the_units_of_its_joint(urdf, j
     assert tuple(by_name[name] for name in order) == units
     position = found.axes[0]
     np.testing.assert_allclose(position.means, 30.0 * position.centres, rtol=1e-6, atol=1e-9)
+
+
+def test_an_offset_is_a_constant_and_in_proportion_to_nothing():
+    bench = Bench(URDF)
+    data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
+    residual = [np.full_like(part.torque, [0.0, 1.2]) for part in data]
+    noise = tuple(np.full(2, 0.1) for _ in data)
+    (found,) = locate(bench.arm, Evidence.over_noise(data, noise), residual, np.ones(2))
+    assert found.joint == bench.robot.joints[1]
+    assert found.signature == 'in a constant (100 % of its power)'

@@ -10,7 +10,7 @@ from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.diagnosis.verdict.naming import _separating, _without_later
+from armid_ros.diagnosis.verdict.naming import _rivals, _separating, _without_later
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
@@ -176,6 +176,7 @@ def test_small_print_of_no_size_is_not_read_out(bench, share, mentioned):
             (Rival('link_inertia', ('elbow',)), Rival('payload', ('shoulder',))),
             'it from link inertia of elbow or payload of shoulder.',
         ),
+        ((Rival('torque_offset', ('shoulder',)),), 'it from one of shoulder.'),
     ],
 )
 def test_what_could_stand_in_another_joint_is_said_with_it(bench, rivals, said):
@@ -192,6 +193,18 @@ def test_an_experiment_names_the_joints_of_both():
     assert same.endswith('elbow: the same motion with and without the tool.')
     other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
     assert other.startswith('To separate torque offset of elbow from link inertia of wrist: ')
+
+
+def test_the_same_name_in_another_joint_is_a_rival():
+    def trial(name, *joints):
+        effect = SimpleNamespace(said_as=name, joints=joints)
+        return SimpleNamespace(candidate=SimpleNamespace(effect=effect), gain=1.0)
+
+    others = trial('payload', 'elbow'), trial('payload', 'wrist'), trial('torque_gain', 'elbow')
+    step = SimpleNamespace(trial=trial('payload', 'wrist'), rivals=others)
+    arm = SimpleNamespace(robot=SimpleNamespace(joints=('elbow', 'wrist')))
+    found = _rivals([step], {'torque_gain'}, ('wrist',), arm)
+    assert found == (Rival('payload', ('elbow',)),)
 
 
 def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():

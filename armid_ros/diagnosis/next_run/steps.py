@@ -13,7 +13,15 @@ from __future__ import annotations
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.diagnosis.verdict.naming import shown_best, two_names
+from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.fitting.identifiability import excludes_zero
+
+_USE = 'Use model.yaml in simulation and control; keep these bags to compare with.'
+_ANEW = (
+    'Identify the arm anew before the model is used in simulation or control: it is poor on the '
+    'baseline itself.'
+)
 
 
 def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '') -> list[str]:
@@ -44,7 +52,7 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
     if verdict in ('named', 'consistent'):
-        steps.append('Use model.yaml in simulation and control; keep these bags to compare with.')
+        steps.append(_ANEW if diagnosis.doubt else _USE)
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
@@ -62,8 +70,20 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
         where = ', '.join(one.joints) or 'the whole arm'
         name = one.name.replace('_', ' ')
         head = f'Look at {where}' if one is own else f'If it is {name}, look at {where}'
-        steps.append(f'{head}: {what}.')
+        place = _centre(finding) if one is own else ''
+        steps.append(f'{head}: {what}{place}.')
     return steps
+
+
+def _centre(finding: Finding) -> str:
+    """Say where the centre of mass of a load is; nothing where the data do not determine it."""
+    rows = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    mass = [row for row in rows if row[0].unit == 'kg']
+    moments = [row for row in rows if row[0].unit == 'kg m']
+    if not (finding.weighs and mass and len(moments) == 3 and excludes_zero(*mass[0][1:])):
+        return ''
+    at = ', '.join(as_sure(value / mass[0][1], std / abs(mass[0][1])) for _, value, std in moments)
+    return f'; the load is centred at ({at}) m in the frame of that link'
 
 
 def _first(looks: list[str]) -> list[str]:

@@ -208,6 +208,8 @@ class Diagnosis:
         The floor of the gap in words: the noise, the model's own misfit, or an estimate of it.
     harmful : bool
         Whether the model is not patched, as the names would make it worse in some joint.
+    doubt : str
+        Why the model itself may be wrong, a sentence; empty if it need not be.
 
     """
 
@@ -227,6 +229,7 @@ class Diagnosis:
     notes: tuple[str, ...]
     baseline: str
     harmful: bool = False
+    doubt: str = ''
 
     def __repr__(self) -> str:
         """Return the verdict and its sentence."""

@@ -60,7 +60,7 @@ def findings(
         ]
         places = [*order, '']
         rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
-        rivals = _rivals(steps, set(merged), arm)
+        rivals = _rivals(steps, set(merged) - {name}, joints, arm)
         result.append(
             Finding(
                 name,
@@ -201,14 +201,24 @@ def _without_later(steps: Sequence[Step]) -> list[Step]:
     return result[::-1]
 
 
-def _rivals(steps: Sequence[Step], named: set[str], arm: ArmModel) -> tuple[Rival, ...]:
-    """Return the rivals of a name, the largest gain first, with their joints."""
+def _rivals(
+    steps: Sequence[Step], others: set[str], joints: Sequence[str], arm: ArmModel
+) -> tuple[Rival, ...]:
+    """
+    Return the rivals of a name in some joints, the largest gain first, with their joints.
+
+    The same name in another joint is a rival as well; the names of other findings are none.
+
+    """
     best: dict[str, list[Trial]] = {}
     for step in steps:
         here: dict[str, Trial] = {}
         for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
-            here.setdefault(trial.candidate.effect.said_as, trial)
-        for name in here.keys() - named:
+            effect = trial.candidate.effect
+            same = effect.said_as == step.trial.candidate.effect.said_as
+            if not (same and set(effect.joints) <= set(joints)):
+                here.setdefault(effect.said_as, trial)
+        for name in here.keys() - others:
             best.setdefault(name, []).append(here[name])
     order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
     return tuple(

@@ -17,6 +17,8 @@ import numpy as np
 _BINS = 16
 #: A quantity is named if the means of its bins hold this share of the residual's power.
 _TELLING = 0.15
+#: Means whose squares are off a constant, or a straight line, by less than this share are one.
+_CURVED = 0.15
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,9 @@ def _in_words(axes: Sequence[Axis]) -> str:
     straight = np.polyval(line, best.centres)
     size = float(np.sum(best.means**2))
     share = f'{100 * best.share:.0f} % of its power'
-    if np.sum((best.means - straight) ** 2) < 0.15 * size:
+    if np.sum((best.means - best.means.mean()) ** 2) < _CURVED * size:
+        return f'in a constant ({share})'
+    if np.sum((best.means - straight) ** 2) < _CURVED * size:
         return f'in proportion to {best.name} ({share})'
     if best.name == 'velocity' and _jumps(best):
         return f'a jump with the direction of motion ({share})'

@@ -271,7 +271,7 @@ def _weight(finding: Finding) -> str:
     mass, std = _mass(finding)
     if not abs(mass) > HALF_WIDTH * std:
         return 'whose mass these data do not determine'
-    return f'of {_as_sure(abs(mass), std)} kg'
+    return f'of {as_sure(abs(mass), std)} kg'
 
 
 def _put_down(finding: Finding) -> str:
@@ -287,7 +287,7 @@ def _mass(finding: Finding) -> tuple[float, float]:
 
 
 def _with_degrees(value: float, std: float, unit: str) -> str:
-    text = f'{_as_sure(value, std)} {unit}'.strip()
+    text = f'{as_sure(value, std)} {unit}'.strip()
     if unit == 'rad':
         return f'{text}, {np.rad2deg(value):.1f} degrees'
     return text
@@ -339,7 +339,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
 
 def _tie(finding: Finding, joint: str, segment: str) -> str:
     shown = [
-        f'{p.name.replace("_", " ")} {_as_sure(value, std)} {p.unit}'
+        f'{p.name.replace("_", " ")} {as_sure(value, std)} {p.unit}'
         for p, value, std in finding.values_of(joint)
     ]
     return f'{segment} ({", ".join(shown)})'
@@ -348,14 +348,15 @@ def _tie(finding: Finding, joint: str, segment: str) -> str:
 def _others(finding: Finding) -> str:
     """Return the rivals of a name in words, with their joints if any rival has other joints."""
     elsewhere = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
-    return ' or '.join(
-        rival.name.replace('_', ' ')
-        + (f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else '')
-        for rival in finding.rivals
-    )
+    words = []
+    for rival in finding.rivals:
+        place = f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else ''
+        same = rival.name == finding.name
+        words.append(('one' if same else rival.name.replace('_', ' ')) + place)
+    return ' or '.join(words)
 
 
-def _as_sure(value: float, std: float) -> str:
+def as_sure(value: float, std: float) -> str:
     """Return a value and the half-width of its 95 % interval, to two digits of the latter."""
     wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
