@@ -29,6 +29,9 @@ import numpy as np
 _WALK = 3.0
 #: Rows of which a torque that nobody recorded the motion of is told.
 _ROWS = 600
+#: Rows in a part of a recording below which nothing is told of its torque, and the share of what
+#: a torque varies by while its joint moves that it does while the joint moves unseen.
+_LEAST, _LIVELY = 100, 0.5
 
 
 def dead_encoders(
@@ -67,10 +70,11 @@ def dead_encoders(
                 f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; '
                 + ('record again' if always else 'leave that time out')
             )
-        elif always and robot is not None and _moves_unseen(robot, motions, j):
+        elif robot is not None and _moves_unseen(robot, motions, j, (t[start], t[stop - 1])):
             yield (
                 f'{said}, while its torque is not what weight and the other joints make of a '
-                'joint at rest: its encoder is dead; record again'
+                'joint at rest: its encoder is dead; '
+                + ('record again' if always else 'leave that time out')
             )
     yield from _dead_velocities(recording, source)
 
@@ -125,23 +129,30 @@ def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
     return max(float(np.ptp(way) - walk), 0.0)
 
 
-def _moves_unseen(robot: Robot, motions: Sequence[Motion], joint: int) -> bool:
+def _moves_unseen(
+    robot: Robot, motions: Sequence[Motion], joint: int, time: tuple[float, float]
+) -> bool:
     """
-    Return whether the torque of a joint that reads the same is none of a joint at rest.
+    Return whether the torque of a joint that reads the same for a time is none of one at rest.
 
     A joint at rest takes what its links weigh and what the other joints do to them. Its friction
     answers to that: the drive gives what is left, none at least and all at most. What is described
     is within a factor of two, so that a joint at rest is off it by no more than it varies itself.
     One that is off by more, and by more than noise of its sensor, is at rest where a good model of
-    that describes it, with free masses and a share of the friction of other joints.
+    that describes it, with free masses and a share of the friction of other joints. A joint that
+    moves before or after varies as much then, and no more by far.
 
     """
-    motion = _thinned(motions)
-    if motion is None:
+    within, other = _divided(motions, time)
+    motion = _thinned(within)
+    if motion is None or len(motion) < min(_LEAST, sum(len(one) for one in motions)):
         return False
     assert motion.tau is not None
     described, torque = inverse_dynamics(robot, motion)[:, joint], motion.tau[:, joint]
     size, off = float(np.std(torque)), float(np.std(torque - described))
+    moving = [one.tau[:, joint] for one in other if one.tau is not None]
+    if moving and size < _LIVELY * float(np.std(np.concatenate(moving))):
+        return False
     if not off > float(np.std(described)) + sensor_noise(robot, None)[joint]:
         return False
     others = [k for k in range(motion.n_joints) if k != joint]
@@ -152,6 +163,20 @@ def _moves_unseen(robot: Robot, motions: Sequence[Motion], joint: int) -> bool:
     left = left_of_blocks(columns, (torque - described)[:, np.newaxis] / size)[:, 0]
     smooth = float(np.mean(left**2)) - _white(left)
     return bool(100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor)
+
+
+def _divided(
+    motions: Sequence[Motion], time: tuple[float, float]
+) -> tuple[list[Motion], list[Motion]]:
+    """Return the parts of motions within a time, and those before and after it."""
+    within, other = [], []
+    for motion in motions:
+        first, last = np.searchsorted(motion.t, [time[0], time[1] + 1e-9])
+        pieces = slice(0, first), slice(first, last), slice(last, len(motion))
+        before, inside, after = (motion.select(np.arange(len(motion))[one]) for one in pieces)
+        within.append(inside)
+        other += [one for one in (before, after) if len(one)]
+    return within, other
 
 
 def _white(values: FloatArray) -> float:

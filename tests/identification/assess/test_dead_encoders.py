@@ -66,6 +66,24 @@ def test_a_torque_of_no_joint_at_rest_shows_a_dead_encoder(arm, joint, seed):
     assert 'its torque is not what' in text
 
 
+@pytest.mark.parametrize('joint', [4, 5])
+def test_an_encoder_that_dies_during_a_recording_is_dead_from_then_on(arm, joint):
+    (text,) = said(arm.robot, stuck(record(arm, 1), joint, since=1000, velocity=False))
+    assert f'the position of {arm.robot.joints[joint]} stays at' in text
+    assert 'from 10.000 s to 19.9' in text
+    assert text.endswith('its encoder is dead; leave that time out')
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+def test_a_joint_that_waits_for_the_others_is_not_dead(arm, joint):
+    moves, waits = record(arm, 1), record(arm, 1, held=joint)
+    q, dq, tau = (
+        np.concatenate([getattr(moves, name)[:1000], getattr(waits, name)[1000:]])
+        for name in ('q', 'dq', 'tau')
+    )
+    assert said(arm.robot, replace(moves, q=q, dq=dq, tau=tau)) == []
+
+
 @pytest.mark.parametrize('joint', JOINTS)
 def test_a_velocity_that_stays_while_its_position_moves_is_dead(arm, joint):
     recording = record(arm, 1)
