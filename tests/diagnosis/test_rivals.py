@@ -75,6 +75,18 @@ def test_a_load_is_at_the_end_of_an_arm_where_it_may_be(bench):
     assert likeliest([inside], {}, here) is inside
 
 
+def test_what_another_cause_excludes_is_in_no_tie_with_it(bench):
+    """A load of an inner link has to take more than a gain by far, and one at the end has not."""
+    gains = 10.0 + np.random.default_rng(0).normal(size=36)
+    gain = Known(bench, 'torque_gain', 0.8 * gains)
+    at_end, inside = (Known(bench, 'payload', gains, 9.0) for _ in range(2))
+    inside.candidate.effect = CATALOGUE['payload'].on(bench.robot, ('shoulder',))
+    here = asked(400.0, True)
+    assert not beaten(gain, inside, here) and beaten(gain, at_end, here)
+    closing = {one.candidate.key: True for one in (gain, at_end, inside)}
+    assert likeliest([inside, at_end, gain], closing, here) is at_end
+
+
 @pytest.mark.parametrize(('power', 'wanted'), [(1e4, True), (4e4, False)])
 def test_what_the_values_of_the_leading_cause_cost_is_no_lead(bench, power, wanted):
     """Each costs a share of what is to be explained, and a person counts for ten more."""
