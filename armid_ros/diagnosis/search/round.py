@@ -326,6 +326,8 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -
     least = min(of_arm, default=Frequency.NEVER)
     first, *others = (trial for trial in tied if frequency(trial, here) <= least)
     tied = [first, *(trial for trial in others if not beaten(trial, first, here))]
+    if len(tied) == 1:
+        return first
     able = [trial for trial in tied if closing[trial.candidate.key]]
     if able:
         return simplest(able, here)
