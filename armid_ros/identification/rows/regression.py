@@ -1,6 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The linear problem of an identification: decimated torques and base columns, joint by joint."""
+"""
+The linear problem of an identification: decimated torques and base columns, joint by joint.
+
+Where a joint reverses between two samples nobody knows when its dry friction turned over, nor
+what it was if the joint stopped for a moment: anything between its limits. A wrong sign there is
+against the acceleration at every reversal, so it does not average out but takes something off the
+inertia. Torques and columns are therefore both interpolated across these samples before they are
+filtered, which leaves their equation as true as it was without them.
+
+"""
 
 from __future__ import annotations
 
@@ -183,14 +192,16 @@ def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatA
     ndarray, shape (M, n)
 
     """
+    unsure = unsure_samples(arm, motion)
     if not all(effect.instantaneous for effect in arm.effects):
-        return decimate(arm.torque(motion), used)
-    margin = arm.neighbours(1.0 / used.rate_hz)
+        return decimate(bridged(arm.torque(motion), unsure), used)
+    margin = max(arm.neighbours(1.0 / used.rate_hz), _longest(unsure))
     blocks = []
     for samples in _overlapping(len(motion), used):
         around = slice(max(0, samples.start - margin), samples.stop + margin)
         inside = slice(samples.start - around.start, samples.stop - around.start)
-        blocks.append(decimate(arm.torque(motion.select(around))[inside], used))
+        torque = bridged(arm.torque(motion.select(around)), unsure[around])
+        blocks.append(decimate(torque[inside], used))
     return np.concatenate(blocks)
 
 
@@ -200,7 +211,8 @@ def _rows(
     """Return the rows of a stretch: decimated motion and torque, and which say something."""
     kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
     assert motion.tau is not None
-    decimated = motion.select(kept).with_torque(decimate(motion.tau, used))
+    tau = bridged(motion.tau, unsure_samples(arm, motion))
+    decimated = motion.select(kept).with_torque(decimate(tau, used))
     return decimated, ~_at_rest(arm, motion)[kept]
 
 
@@ -241,12 +253,14 @@ def filtered_columns(
     """
     result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
     sources = _sources(arm, columns)
+    unsure = unsure_samples(arm, motion)
     for source in sources:
         if not source.instantaneous:
-            whole = source.columns(motion)[:, :, source.inner]
+            whole = bridged(source.columns(motion)[:, :, source.inner], unsure)
             result[:, :, source.outer] = decimate(whole, used)
     margin = arm.neighbours(1.0 / used.rate_hz)
     stride = used.smooth_stride if margin == 0 else 1
+    margin = max(margin, _longest(unsure))
     first = 0
     for samples in _overlapping(len(motion), used):
         around = slice(max(0, samples.start - margin), samples.stop + margin)
@@ -255,12 +269,13 @@ def filtered_columns(
         count = len(decimated_samples(samples.stop - samples.start, used))
         for source in sources:
             if source.smooth and stride > 1:
-                block = source.columns(part.select(slice(None, None, stride)))
+                few = motion.select(slice(samples.start, samples.stop, stride))
+                block = source.columns(few)  # interpolation would hardly change what is smooth
                 filtered = decimate(block[:, :, source.inner], used, stride)
                 result[first : first + count, :, source.outer] = filtered
             elif source.instantaneous:
-                block = source.columns(part)[inside, :, source.inner]
-                result[first : first + count, :, source.outer] = decimate(block, used)
+                block = bridged(source.columns(part)[:, :, source.inner], unsure[around])
+                result[first : first + count, :, source.outer] = decimate(block[inside], used)
         first += count
         tick(samples.stop - samples.start)
     result.setflags(write=False)  # so that nobody who freezes it has to copy it
@@ -308,12 +323,64 @@ def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
     return sources
 
 
+def unsure_samples(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
+    """Return the samples next to a reversal of joints that have dry friction, shape (N, n)."""
+    held = _held(arm, motion)
+    turned = np.diff(np.sign(motion.dq[:, held]), axis=0) != 0.0
+    unsure = np.zeros(motion.q.shape, dtype=bool)
+    unsure[1:, held] = turned
+    unsure[:-1, held] |= turned
+    return unsure & ~_at_rest(arm, motion)
+
+
+def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
+    """
+    Interpolate values of each joint across its unsure samples, in a line.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N, n, ...)
+        Torques or columns.
+    unsure : ndarray of bool, shape (N, n)
+        What to replace; at an end, by the nearest sample that is sure.
+
+    Returns
+    -------
+    ndarray, shape (N, n, ...)
+
+    """
+    result = values
+    for joint in np.flatnonzero(unsure.any(axis=0) & ~unsure.all(axis=0)):
+        if result is values:
+            result = values.copy()
+        own, gaps = values[:, joint], np.flatnonzero(unsure[:, joint])
+        sure = np.flatnonzero(~unsure[:, joint])
+        after = np.searchsorted(sure, gaps)
+        left = sure[np.maximum(after - 1, 0)]
+        right = sure[np.minimum(after, len(sure) - 1)]
+        share = (gaps - left) / np.maximum(right - left, 1)
+        share = share.reshape(-1, *(1,) * (own.ndim - 1))
+        result[gaps, joint] = own[left] + share * (own[right] - own[left])
+    return result
+
+
+def _longest(unsure: npt.NDArray[np.bool_]) -> int:
+    """Return how many samples the longest run of unsure ones has."""
+    sure = ~np.pad(unsure, ((1, 1), (0, 0)))
+    return max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
+
+
+def _held(arm: ArmModel, motion: Motion) -> list[int]:
+    """Return the joints that dry friction may hold, as columns of the motion."""
+    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
+    return [motion.joints.index(name) for name in held]
+
+
 def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
     """Return where joints stand still that dry friction may hold, shape (N, n)."""
-    held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
     rest = np.zeros(motion.q.shape, dtype=bool)
     shortest = REST_TIME / float(motion.t[1] - motion.t[0])
-    for joint in [motion.joints.index(name) for name in held]:
+    for joint in _held(arm, motion):
         speed = np.abs(motion.dq[:, joint])
         slow = np.concatenate([[False], speed < REST_SPEED * speed.max(), [False]])
         edges = np.flatnonzero(np.diff(slow.astype(int))).reshape(-1, 2)

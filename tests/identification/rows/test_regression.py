@@ -1,13 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Columns of long motions, made in parts: the same as made at once."""
+"""The linear problem: columns made in parts, and what dry friction hides at reversals."""
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.rows.regression import filtered_columns
+from armid_ros.identification import identify
+from armid_ros.identification.rows.regression import bridged, filtered_columns, unsure_samples
 from armid_ros.identification.rows.signals import Conditioning, decimate
 from armid_ros.motion import Motion
+from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
+from armid_ros.simulation.run import simulate
+from armid_ros.simulation.sensors import Sensors
 import numpy as np
 import pytest
 
@@ -52,7 +56,8 @@ def test_columns_made_in_parts_are_those_made_at_once(robot, long_motion, values
     used = Conditioning(1000.0, 50.0, 20)
     chosen = np.array([9 + len(values), 3, 9, 10])
     parts = filtered_columns(arm, chosen, long_motion, used)
-    whole = decimate(arm.columns(long_motion)[:, :, chosen], used)
+    columns = arm.columns(long_motion)[:, :, chosen]
+    whole = decimate(bridged(columns, unsure_samples(arm, long_motion)), used)
     np.testing.assert_allclose(parts, whole, atol=2e-5 * np.abs(whole).max())
 
 
@@ -66,3 +71,41 @@ def test_the_rigid_body_needs_no_more_samples_than_it_has_content(arm):
     whole = decimate(arm.columns(motion)[:, :, rigid], used)
     scale = np.abs(whole).max(axis=(0, 1))
     np.testing.assert_array_less(np.abs(strided - whole).max(axis=(0, 1)), 3e-3 * scale + 1e-12)
+
+
+@pytest.mark.parametrize(('kind', 'inertia'), [('prismatic', 2.0), ('revolute', 0.1)])
+def test_a_joint_that_stops_as_it_reverses_loses_no_inertia(kind, inertia):
+    """Friction is between its limits while a joint stands, which is not its sign times a level."""
+    robot = load_robot(URDF.replace('revolute', kind).replace('0 1 0', '0 0 1'))
+    structure, arm = ArmModel(robot), ArmModel(robot)
+    for name, value in {'viscous_friction': 2.0, 'coulomb_friction': 2.5}.items():
+        structure = structure.with_effect(make_effect(name, robot), [0.0])
+        arm = arm.with_effect(make_effect(name, robot), [inertia * value])
+    structure = structure.with_effect(make_effect('torque_offset', robot), [0.0])
+    rng = np.random.default_rng(1)
+    sensors = Sensors(torque_noise=0.025 * inertia)
+    run = simulate(arm, _slow_swing(robot.joints), rng=rng, sensors=sensors)
+    recording = Recording(joints=run.joints, t=run.t, q=run.q, tau=run.tau)
+    result = identify(structure, [recording], rng=rng)
+    truth = result.base.values(np.append(arm.theta, 0.0))
+    error = (result.estimate.values - truth) / result.estimate.std
+    assert np.abs(error).max() < 3.0
+
+
+def _slow_swing(joints):
+    """Return 20 s at 1 kHz with a reversal every two seconds."""
+    t = np.arange(20_001) * 1e-3
+    w, size = 2.0 * np.pi * np.array([0.25, 0.6]), np.array([0.25, 0.02])
+    angle = np.outer(t, w)
+    parts = np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)
+    return Motion(joints, t, *((part @ size)[:, None] for part in parts))
+
+
+def test_what_is_unsure_is_interpolated_the_others_stay():
+    """Each joint has samples of its own; at an end the nearest sample stands in."""
+    values = np.array([[7.0, 1.0], [9.0, 9.0], [2.0, 9.0], [3.0, 4.0]])
+    unsure = np.array([[True, False], [True, True], [False, True], [False, False]])
+    np.testing.assert_allclose(bridged(values, unsure), [[2, 1], [2, 2], [2, 3], [3, 4]])
+    np.testing.assert_allclose(
+        bridged(values[:, :, None], unsure)[..., 0], bridged(values, unsure)
+    )
