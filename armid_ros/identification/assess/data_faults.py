@@ -27,7 +27,8 @@ from armid_ros.identification.assess.hypotheses import (
     Reversed,
     unit_of,
 )
-from armid_ros.identification.assess.mistakes import effort_factor, find_mistake
+from armid_ros.identification.assess.joint_units import units_beside_model, units_beyond_drives
+from armid_ros.identification.assess.mistakes import effort_factor, find_mistake, slow_motions
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.rows.checks import (
     check_motion,
@@ -121,6 +122,7 @@ def check_data(
     }
     blind = [x for one in recordings for x in dead_encoders(arm.body, one, motions[one.source])]
     mistaken = blind or _mistaken(arm, recordings, used, before)
+    mistaken = mistaken or _units(arm, recordings, used, before)
     if mistaken:
         return mistaken, []
     faults = [*_time_base(recordings, _band(used, data)), *_laws(arm, data)]
@@ -168,6 +170,20 @@ def _mistaken(
         return []
     (sentences,) = said
     return [', or '.join(sentences)] if all(sentences) else []
+
+
+def _units(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
+) -> list[str]:
+    """Say of which joints torques are in another unit, as the model or else drives show."""
+    if any(one.partner is not None for one in recordings):
+        return []
+    now, then = (
+        [motion for one in some for motion in slow_motions(one, used)]
+        for some in (recordings, before)
+    )
+    beside = list(units_beside_model(arm, now, then))
+    return beside or list(units_beyond_drives(arm.robot, recordings, now))
 
 
 def _since(

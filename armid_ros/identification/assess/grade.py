@@ -19,6 +19,7 @@ from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
+from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.identify import Fit, Identification, Score
@@ -85,7 +86,7 @@ def grade(
     seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
     reasons = [
         *(_Reason('unusable', _sentence(text)) for texts in blind.values() for text in texts),
-        *_mistakes(result, description, seeing),
+        *_of_recordings(result, description, validation, seeing),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
         *_errors(result, validation),
@@ -98,6 +99,21 @@ def grade(
 def by_error(error: float) -> Word:
     """Return the grade of a relative torque error on data that were not fitted [%]."""
     return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'
+
+
+def _of_recordings(
+    result: Identification,
+    description: ArmModel,
+    validation: Mapping[str, Sequence[Fit]],
+    recordings: Sequence[Recording],
+) -> list[_Reason]:
+    """Say what recordings show to be wrong; limits of drives tell where the body does not."""
+    mistakes = list(_mistakes(result, description, recordings))
+    if mistakes:
+        return mistakes
+    motions = [fit.motion for fit in _fits(result, validation)]
+    units = units_beyond_drives(description.robot, recordings, motions)
+    return [_Reason('poor', _sentence(text)) for text in units]
 
 
 def _mistakes(

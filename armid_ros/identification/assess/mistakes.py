@@ -112,13 +112,13 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
         None where the data are best as they are.
 
     """
-    slow = _slow_motions(recording, used)
+    slow = slow_motions(recording, used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
     tried = list(hypotheses(robot))
     faults = faulty_samples(recording)
     if faults is not None:
-        without = tuple(_slow_motions(recording.select(faults.sound), used))
+        without = tuple(slow_motions(recording.select(faults.sound), used))
         tried.append(Faulty(faults.first, faults.count, without))
     found = _best(robot, tried, _described(robot, slow), fitted=False)
     if found is not None:
@@ -140,7 +140,7 @@ def effort_factor(
     too short, or the efforts do not follow the description.
 
     """
-    slow = [motion for one in recordings for motion in _slow_motions(one, used)]
+    slow = [motion for one in recordings for motion in slow_motions(one, used)]
     found = _described(robot, slow)(OtherUnit())
     if found is None or not found[0].shared[0] > 0.0:
         return None
@@ -227,7 +227,7 @@ def _judged(
     return rows
 
 
-def _slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
+def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
     """Return the stretches of a recording, with what is in the band of the motion alone."""
     result = []
     for motion in segments(recording, used):

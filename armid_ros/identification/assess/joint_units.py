@@ -1,0 +1,121 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Torque of one joint in another unit than N m, where the described body does not show it.
+
+A joint whose torque is mostly friction, as that of a wrist, fits as well in any unit, for its
+friction is free; see `mistakes`. The limit of its drive shows it, or a model with its friction.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.identification.assess.hypotheses import InUnit
+from armid_ros.identification.rows.checks import TORQUE_UNITS
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+
+#: Half of the readings of a joint at so many times the limit of its drive are in another unit: the
+#: smallest factor of one is a hundred, of which this is half in the logarithm, and no drive gives
+#: as much.
+_BEYOND_DRIVE = 10.0
+#: A joint below this share of its top speed may be held by its friction, with any torque.
+_SLOW = 0.05
+#: A factor is that of a unit if it is within this factor of it, as in `hypotheses`.
+_NEAR = 1.5
+#: Correlation of a torque with that of the model from which its factor is clear: four fifths of
+#: the power follow the model.
+_FOLLOWS = 0.9
+
+
+def units_beyond_drives(
+    robot: Robot, recordings: Sequence[Recording], motions: Sequence[Motion]
+) -> Iterator[str]:
+    """
+    Say whose torque is in another unit, as the limits of drives show.
+
+    Where most joints are beyond their limits, or the described body needs as much, it is
+    the limits of the description that are wrong.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    recordings : sequence of Recording
+        The data.
+    motions : sequence of Motion
+        Their filtered motions.
+
+    """
+    measured = [recording.tau for recording in recordings if recording.tau is not None]
+    if not measured or not motions:
+        return
+    usual = np.median(np.abs(np.concatenate(measured)), axis=0)
+    known = np.isfinite(robot.torque_limit) & (robot.torque_limit > 0.0)
+    beyond = known & (usual > _BEYOND_DRIVE * robot.torque_limit)
+    if 2 * np.sum(beyond) > np.sum(known):
+        return
+    needed = np.max([np.abs(inverse_dynamics(robot, one)).max(axis=0) for one in motions], axis=0)
+    for joint in np.flatnonzero(beyond & (needed < robot.torque_limit)).tolist():
+        limit, unit = robot.torque_limit[joint], robot.torque_units[joint]
+        units = [name for name, per in TORQUE_UNITS.items() if usual[joint] / per < limit]
+        in_unit = ' or '.join(one for one in units if one != 'kN m') or 'another unit'
+        yield (
+            f'the torque of {robot.joints[joint]} seems to be in {in_unit} instead of N m: half '
+            f'of its readings are beyond {usual[joint]:.3g}, its drive gives {limit:.4g} {unit}; '
+            'convert it, or correct the limit in the description'
+        )
+
+
+def units_beside_model(
+    arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
+) -> Iterator[str]:
+    """
+    Say whose torque is in another unit, as a model with its friction shows.
+
+    Where most joints are, it may be the masses of the model that are wrong.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model.
+    motions : sequence of Motion
+        Filtered motions with torque.
+    before : sequence of Motion
+        The same from when nothing was wrong: factors are those since then.
+
+    """
+    factors, then = _factors(arm, motions), _factors(arm, before)
+    factors /= np.where(then > 0.0, then, 1.0)
+    found = [
+        InUnit(joint, unit).sentence(arm.robot)
+        for joint, factor in enumerate(factors)
+        for unit, per in TORQUE_UNITS.items()
+        if per / _NEAR < factor < per * _NEAR
+    ]
+    if 2 * len(found) <= arm.robot.n_joints:
+        yield from found
+
+
+def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:
+    """Return the slope of torques on those of the model, (n,); zero where it is not clear."""
+    factors = np.zeros(arm.robot.n_joints)
+    if not motions:
+        return factors
+    speed = np.abs(np.concatenate([motion.dq for motion in motions]))
+    expected = np.concatenate([arm.torque(motion) for motion in motions])
+    measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+    for joint in range(len(factors)):
+        moves = speed[:, joint] >= _SLOW * speed[:, joint].max()
+        x, y = (torque[moves, joint] for torque in (expected, measured))
+        x, y = x - x.mean(), y - y.mean()
+        size = float(np.sqrt((x @ x) * (y @ y)))
+        if size > 0.0 and x @ y > _FOLLOWS * size:
+            factors[joint] = (x @ y) / (x @ x)
+    return factors

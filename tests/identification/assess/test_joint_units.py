@@ -1,0 +1,109 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The unit of a wrist that is all friction shows in the limit of its drive, or beside a model."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification import grade, identify
+from armid_ros.identification.assess.data_faults import check_data, Stretch
+from armid_ros.identification.assess.joint_units import units_beside_model, units_beyond_drives
+from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+from ..conftest import multisine, recorded
+
+WRIST = 5
+LIMIT = 10.0
+
+
+@pytest.fixture(scope='module')
+def arm():
+    robot = load_robot('humanoid_arm')
+    robot = replace(robot, torque_limit=np.where(np.arange(6) == WRIST, LIMIT, 1e3))
+    body = robot.rigid_parameters.reshape(-1, 10).copy()
+    body[WRIST] = 0.0
+    light = ArmModel(robot.with_inertias(body.ravel()))
+    return light.with_effect(make_effect('coulomb_friction', robot), np.full(6, 0.6))
+
+
+@pytest.fixture(scope='module')
+def run(arm):
+    return recorded(arm, multisine(arm.robot.joints, 10.0, 100.0, seed=3), torque_noise=0.01)
+
+
+def times(recording, factor, joints=(WRIST,)):
+    tau = recording.tau.copy()
+    tau[:, list(joints)] *= factor
+    return replace(recording, tau=tau)
+
+
+def filtered(recording):
+    return list(segments(recording, conditioning([recording], SignalSettings())))
+
+
+def beyond_drives(robot, recording):
+    return list(units_beyond_drives(robot, [recording], filtered(recording)))
+
+
+def beside_model(arm, recording):
+    return list(units_beside_model(arm, filtered(recording)))
+
+
+def test_half_of_the_readings_at_sixty_times_a_limit_are_in_another_unit(arm, run):
+    (said,) = beyond_drives(arm.robot, times(run, 1e3))
+    assert said.startswith(f'the torque of {arm.robot.joints[WRIST]} seems to be in N mm or N cm')
+
+
+def test_torques_in_newton_metres_and_a_few_wrong_samples_are_no_unit(arm, run):
+    assert beyond_drives(arm.robot, run) == []
+    spoilt = run.tau.copy()
+    spoilt[::50, WRIST] = 1e4
+    assert beyond_drives(arm.robot, replace(run, tau=spoilt)) == []
+
+
+def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
+    needy = replace(arm.robot, torque_limit=np.where(np.arange(6) == 1, 1e-3, 1e3))
+    assert beyond_drives(needy, run) == []
+    assert beyond_drives(replace(arm.robot, torque_limit=np.full(6, 1e-3)), run) == []
+
+
+@pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (1e-3, 'kN m')])
+def test_a_model_with_the_friction_tells_the_unit(arm, run, factor, unit):
+    (said,) = beside_model(arm, times(run, factor))
+    assert arm.robot.joints[WRIST] in said
+    assert f'in {unit} instead' in said
+
+
+@pytest.mark.parametrize('factor', [1.0, 3.0, 20.0])
+def test_other_factors_and_all_joints_alike_are_no_unit_of_a_joint(arm, run, factor):
+    assert beside_model(arm, times(run, factor)) == []
+    assert beside_model(arm, times(run, 1e3 * factor, range(6))) == []
+
+
+def test_a_factor_that_was_there_before_is_that_of_the_model(arm, run):
+    wrong = filtered(times(run, 1e3))
+    assert list(units_beside_model(arm, wrong, wrong)) == []
+    assert len(list(units_beside_model(arm, wrong, filtered(run)))) == 1
+
+
+def test_the_grade_of_a_fit_of_such_a_torque_is_poor(arm, run):
+    wrong = times(run, 1e3)
+    fitted = identify(arm, [wrong], rng=np.random.default_rng(0))
+    found = grade(fitted, arm, [wrong], {})
+    assert found.word == 'poor'
+    assert 'N mm or N cm' in found.reasons[0]
+
+
+def test_such_data_are_not_diagnosed(arm, run):
+    wrong = times(run, 1e3)
+    used = conditioning([wrong], SignalSettings())
+    (motion,) = segments(wrong, used)
+    part = Stretch(wrong.source, motion, np.abs(motion.dq) > 0.1)
+    faults, _ = check_data(arm, [wrong], used, [part])
+    assert faults == [
+        f'the torque of {arm.robot.joints[WRIST]} seems to be in N mm instead of N m: convert it'
+    ]
