@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import beyond_limits, too_short_to_tell
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
@@ -227,6 +228,9 @@ def _of_units(
         ]
         if off:
             yield Remark(weight, f'velocities of {", ".join(off)} {text}')  # type: ignore[arg-type]
+    time_base = time_base_fault(recording)
+    if time_base:
+        yield Remark('bad', time_base)
     empty = [j.name for j in joints if j.velocity_ratio == 0.0]
     if empty:
         yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from armid_ros.identification.assess.velocities import velocity_ratio, VelocityRatio
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -39,8 +40,8 @@ class JointFacts:
     repeated : float
         Share of the samples that repeat the position of the one before while it moves.
     velocity_ratio : float or None
-        Slope of the recorded velocity on the positions' derivative, which is 1 in equal units;
-        None where there is no velocity or no motion.
+        Recorded velocity over that of the positions, which is 1 in equal units; None where
+        there is no velocity or no motion.
     velocity_fit : float
         Correlation of the two.
     effort_rms, effort_largest : float or None
@@ -72,7 +73,8 @@ class JointFacts:
 def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
     """Return the facts of every joint of a recording."""
     derivative = _derivative(recording)
-    return tuple(_facts(recording, derivative, j) for j in range(recording.n_joints))
+    ratio = velocity_ratio(recording)
+    return tuple(_facts(recording, derivative, ratio, j) for j in range(recording.n_joints))
 
 
 def _derivative(recording: Recording) -> FloatArray:
@@ -88,7 +90,9 @@ def _derivative(recording: Recording) -> FloatArray:
     return np.column_stack(columns)
 
 
-def _facts(recording: Recording, derivative: FloatArray, j: int) -> JointFacts:
+def _facts(
+    recording: Recording, derivative: FloatArray, found: VelocityRatio | None, j: int
+) -> JointFacts:
     q, speed = recording.q[:, j], np.abs(derivative[:, j])
     top = float(np.percentile(speed, 99))
     moves = speed > _REST * max(top, 1e-12)
@@ -96,8 +100,8 @@ def _facts(recording: Recording, derivative: FloatArray, j: int) -> JointFacts:
     moved = changes[changes > 0.0]
     still = float(np.ptp(q)) < STILL
     ratio, fit = None, 0.0
-    if recording.dq is not None and not still:
-        ratio, fit = _slope(derivative[:, j], recording.dq[:, j])
+    if found is not None and np.isfinite(found.ratio[j]):
+        ratio, fit = float(found.ratio[j]), float(found.fit[j])
     tau = None if recording.tau is None else recording.tau[:, j]
     return JointFacts(
         name=recording.joints[j],
@@ -113,11 +117,3 @@ def _facts(recording: Recording, derivative: FloatArray, j: int) -> JointFacts:
         effort_largest=None if tau is None else float(np.abs(tau).max()),
         effort_varies=tau is not None and bool(np.ptp(tau) > 0.0),
     )
-
-
-def _slope(x: FloatArray, y: FloatArray) -> tuple[float | None, float]:
-    """Return the slope of y on x, and their correlation."""
-    power = float(np.sqrt((x @ x) * (y @ y)))
-    if power == 0.0:
-        return (0.0, 0.0) if x @ x > 0.0 else (None, 0.0)
-    return float((x @ y) / (x @ x)), float((x @ y) / power)

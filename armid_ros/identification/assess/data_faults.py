@@ -30,6 +30,7 @@ from armid_ros.identification.assess.hypotheses import (
 from armid_ros.identification.assess.joint_units import units_beside_model, units_beyond_drives
 from armid_ros.identification.assess.mistakes import effort_factor, find_mistake, slow_motions
 from armid_ros.identification.assess.undriven import held_elsewhere
+from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
@@ -121,7 +122,7 @@ def check_data(
         for one in recordings
     }
     blind = [x for one in recordings for x in dead_encoders(arm.body, one, motions[one.source])]
-    mistaken = blind or _mistaken(arm, recordings, used, before)
+    mistaken = blind or _velocities(recordings) or _mistaken(arm, recordings, used, before)
     mistaken = mistaken or _units(arm, recordings, used, before)
     if mistaken:
         return mistaken, []
@@ -170,6 +171,12 @@ def _mistaken(
         return []
     (sentences,) = said
     return [', or '.join(sentences)] if all(sentences) else []
+
+
+def _velocities(recordings: Sequence[Recording]) -> list[str]:
+    """Say of which recordings velocities and time do not go together."""
+    said = [(one.source or 'recording', time_base_fault(one)) for one in recordings]
+    return [f'{source}: {text}' for source, text in said if text]
 
 
 def _units(

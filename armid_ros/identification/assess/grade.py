@@ -22,6 +22,7 @@ from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
+from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -86,6 +87,7 @@ def grade(
     seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
     reasons = [
         *(_Reason('unusable', _sentence(text)) for texts in blind.values() for text in texts),
+        *_time_bases([*recordings, *held_out]),
         *_of_recordings(result, description, validation, seeing),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
@@ -250,6 +252,13 @@ def _elsewhere(
     motions = [fit.motion for fit in _fits(result, validation)]
     for found in held_elsewhere(description.robot, recordings, motions):
         yield _Reason('poor' if found.spoils else 'good', _sentence(found.text))
+
+
+def _time_bases(recordings: Sequence[Recording]) -> Iterator[_Reason]:
+    for recording in recordings:
+        text = time_base_fault(recording)
+        if text:
+            yield _Reason('poor', _sentence(f'in {recording.source}: {text}'))
 
 
 def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:

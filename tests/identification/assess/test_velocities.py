@@ -1,0 +1,103 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Velocities that are a factor from positions in every joint show a time that is not the arm's."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.identification import grade, identify
+from armid_ros.identification.assess.data_faults import check_data, Stretch
+from armid_ros.identification.assess.velocities import time_base_fault, velocity_ratio
+from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
+from armid_ros.inspection import inspect
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+from scipy import signal
+
+from ..conftest import multisine, recorded
+
+RATE = 100.0
+
+
+@pytest.fixture(scope='module')
+def arm():
+    robot = load_robot('humanoid_arm')
+    return ArmModel(robot).with_effect(make_effect('viscous_friction', robot), np.full(6, 0.1))
+
+
+@pytest.fixture(scope='module')
+def run(arm):
+    motion = multisine(arm.robot.joints, 20.0, RATE, seed=1, base_hz=0.12)
+    made = recorded(arm, motion, torque_noise=0.01, position_noise=1e-4, source='run')
+    noise = 0.05 * np.random.default_rng(2).normal(size=motion.dq.shape)
+    return replace(made, dq=motion.dq + noise)
+
+
+@pytest.mark.parametrize('factor', [0.5, 0.9, 1.1, 3.0])
+def test_a_wrong_time_is_said(run, factor):
+    said = time_base_fault(replace(run, t=factor * run.t))
+    number = said.split(' times what positions do')[0].split()[-1]
+    assert float(number) == pytest.approx(factor, rel=0.01)
+
+
+def late(run):
+    return replace(run, dq=signal.lfilter([0.06], [1.0, -0.94], run.dq, axis=0))
+
+
+def jittering(run):
+    by = np.random.default_rng(3).uniform(-0.02, 0.02, len(run))
+    return replace(run, t=np.sort(run.t + by))
+
+
+def broken(run):
+    return run.select(np.r_[0:700, 1100:2000])
+
+
+def one_joint(run):
+    return replace(run, dq=run.dq * np.array([1.0, 1.0, 1.2, 1.0, 1.0, 1.0]))
+
+
+def in_degrees(run):
+    return replace(run, dq=np.rad2deg(run.dq))
+
+
+def slow(run):
+    return run.select(slice(None, None, 8))
+
+
+def slightly_off(run):
+    return replace(run, dq=1.03 * run.dq)
+
+
+def without(run):
+    return replace(run, dq=None)
+
+
+@pytest.mark.parametrize(
+    'change', [late, jittering, broken, one_joint, in_degrees, slow, slightly_off, without]
+)
+def test_what_noise_filters_and_units_make_is_no_wrong_time(run, change):
+    assert time_base_fault(change(run)) == ''
+
+
+def test_ratios_of_a_coarse_and_noisy_recording_are_close(run):
+    assert np.allclose(velocity_ratio(slow(run)).ratio, 1.0, atol=0.02)
+
+
+def test_inspection_grade_and_diagnosis_say_it(arm, run):
+    wrong = replace(run, t=1.1 * run.t)
+    said = [
+        one for one in inspect(wrong, rng=np.random.default_rng(0)).remarks if '1.1' in one.text
+    ]
+    assert [one.weight for one in said] == ['bad']
+    fitted = identify(arm, [wrong], rng=np.random.default_rng(0))
+    found = grade(fitted, arm, [wrong], {})
+    assert found.word == 'poor'
+    assert '1.1 times' in found.reasons[0]
+    used = conditioning([wrong], SignalSettings())
+    (motion,) = segments(wrong, used)
+    part = Stretch('run', motion, np.abs(motion.dq) > 0.1)
+    (fault,) = check_data(arm, [wrong], used, [part])[0]
+    assert 'run: velocities of all joints' in fault
