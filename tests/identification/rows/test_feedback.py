@@ -60,6 +60,12 @@ def test_a_joint_says_nothing_of_a_controller_where_the_others_cannot_be_asked(a
     assert laws_of_controllers(robot, motion, resting) == ()
 
 
+def test_a_stretch_of_three_rows_obeys_no_law(arm):
+    motion = multisine(arm.robot.joints, 10.0, 100.0, seed=1)
+    few = motion.with_torque(arm.torque(motion)).select(np.arange(3))
+    assert laws_of_controllers(arm.robot, few, np.ones((3, 6), dtype=bool)) == ()
+
+
 @pytest.mark.parametrize('heavier', [0.2, 1.0, 5.0])
 def test_an_arm_that_follows_a_trajectory_obeys_no_law(arm, structure, heavier):
     robot = arm.robot
