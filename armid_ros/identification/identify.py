@@ -26,6 +26,7 @@ from armid_ros.identification.rows.checks import (
     beyond_limits,
     check_length,
     check_motion,
+    check_stamps,
     check_torque,
     too_short_to_tell,
 )
@@ -274,8 +275,8 @@ def identify(
     if settings.signals.cutoff_hz is None:
         used = cutoff_of_torques(whole, theory.independent, recordings, used)
     columns = regressions(whole, theory.independent, recordings, used, progress)
-    check_length(recordings, columns)
-    _require_samples(theory, recordings[0].source, columns, used)
+    check_length(recordings, columns, used)
+    _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
     if described:
@@ -317,14 +318,19 @@ def identify(
 
 
 def _require_samples(
-    theory: BaseParameters, source: str, columns: Sequence[Regression], used: Conditioning
+    theory: BaseParameters,
+    recordings: Sequence[Recording],
+    columns: Sequence[Regression],
+    used: Conditioning,
 ) -> None:
     """Refuse data with fewer than two torques for a parameter."""
     samples = sum(len(part.motion) for part in columns)
     if sum(part.tau.size for part in columns) < 2 * theory.rank:
+        check_stamps(recordings, used)
         raise IdentificationError(
-            f'{source}: {samples} samples remain after filtering at {used.cutoff_hz:g} Hz and '
-            f'decimation by {used.decimation}; {theory.rank} parameters need more: record longer'
+            f'{recordings[0].source}: {samples} samples remain after filtering at '
+            f'{used.cutoff_hz:g} Hz and decimation by {used.decimation}; {theory.rank} parameters '
+            'need more: record longer'
         )
 
 

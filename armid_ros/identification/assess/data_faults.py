@@ -38,6 +38,7 @@ from armid_ros.identification.rows.checks import (
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
@@ -52,11 +53,6 @@ _BEYOND = 1.5
 _CLIPPED = 0.02
 #: A step of a position at this multiple of the highest velocity is none of the arm.
 _IMPOSSIBLE = 10.0
-#: Share of steps in time that differ from the median by more than half of it.
-_UNEVEN = 0.05
-#: Jitter of stamps that blurs a torque at the end of the band by less than this share of it is
-#: harmless.
-_BLURRED = 0.1
 
 
 @dataclass(frozen=True)
@@ -126,7 +122,9 @@ def check_data(
     mistaken = mistaken or _units(arm, recordings, used, before)
     if mistaken:
         return mistaken, []
-    faults = [*_time_base(recordings, _band(used, data)), *_laws(arm, data)]
+    band_hz = _band(used, data)
+    stamps = (uneven_stamps(one, used.cutoff_hz, band_hz) for one in recordings)
+    faults = [*filter(None, stamps), *_laws(arm, data)]
     for one in recordings:
         faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
     faults += [] if faults else _signs(arm, recordings, data)
@@ -232,21 +230,6 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
 def _band(used: Conditioning, data: Sequence[Stretch]) -> float:
     """Return up to which frequency rows hold motion [Hz]."""
     return min(used.kept_hz, *(part.motion.band_hz for part in data))
-
-
-def _time_base(recordings: Sequence[Recording], band_hz: float) -> list[str]:
-    faults = []
-    for recording in recordings:
-        steps = np.diff(recording.t)
-        median = float(np.median(steps))
-        uneven = float(np.mean(np.abs(steps - median) > 0.5 * median))
-        jitter = float(np.sqrt(np.mean(np.minimum(np.abs(steps - median), median) ** 2)))
-        if uneven > _UNEVEN and 2.0 * np.pi * band_hz * jitter > _BLURRED:
-            faults.append(
-                f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are '
-                'uneven by more than half a period; record with the stamps of the driver'
-            )
-    return faults
 
 
 def _described_friction(arm: ArmModel) -> list[str]:

@@ -24,6 +24,7 @@ from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -87,7 +88,7 @@ def grade(
     seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
     reasons = [
         *(_Reason('unusable', _sentence(text)) for texts in blind.values() for text in texts),
-        *_time_bases([*recordings, *held_out]),
+        *_time_bases([*recordings, *held_out], result),
         *_of_recordings(result, description, validation, seeing),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
@@ -254,11 +255,16 @@ def _elsewhere(
         yield _Reason('poor' if found.spoils else 'good', _sentence(found.text))
 
 
-def _time_bases(recordings: Sequence[Recording]) -> Iterator[_Reason]:
+def _time_bases(recordings: Sequence[Recording], result: Identification) -> Iterator[_Reason]:
+    """Say whose time is not that of the arm, or whose stamps are uneven."""
+    band_hz = min(result.used.kept_hz, *(fit.motion.band_hz for fit in result.training))
     for recording in recordings:
         text = time_base_fault(recording)
         if text:
             yield _Reason('poor', _sentence(f'in {recording.source}: {text}'))
+        uneven = uneven_stamps(recording, result.used.cutoff_hz, band_hz)
+        if uneven:
+            yield _Reason('poor', _sentence(f'in {uneven}'))
 
 
 def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:

@@ -11,6 +11,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.signals import Conditioning, segments
+from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -77,12 +78,23 @@ def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < _SHORT else ()
 
 
-def check_length(recordings: Sequence[Recording], problem: Sequence[Regression]) -> None:
-    """Refuse recordings that are too short for the filters."""
+def check_length(
+    recordings: Sequence[Recording], problem: Sequence[Regression], used: Conditioning
+) -> None:
+    """Refuse recordings that are too short for the filters, as a whole or between gaps."""
     left = {part.source for part in problem}
     for recording in recordings:
         if recording.source not in left:
+            check_stamps([recording], used)
             raise _too_short(recording)
+
+
+def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
+    """Refuse uneven time stamps where little is left of data: late ones look like gaps."""
+    for recording in recordings:
+        uneven = uneven_stamps(recording, used.cutoff_hz, used.kept_hz)
+        if uneven:
+            raise IdentificationError(uneven)
 
 
 def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
