@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,8 +71,15 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 def recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
 ) -> list[Recording]:
-    """Return recordings, read where they are paths; one or many."""
-    several = [recordings] if isinstance(recordings, (Recording, str, Path)) else list(recordings)
+    """Return recordings, read where they are paths; one, many or none."""
+    several = recordings if isinstance(recordings, Iterable) else [recordings]
+    several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
+    for one in several:
+        if not isinstance(one, RecordingLike):
+            raise RecordingError(
+                f'{str(one)[:40]!r} is no recording; give a Recording, or the path of a bag or '
+                'a table'
+            )
     read = [one if isinstance(one, Recording) else read_recording(one, robot) for one in several]
     for recording in read:
         if recording.joints != robot.joints:
@@ -82,6 +89,16 @@ def recordings_of(
                 f'{", ".join(robot.joints)}; read it with that robot'
             )
     return read
+
+
+def some_recordings_of(
+    recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
+) -> list[Recording]:
+    """Return recordings as `recordings_of`; RecordingError where there is none."""
+    found = recordings_of(recordings, robot)
+    if not found:
+        raise RecordingError('no recordings: give one bag, table or Recording at least')
+    return found
 
 
 def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:

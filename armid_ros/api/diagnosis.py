@@ -18,6 +18,7 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
+    some_recordings_of,
     source_of,
     with_sources_apart,
 )
@@ -248,7 +249,8 @@ def diagnose(
     if residual is not None:
         require_libraries()
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
-    looked_at, held_out = (recordings_of(group, model.robot) for group in (recordings, validate))
+    looked_at = some_recordings_of(recordings, model.robot)
+    held_out = recordings_of(validate, model.robot)
     if baseline is None:
         before = _since(arm, model, [*looked_at, *held_out])
     else:

@@ -17,6 +17,7 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
+    some_recordings_of,
     source_of,
     USUAL,
     with_sources_apart,
@@ -137,7 +138,7 @@ class IdentificationResult(Shown):
 
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings."""
-        return self.core.predict(recordings_of(recordings, self.arm.robot))
+        return self.core.predict(some_recordings_of(recordings, self.arm.robot))
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
@@ -293,7 +294,7 @@ def identify(
     IdentificationError
         If the data cannot identify anything; the message says why and what to do.
     RecordingError
-        If a recording is given twice, or held out and fitted.
+        If there is no recording, or one is given twice, or held out and fitted.
 
     Examples
     --------
@@ -305,7 +306,7 @@ def identify(
     """
     model = arm_of(arm, effects)
     training, held_out = with_sources_apart(
-        recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
+        some_recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
     )
     require_once(training, held_out)
     known = PhysicalSettings() if physical is True else physical or None

@@ -141,7 +141,7 @@ def save_model(
     write_file(path, text)
 
 
-def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
+def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = None) -> ArmModel:
     """
     Read model.yaml.
 
@@ -149,7 +149,7 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
     ----------
     path : str or Path
         The file.
-    robot : Robot, optional
+    robot : robot, model, name or path, optional
         The description, where the one that the file names is not to be used; its inertial
         parameters and gravity are replaced by the file's.
 
@@ -162,6 +162,8 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
     ------
     ModelError
         Naming the file and what is wrong in it.
+    RobotError
+        If the description is not there, or cannot be used.
 
     Examples
     --------
@@ -176,6 +178,10 @@ def load_model(path: str | Path, robot: Robot | None = None) -> ArmModel:
         inside = path / 'model.yaml'
         hint = f'name the model in it, {inside}' if inside.is_file() else 'there is no model.yaml'
         raise ModelError(f'{path}: a folder; {hint}')
+    if isinstance(robot, ArmModel):
+        robot = robot.robot
+    elif isinstance(robot, (str, Path)):
+        robot = load_robot(str(robot))
     text = read_text(path, ModelError)
     with reading(path, ModelError):
         document = _document(text)

@@ -10,7 +10,11 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.estimators.names import Estimator, least_squares_of
+from armid_ros.identification.estimators.names import (
+    Estimator,
+    least_squares_of,
+    require_estimator,
+)
 from armid_ros.identification.estimators.refine import refined
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques
 from armid_ros.identification.fitting.excited import excited
@@ -62,7 +66,8 @@ class IdentificationSettings:
     physical: PhysicalSettings | None = None
 
     def __post_init__(self) -> None:
-        """Refuse bodies where the estimator knows no constraints."""
+        """Refuse a method that is not there, and bodies where it knows no constraints."""
+        require_estimator(self.method)
         if self.physical is not None and self.method != self.least_squares:
             raise IdentificationError(
                 f'{self.method} is not fitted among bodies: take ols, wls or irls for that'

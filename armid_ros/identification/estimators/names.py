@@ -32,6 +32,12 @@ def least_squares_of(estimator: Estimator) -> Method:
     return 'wls'
 
 
+def require_estimator(name: str, beside: str = '') -> None:
+    """Raise an IdentificationError that lists the estimators, and what may stand beside them."""
+    if name not in ESTIMATORS:
+        raise IdentificationError(f"no method '{name}'; there are {', '.join(ESTIMATORS)}{beside}")
+
+
 def estimators_of(text: str) -> tuple[Estimator, ...]:
     """
     Read 'all', or names with commas.
@@ -45,9 +51,6 @@ def estimators_of(text: str) -> tuple[Estimator, ...]:
     if text == 'all':
         return ESTIMATORS
     asked = [name.strip() for name in text.split(',')]
-    unknown = [name for name in asked if name not in ESTIMATORS]
-    if unknown:
-        raise IdentificationError(
-            f"no method '{unknown[0]}'; there are {', '.join(ESTIMATORS)}, or all"
-        )
+    for name in asked:
+        require_estimator(name, ', or all')
     return tuple(name for name in ESTIMATORS if name in asked)

@@ -1,0 +1,49 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What cannot be an argument is refused in one line that says what to give."""
+
+import armid_ros as ar
+import numpy as np
+import pytest
+
+from tests.identification.conftest import multisine, recorded
+
+
+@pytest.fixture(scope='module')
+def arm():
+    return ar.ArmModel.of('humanoid_arm', effects='viscous_friction')
+
+
+@pytest.fixture(scope='module')
+def run(arm):
+    return recorded(arm, multisine(arm.robot.joints, 4.0, 50.0, seed=1))
+
+
+@pytest.mark.parametrize('ask', [ar.identify, ar.diagnose])
+@pytest.mark.parametrize(
+    ('recordings', 'said'),
+    [
+        ([], 'no recordings: give one'),
+        ((), 'no recordings: give one'),
+        (None, "'None' is no recording; give a Recording, or the path"),
+        (3, "'3' is no recording"),
+        ([None], "'None' is no recording"),
+    ],
+)
+def test_no_recording_is_said(arm, ask, recordings, said):
+    with pytest.raises(ar.ArmidError, match=said):
+        ask(arm, recordings)
+
+
+def test_an_unknown_method_is_answered_with_those_there_are(arm, run):
+    with pytest.raises(ar.ArmidError, match="no method 'foo'; there are ols, wls"):
+        ar.identify(arm, run, method='foo')
+
+
+def test_a_model_is_read_with_a_robot_in_any_form(arm, tmp_path):
+    path = tmp_path / 'model.yaml'
+    ar.save_model(path, arm, 'nowhere.urdf')
+    for robot in (arm, arm.robot, 'humanoid_arm', arm.robot.path):
+        np.testing.assert_array_equal(ar.load_model(path, robot).theta, arm.theta)
+    with pytest.raises(ar.ArmidError, match=r'absent\.urdf: neither a file nor a shipped robot'):
+        ar.load_model(path, 'absent.urdf')
