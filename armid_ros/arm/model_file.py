@@ -31,6 +31,7 @@ import numpy as np
 import yaml
 
 SCHEMA = 'armid/model/1'
+_KEYS = 'schema', 'robot', 'gravity', 'rigid_parameters', 'effects', 'misfit'
 
 
 def parameter_table(
@@ -221,7 +222,21 @@ def _document(text: str) -> dict[str, Any]:
     document = parsed_yaml(text, ModelError)
     if not isinstance(document, dict) or document.get('schema') != SCHEMA:
         raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
+    strange = [str(key) for key in document if key not in _KEYS]
+    if strange:
+        raise ModelError(f"no key '{strange[0][:40]}' is known; a model has {', '.join(_KEYS)}")
     return document
+
+
+def _gravity(given: Any) -> FloatArray:
+    try:
+        x, y, z = given
+        return np.array([finite(part, 'gravity') for part in (x, y, z)])
+    except (TypeError, ValueError):
+        raise ModelError(
+            "'gravity' has to be three finite numbers [m/s^2] in the frame of the base, as "
+            f'[0, 0, -9.81], not {str(given)[:40]!r}'
+        ) from None
 
 
 def _described(path: Path, source: str) -> Robot:
@@ -230,7 +245,7 @@ def _described(path: Path, source: str) -> Robot:
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:
-    arm = ArmModel(robot.with_gravity(np.array(document['gravity'], dtype=float)))
+    arm = ArmModel(robot.with_gravity(_gravity(document['gravity'])))
     arm = arm.with_theta(_values(document['rigid_parameters'], arm.parameters))
     for entry in document['effects']:
         kind: Kind = CATALOGUE.find(str(entry['name']))

@@ -36,7 +36,12 @@ from armid_ros.identification.rows.checks import (
 )
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import predictions, Regression, regressions
-from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    conditioning,
+    no_stretch,
+    SignalSettings,
+)
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -223,10 +228,7 @@ class Identification:
         recordings, _ = without_damage(recordings, signals)
         found = predictions(self.arm, recordings, self.used)
         if not found:
-            raise IdentificationError(
-                f'{recordings[0].source}: no stretch is long enough to be filtered at '
-                f'{self.used.cutoff_hz:g} Hz'
-            )
+            raise no_stretch(recordings[0], self.used)
         return tuple(
             Fit(part.source, part.motion, part.torque, part.informative) for part in found
         )

@@ -74,6 +74,12 @@ def test_a_file_without_shapes_takes_the_defaults(robot, tmp_path):
         (lambda d: d['effects'][0]['shapes'][0].update(value=-1.0), 'has to be from'),
         (lambda d: d.pop('gravity'), 'gravity'),
         (
+            lambda d: d.update(gravity='earth'),
+            r"'gravity' has to be three finite numbers .*'earth'",
+        ),
+        (lambda d: d.update(gravity=[0, 0, 'down']), "'gravity' has to be three finite"),
+        (lambda d: d.update(effectz=d.pop('effects')), "no key 'effectz' is known; .*effects"),
+        (
             lambda d: d['effects'][0]['parameters'][0].update(value=float('nan')),
             "'stribeck_torque' of joint 'shoulder_pitch' has to be a finite number",
         ),

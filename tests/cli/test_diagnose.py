@@ -155,6 +155,13 @@ def test_a_recording_has_one_role(files, tmp_path, role):
     assert f'given twice, or in two roles: {bags[0]}; give each recording once' in said
 
 
+def test_a_baseline_and_none_is_refused(files, tmp_path):
+    urdf, model, bags = files
+    asked = ['--robot', urdf, '--model', model, '--baseline', bags[1], '--no-baseline']
+    refused = armid('diagnose', bags[0], *asked, '--out', tmp_path / 'out', code=2)
+    assert '--baseline names bags, --no-baseline asks without' in refused.output
+
+
 def test_a_baseline_of_the_same_day_leaves_nothing_to_name(files, tmp_path):
     urdf, model, bags = files
     out = tmp_path / 'out'

@@ -87,6 +87,15 @@ def faults_since(arm, recordings, before):
     return check_data(arm, recordings, used, stretches(recordings, used), before)[0]
 
 
+def test_of_a_recording_that_is_too_short_it_is_said_how_long_one_has_to_be(bench):
+    recordings = bench.recordings()
+    used = conditioning(recordings, SignalSettings())
+    short = recordings[0].select(slice(0, 50))
+    said = rf'longest without a gap has {short.duration:.2f} s, more than [0-9.]+ s are needed'
+    with pytest.raises(IdentificationError, match=said):
+        stretches([short], used)
+
+
 def test_a_position_that_jumps_is_named_with_its_joint_and_time(bench):
     first, *others = bench.recordings()
     q = first.q.copy()

@@ -75,6 +75,11 @@ class DiagnosisData:
     no_baseline: bool
     topic: str | None
 
+    def __post_init__(self) -> None:
+        """Refuse a baseline and none."""
+        if self.baseline and self.no_baseline:
+            raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
+
     def since(self, model: Path | None) -> DiagnosisData:
         """
         Return the same with a baseline: what a model was identified from, if none is given.

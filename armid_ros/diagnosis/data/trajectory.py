@@ -16,13 +16,14 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
-from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.data_faults import Stretch
+from armid_ros.identification.rows.checks import check_stamps
 from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
     decimated_samples,
+    no_stretch,
     segments,
     velocity_error,
 )
@@ -167,10 +168,8 @@ def trajectories(
         stretches = segments(recording, used)
         found = [_trajectory(recording, fold, m, used, least) for m in stretches]
         if not found:
-            raise IdentificationError(
-                f'{recording.source}: no stretch is long enough to be filtered at '
-                f'{used.cutoff_hz:g} Hz'
-            )
+            check_stamps([recording], used)
+            raise no_stretch(recording, used)
         if allowed is not None:
             found = [replace(part, allowed=allowed) for part in found]
         if recording.partner is not None and arm is not None:

@@ -220,13 +220,33 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     if recording.partner is not None:
         positions = np.hstack([positions, recording.partner.q])
     period = 1.0 / used.rate_hz
-    shortest = 2 * _HALF_TAPS * used.decimation + 10 * used.rate_hz / used.cutoff_hz
-    longest = GAP_PERIODS * max(period, recording.period)
-    breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
-    for part in np.split(np.arange(len(recording.t)), breaks):
-        if len(part) > 3 and recording.t[part[-1]] - recording.t[part[0]] > shortest * period:
+    for part in _stretches(recording, used):
+        if len(part) > 3 and recording.t[part[-1]] - recording.t[part[0]] > _shortest(used):
             t, q, tau = _even(recording.t[part], positions[part], recording.tau[part], period)
             yield _differentiated(recording, t, q, tau, used)
+
+
+def _stretches(recording: Recording, used: Conditioning) -> list[npt.NDArray[np.intp]]:
+    """Return the samples of every stretch without a gap."""
+    longest = GAP_PERIODS * max(1.0 / used.rate_hz, recording.period)
+    breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
+    return np.split(np.arange(len(recording.t)), breaks)
+
+
+def _shortest(used: Conditioning) -> float:
+    """Return how long a stretch has to be for the filters [s]."""
+    return 2 * _HALF_TAPS * used.decimation / used.rate_hz + 10 / used.cutoff_hz
+
+
+def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
+    """Say that no stretch is long enough for the filters, and how long one has to be."""
+    spans = [recording.t[part[[0, -1]]] for part in _stretches(recording, used)]
+    longest = max(float(last - first) for first, last in spans)
+    return IdentificationError(
+        f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
+        f'the longest without a gap has {longest:.2f} s, more than {_shortest(used):.2f} s are '
+        'needed; record longer, or without gaps'
+    )
 
 
 def decimate(values: FloatArray, used: Conditioning, stride: int = 1) -> FloatArray:
