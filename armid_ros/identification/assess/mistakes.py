@@ -123,8 +123,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     found = _best(robot, tried, _described(robot, slow), fitted=False)
     if found is not None:
         return found
-    as_recorded = _fitted(robot, slow)(AsRecorded())
-    if as_recorded is None or 100.0 * as_recorded[0].joints.max() < LIMITS.poor:
+    if any(_predicts(judge(robot, slow)) for judge in (_described, _fitted)):
         return None
     changes = [one for one in tried if not isinstance(one, InUnit | OtherGravity | OtherUnit)]
     return _best(robot, changes, _fitted(robot, slow), fitted=True)
@@ -145,6 +144,12 @@ def effort_factor(
     if found is None or not found[0].shared[0] > 0.0:
         return None
     return float(found[0].shared[0])
+
+
+def _predicts(judge: Judge) -> bool:
+    """Whether data are predicted as they were recorded, or are too few to ask."""
+    as_recorded = judge(AsRecorded())
+    return as_recorded is None or 100.0 * float(as_recorded[0].joints.max()) < LIMITS.poor
 
 
 def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:

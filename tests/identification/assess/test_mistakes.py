@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.identification.assess import mistakes
 from armid_ros.identification.assess.faulty_samples import faulty_samples
 from armid_ros.identification.assess.hypotheses import (
     hypotheses,
@@ -387,3 +388,14 @@ class TestRealRecordings:
         ):
             assert expected in mistake_in(robot, changed)
         assert '--gravity earth' in mistake_in(robot.with_gravity((9.81, 0.0, 0.0)), sound)
+
+
+def test_no_body_is_fitted_to_data_that_the_description_predicts(robot, sound, monkeypatch):
+    """Of a few seconds a fit leaves anything, and degrees in place of rad leave less."""
+
+    def fit(*_):
+        raise AssertionError('a body is fitted')
+
+    monkeypatch.setattr(mistakes, 'fitted_error', fit)
+    assert mistake_in(robot, sound.select(slice(0, 500))) == ''
+    assert mistake_in(robot, sound) == ''
