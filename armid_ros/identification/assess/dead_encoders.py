@@ -32,6 +32,9 @@ _ROWS = 600
 #: Rows in a part of a recording below which nothing is told of its torque, and the share of what
 #: a torque varies by while its joint moves that it does while the joint moves unseen.
 _LEAST, _LIVELY = 100, 0.5
+#: Share of a recording below which a reading that stays the same until its end is a joint that has
+#: come to rest.
+_PART = 0.2
 
 
 def dead_encoders(
@@ -70,7 +73,11 @@ def dead_encoders(
                 f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; '
                 + ('record again' if always else 'leave that time out')
             )
-        elif robot is not None and _moves_unseen(robot, motions, j, (t[start], t[stop - 1])):
+        elif (
+            robot is not None
+            and _until_the_end(recording, start, stop)
+            and _moves_unseen(robot, motions, j, (t[start], t[stop - 1]))
+        ):
             yield (
                 f'{said}, while its torque is not what weight and the other joints make of a '
                 'joint at rest: its encoder is dead; '
@@ -127,6 +134,17 @@ def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
     way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
     walk = _WALK * np.sqrt(_white(dq) * np.sum(steps**2))
     return max(float(np.ptp(way) - walk), 0.0)
+
+
+def _until_the_end(recording: Recording, start: int, stop: int) -> bool:
+    """
+    Return whether a reading stays the same until the end, for a part of the recording at least.
+
+    What has died stays dead. A joint that turns round slowly, or comes to rest, goes from one end
+    of its friction to the other while a coarse encoder reads the same.
+
+    """
+    return stop == len(recording) and stop - start > _PART * len(recording)
 
 
 def _moves_unseen(

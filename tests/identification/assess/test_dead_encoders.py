@@ -74,6 +74,14 @@ def test_an_encoder_that_dies_during_a_recording_is_dead_from_then_on(arm, joint
     assert text.endswith('its encoder is dead; leave that time out')
 
 
+def test_a_joint_that_turns_round_under_a_coarse_encoder_is_not_dead(arm):
+    """Its friction goes from one end to the other meanwhile, and it moves on afterwards."""
+    recording = stuck(record(arm, 1), 5, since=800, velocity=False)
+    q, dq, moves = recording.q.copy(), recording.dq.copy(), record(arm, 1)
+    q[1400:, 5], dq[1400:, 5] = moves.q[1400:, 5], moves.dq[1400:, 5]
+    assert said(arm.robot, replace(recording, q=q, dq=dq)) == []
+
+
 @pytest.mark.parametrize('joint', JOINTS)
 def test_a_joint_that_waits_for_the_others_is_not_dead(arm, joint):
     moves, waits = record(arm, 1), record(arm, 1, held=joint)
