@@ -54,7 +54,7 @@ _PACKAGE = Path(armid_ros.diagnosis.__file__).parent
 _VERDICT = ('verdict/attribution.py', 'verdict/gap.py')
 _DECIDING = ('diagnose.py', 'data', 'search', *_VERDICT)
 #: What decides beside it, below armid_ros: whether data are at fault.
-_BESIDE = ('identification/assess/data_faults.py',)
+_BESIDE = ('identification/assess/data_faults.py', 'identification/rows/stamps.py')
 #: From here up to one a number is a level, of which what is beyond is changed.
 _LEVEL = 0.9
 

@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[1]
 BESIDE_THE_DIAGNOSIS = (
     'pair/ties',
     'identification/assess/data_faults.py',
+    'identification/rows/stamps.py',
     'excitation/templates.py',
 )
 NOTEBOOKS = ROOT / 'examples' / 'notebooks'

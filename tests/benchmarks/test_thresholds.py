@@ -7,7 +7,7 @@ from dataclasses import fields
 from armid_ros.diagnosis.data import trajectory
 from armid_ros.diagnosis.search import acceptance, look, trial
 from armid_ros.diagnosis.settings import Thresholds
-from armid_ros.identification.assess import data_faults
+from armid_ros.identification.rows import stamps
 import numpy as np
 import pytest
 
@@ -67,9 +67,9 @@ def test_numbers_of_modules_are_all_found_once():
     found = of_modules()
     assert len(found) == len(set(found)) > 40
     assert {'data/trajectory.py BLOCKS', 'data/trajectory.py _REST_SPEED'} <= set(found)
-    assert 'armid_ros/identification/assess/data_faults.py _UNEVEN' in found
+    assert 'armid_ros/identification/rows/stamps.py _UNEVEN' in found
     with changed(found, 1.3):
-        assert data_faults._UNEVEN == pytest.approx(0.065)
+        assert stamps._UNEVEN == pytest.approx(0.065)
         assert trajectory.BLOCKS == 8
         assert trajectory._REST_SPEED == pytest.approx(0.026)
 

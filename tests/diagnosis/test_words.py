@@ -203,7 +203,7 @@ def test_the_same_name_in_another_joint_is_a_rival():
     others = trial('payload', 'elbow'), trial('payload', 'wrist'), trial('torque_gain', 'elbow')
     step = SimpleNamespace(trial=trial('payload', 'wrist'), rivals=others)
     arm = SimpleNamespace(robot=SimpleNamespace(joints=('elbow', 'wrist')))
-    found = _rivals([step], {'torque_gain'}, ('wrist',), arm)
+    found = _rivals([step], Rival('payload', ('wrist',)), {'torque_gain'}, arm)
     assert found == (Rival('payload', ('elbow',)),)
 
 

@@ -218,7 +218,7 @@ def _survey(candidates: Sequence[Candidate], ranking: Sequence[Trial], here: Rou
     least = here.evidence.least_squares(here.settings, whole)
     return Survey(
         tuple(ranking),
-        tuple(_material_sizes(trial, least, here) for trial in ranking),
+        {trial.candidate.key: _material_sizes(trial, least, here) for trial in ranking},
         frozenset(candidate.effect.said_as for candidate in candidates) - visible,
         here.total,
         here.tried,

@@ -10,7 +10,7 @@ that its values were not fitted to; see `held_out`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
@@ -314,8 +314,8 @@ class Survey:
     ----------
     ranking : tuple of Trial
         All visible candidates in their best shape, best first.
-    material : tuple of ndarray, each (p,)
-        Size of each value of these from which on it is material.
+    material : mapping of Key to ndarray, shape (p,)
+        Sizes of values of these from which on they are material.
     hidden : frozenset of str
         Names of effects of which no candidate is visible beyond the nuisance columns.
     total : float
@@ -332,7 +332,7 @@ class Survey:
     """
 
     ranking: tuple[Trial, ...]
-    material: tuple[FloatArray, ...]
+    material: Mapping[Key, FloatArray]
     hidden: frozenset[str]
     total: float
     tried: int

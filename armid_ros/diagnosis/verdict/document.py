@@ -152,13 +152,10 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     survey = None if explanation is None else explanation.survey
     if survey is None:
         return []
-    return [
-        _candidate(trial, least, survey)
-        for trial, least in zip(survey.ranking, survey.material, strict=True)
-    ][:_MOST_CANDIDATES]
+    return [_candidate(trial, survey) for trial in survey.ranking[:_MOST_CANDIDATES]]
 
 
-def _candidate(trial: Trial, least: FloatArray, survey: Survey) -> dict[str, Any]:
+def _candidate(trial: Trial, survey: Survey) -> dict[str, Any]:
     return {
         'name': trial.candidate.effect.said_as,
         'joints': list(trial.candidate.effect.joints),
@@ -166,7 +163,7 @@ def _candidate(trial: Trial, least: FloatArray, survey: Survey) -> dict[str, Any
         'held_out_gain': trial.gain,
         'replicated_in': trial.replicated,
         'visible_fraction': trial.visible,
-        'min_detectable': _finite(smallest_size(trial, least)[1]),
+        'min_detectable': _finite(smallest_size(trial, _material(trial, survey))[1]),
         'adjusted_p': min(1.0, trial.p * survey.tried),
     }
 
@@ -233,6 +230,12 @@ def smallest_size(trial: Trial, material: FloatArray) -> tuple[int, float]:
     return trial.candidate.kept[0], float('inf')
 
 
+def _material(trial: Trial, survey: Survey) -> FloatArray:
+    """Return the sizes of values from which they are material; zero where any size is, (p,)."""
+    always = np.zeros(len(trial.candidate.kept))
+    return survey.material.get(trial.candidate.key, always)
+
+
 def _possible(effect: Effect, index: int, size: float) -> bool:
     """
     Return whether a parameter can be as large as a size.
@@ -253,11 +256,9 @@ def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectabl
     if survey is None:
         return ()
     rows = []
-    always = [np.zeros(trial.candidate.size) for trial in survey.nuisance]
-    trials = (*survey.ranking, *survey.nuisance)
-    for trial, material in zip(trials, (*survey.material, *always), strict=True):
+    for trial in (*survey.ranking, *survey.nuisance):
         effect = trial.candidate.effect
-        index, size = smallest_size(trial, material)
+        index, size = smallest_size(trial, _material(trial, survey))
         parameter = effect.parameters(robot)[index]
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
     rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]

@@ -60,7 +60,7 @@ def findings(
         ]
         places = [*order, '']
         rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
-        rivals = _rivals(steps, set(merged) - {name}, joints, arm)
+        rivals = _rivals(steps, Rival(name, joints), set(merged) - {name}, arm)
         result.append(
             Finding(
                 name,
@@ -202,10 +202,10 @@ def _without_later(steps: Sequence[Step]) -> list[Step]:
 
 
 def _rivals(
-    steps: Sequence[Step], others: set[str], joints: Sequence[str], arm: ArmModel
+    steps: Sequence[Step], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the rivals of a name in some joints, the largest gain first, with their joints.
+    Return the rivals of a name in its joints (`own`), the largest gain first, with their joints.
 
     The same name in another joint is a rival as well; the names of other findings are none.
 
@@ -215,8 +215,7 @@ def _rivals(
         here: dict[str, Trial] = {}
         for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
             effect = trial.candidate.effect
-            same = effect.said_as == step.trial.candidate.effect.said_as
-            if not (same and set(effect.joints) <= set(joints)):
+            if not (effect.said_as == own.name and set(effect.joints) <= set(own.joints)):
                 here.setdefault(effect.said_as, trial)
         for name in here.keys() - others:
             best.setdefault(name, []).append(here[name])
