@@ -261,11 +261,8 @@ def candidates(
     kinds: Sequence[Kind],
 ) -> Candidates:
     """Compute the columns of every effect that was not named yet."""
-    arm, unexplained, data = (
-        memoized_arm(fitted.arm),
-        _unexplained(fitted, evidence),
-        evidence.data,
-    )
+    arm, data = memoized_arm(fitted.arm), evidence.data
+    unexplained = _unexplained(fitted, evidence)
     taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
     candidates: list[Candidate] = []
     blocks: list[list[FloatArray]] = [[] for _ in data]

@@ -191,7 +191,7 @@ def _divided(
     for motion in motions:
         first, last = np.searchsorted(motion.t, [time[0], time[1] + 1e-9])
         pieces = slice(0, first), slice(first, last), slice(last, len(motion))
-        before, inside, after = (motion.select(np.arange(len(motion))[one]) for one in pieces)
+        before, inside, after = (motion.select(one) for one in pieces)
         within.append(inside)
         other += [one for one in (before, after) if len(one)]
     return within, other

@@ -35,7 +35,7 @@ QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 _STRONGEST = 24.8
 #: A factor of torques is that of a unit if it is within this factor of it: masses of a description
 #: are off by less.
-_NEAR = 1.5
+NEAR = 1.5
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
 
@@ -372,7 +372,7 @@ def unit_of(factor: float) -> str:
     known = {**TORQUE_UNITS, 'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0))}
     off = {unit: abs(np.log(factor / count)) for unit, count in known.items()}
     return ' or '.join(
-        unit for unit in sorted(off, key=off.__getitem__) if off[unit] < np.log(_NEAR)
+        unit for unit in sorted(off, key=off.__getitem__) if off[unit] < np.log(NEAR)
     )
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.hypotheses import InUnit
+from armid_ros.identification.assess.hypotheses import InUnit, NEAR
 from armid_ros.identification.rows.checks import TORQUE_UNITS
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
@@ -27,8 +27,6 @@ import numpy as np
 _BEYOND_DRIVE = 10.0
 #: A joint below this share of its top speed may be held by its friction, with any torque.
 _SLOW = 0.05
-#: A factor is that of a unit if it is within this factor of it, as in `hypotheses`.
-_NEAR = 1.5
 #: Correlation of a torque with that of the model from which its factor is clear: four fifths of
 #: the power follow the model.
 _FOLLOWS = 0.9
@@ -97,7 +95,7 @@ def units_beside_model(
         InUnit(joint, unit).sentence(arm.robot)
         for joint, factor in enumerate(factors)
         for unit, per in TORQUE_UNITS.items()
-        if per / _NEAR < factor < per * _NEAR
+        if per / NEAR < factor < per * NEAR
     ]
     if 2 * len(found) <= arm.robot.n_joints:
         yield from found
