@@ -8,7 +8,7 @@ diagnosis; rates have 95 % intervals (Wilson). Reach and what counts: tests/hidd
 laboratory asks for everything that is there: the sizes that are hidden are multiples of the noise,
 and so nothing is too small to matter (a share of the torque of zero is material).
 
-    python -m benchmarks.hidden_effects [development|development_2|locked] [--slice] [--only TEXT]
+    python -m benchmarks.hidden_effects [SET] [--slice] [--only TEXT]
         [--baseline] [--single] [--out DIR]
 
 """

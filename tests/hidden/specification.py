@@ -14,7 +14,7 @@ import numpy as np
 
 from tests.hidden.catalogue import CATALOGUED, HIDDEN, OUTSIDE_NAMES
 
-SETS = ('development', 'development_2', 'locked')
+SETS = ('development', 'development_2', 'development_3', 'locked')
 
 SPECIFICATION = Path(__file__).with_name('specification.json')
 
@@ -81,7 +81,7 @@ class CaseSpec:
 
 @cache
 def case_list(name: str) -> tuple[CaseSpec, ...]:
-    """Return all cases of a set: 'development', 'development_2' or 'locked'."""
+    """Return all cases of a set, one of `SETS`."""
     rules = json.loads(SPECIFICATION.read_text())[name]
     rng = np.random.default_rng(rules['seed'])
     machines, spread = rules['machines'], rules['spread']

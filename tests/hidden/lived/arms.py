@@ -24,6 +24,7 @@ PUBLISHED = {
     'ur10': 'ur_description/urdf/ur10_robot.urdf',
     'panda': 'panda_description/urdf/panda.urdf',
     'xarm7': 'xarm_description/urdf/xarm7.urdf',
+    'so101': 'so_arm_description/urdf/so101.urdf',
     'z1': 'z1_description/urdf/z1.urdf',
     'talos': 'robots/talos_data/robots/talos_left_arm.urdf',
 }
@@ -34,9 +35,13 @@ ARMS = {
         *('humanoid', 'ur5', 'panda', 'drawn-6-0', 'z1', 'drawn-4-0', 'ur10', 'drawn-7-0'),
         *('drawn-5-0', 'drawn-3-0'),
     ),
-    'locked': (
+    'development_2': (
         *('xarm7', 'drawn-6-1', 'ur3', 'panda', 'talos', 'drawn-7-1', 'ur5', 'drawn-4-1'),
         *('drawn-5-1', 'drawn-6-2', 'drawn-3-1', 'humanoid'),
+    ),
+    'locked': (
+        *('drawn-6-3', 'so101', 'drawn-7-2', 'drawn-4-2', 'xarm7', 'drawn-5-2', 'drawn-3-2'),
+        *('ur3', 'drawn-6-4', 'talos', 'drawn-7-3', 'drawn-5-3', 'drawn-4-3'),
     ),
 }
 
