@@ -3,8 +3,8 @@
 """
 Which cases there are: what the kind and the number of a case stand for.
 
-A kind is the name of a set, 'development', 'development_2' or 'locked', each with seeds and arms of
-its own, and a question after a stroke: see README.md.
+A kind is the name of a set, 'development', 'development_2' or 'locked', each with seeds and arms
+of its own, and a question after a stroke: see README.md.
 
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from tests.hidden.lived.arms import ARMS
 
 SEEDS = {'development': 20261122, 'development_2': 48611307, 'locked': 90412753}
-#: Names of sets when they were drawn, where they had others: a locked set that was looked at often.
+#: Names of sets when they were drawn: a locked set that was looked at often has another one now.
 _SEEDED_AS = {'development_2': 'locked'}
 
 KINDS = tuple(f'{name}{kind}' for name in SEEDS for kind in ('', '/exact', '/mounting', '/pairs'))
