@@ -30,15 +30,16 @@ class Thresholds:
     rival_z : float
         Deviations by which a name has to be ahead of another one to exclude it.
     tie : float
-        Twice the share of the same by which it has to be ahead as well, and share of a simpler
-        cause, in squares, that what contains it leaves at most.
+        Twice the share of the same by which it has to be ahead as well; share of a simpler cause,
+        in squares, that what contains it leaves at most, and of a cause in all recordings that one
+        of them has to show to tell when it changed.
     far : float
         Lead over its own share that excludes another one however few blocks show it, and that
         a link, which never changes, or a load of one that is not at the end of the arm has to have
         over what happens between two days.
     misfit_share : float
-        Power of a cause over that of the model's own misfit, below which it is small print in that
-        joint: a quarter of it names a change in one of five arms to which nothing happened.
+        Power of a cause over that of the model's own misfit, summed over joints, below which it is
+        small print: a quarter of it names a change in one of five arms to which nothing happened.
     of_state : float
         Share of a misfit, root mean square, that is a function of position and velocity: 0.4 to
         0.8 in half of the joints of 14 arms.

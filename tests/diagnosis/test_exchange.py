@@ -66,6 +66,39 @@ def test_values_that_no_motion_shows_hide_no_change():
     assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3])) == (0, 34)
 
 
+def faintly(rng, value, share):
+    """Return rows of a recording whose motion hardly shows the cause."""
+    free, own = rng.normal(size=(2, ROWS, 1)) * [[[1.0]], [[share]]]
+    return Rows(free, own, value * own[:, 0] + 0.05 * rng.normal(size=ROWS))
+
+
+def shown(first, second, faint):
+    rows = [*first, *second]
+    free, left = (np.concatenate([getattr(one, n) for one in rows]) for n in ('free', 'residual'))
+    known = NormalEquations.of_rows(free, left)
+    return showing_more(first, second, known, np.array([1e-9]), faint)
+
+
+def test_a_recording_that_hardly_shows_a_cause_says_nothing_of_when_it_changed():
+    """To exchange it makes no other division; it would show more of the cause by chance."""
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(20):
+        days = [
+            *(recording(rng, v) for v in (0.0, 0.1, 0.0, 1.0, 1.1, 0.9)),
+            faintly(rng, 1.0, 0.01),
+        ]
+        found.append([shown(days[:3], days[3:], faint)[0] for faint in (0.0, 0.02)])
+    assert not any(clear for _, clear in found)
+    assert 5 <= sum(more > 0 for more, _ in found) <= 15
+
+
+def test_a_cause_that_one_day_hardly_shows_has_not_changed_as_far_as_they_tell():
+    rng = np.random.default_rng(6)
+    before = [faintly(rng, 1.0, 0.001) for _ in range(3)]
+    assert shown(before, [recording(rng, 1.0) for _ in range(3)], 0.02) == (1, 1)
+
+
 def test_what_one_recording_of_the_day_before_had_as_well_is_no_change():
     rng = np.random.default_rng(3)
     values = [0.0, 3.0, 0.0, 1.0, 3.0, 1.0]

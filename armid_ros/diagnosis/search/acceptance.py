@@ -65,8 +65,26 @@ def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
 
 
 def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
-    """Return whether gains (n,) are material, and such a share of the misfit, in any joint."""
-    return bool(np.any(gains >= here.evidence.least_squares(here.settings, misfit_share)))
+    """
+    Return whether gains (n,) are material in any joint, and such a share of the misfit in all.
+
+    A cause that acts in several joints shows in all of them together: its power over that of the
+    misfit is summed over joints.
+
+    """
+    alone, beside = (here.evidence.least_squares(here.settings, x) for x in (0.0, misfit_share))
+    return bool(np.any(gains >= alone) and np.sum(np.maximum(gains, 0.0) / beside) >= 1.0)
+
+
+def material_sizes(trial: Trial, here: Round, misfit_share: float) -> FloatArray:
+    """Return the size of each value, (p,), from which on what it makes alone is that material."""
+    made = np.sum(here.own(trial.candidate) ** 2, axis=0) * trial.visible**2
+    alone, beside = (
+        made / here.evidence.least_squares(here.settings, x)[:, np.newaxis]
+        for x in (0.0, misfit_share)
+    )
+    of_size_one = np.minimum(alone.max(axis=0), beside.sum(axis=0))
+    return np.asarray(1.0 / np.sqrt(np.maximum(of_size_one, 1e-300)))
 
 
 def without_echo(trial: Trial, here: Round) -> Trial:
@@ -163,7 +181,8 @@ def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
     if later is not None:
         for columns, residual in zip(later.free, later.residual, strict=True):
             known = known + NormalEquations.of_rows(columns, residual)
-    return showing_more(first, second, known, trial.candidate.precision)
+    faint = here.settings.thresholds.tie
+    return showing_more(first, second, known, trial.candidate.precision, faint)
 
 
 def showing_more(
@@ -171,9 +190,13 @@ def showing_more(
     second: Sequence[Rows],
     known: NormalEquations,
     precision: FloatArray,
+    faint: float = 0.0,
 ) -> tuple[int, int]:
     """
     Return how many other divisions show a larger change than two groups do, and of how many.
+
+    Recordings that hardly show the candidate are not divided: to exchange them makes no other
+    division. What one of the groups hardly shows has not changed as far as they tell.
 
     Parameters
     ----------
@@ -183,6 +206,8 @@ def showing_more(
         Of the nuisance parameters: all of these recordings, and their prior.
     precision : ndarray, shape (p,)
         Prior precision of the values of the candidate, about zero.
+    faint : float
+        Share of the squares of every column up to which a recording hardly shows the candidate.
 
     """
     rows = [*first, *second]
@@ -203,14 +228,25 @@ def showing_more(
         return float(wanted @ independent_inverse(products, np.tile(squares, 2)) @ wanted)
 
     days = np.arange(len(rows)) >= len(first)
-    least = explained(days) * (1.0 + ROUNDING)
-    others = [explained(other) for other in _divisions(days)]
+    shares = np.diagonal(own, axis1=1, axis2=2) / np.maximum(np.diag(own.sum(axis=0)), 1e-300)
+    clear = np.max(shares, axis=1) > faint
+    if not (np.any(clear & days) and np.any(clear & ~days)):
+        return 1, 1
+    least = explained(days & clear) * (1.0 + ROUNDING)
+    others = [explained(other) for other in _divisions(days, clear)]
     return sum(other > least for other in others), len(others)
 
 
-def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
-    """Yield other divisions into groups of the same sizes, but for the exchange of both groups."""
-    before, today = np.flatnonzero(~days), np.flatnonzero(days)
+def _divisions(
+    days: npt.NDArray[np.bool_], among: npt.NDArray[np.bool_]
+) -> Iterator[npt.NDArray[np.bool_]]:
+    """
+    Yield the second group of other divisions of some recordings, shape (m,).
+
+    Groups are of the same sizes; the exchange of both is no other division.
+
+    """
+    before, today = np.flatnonzero(~days & among), np.flatnonzero(days & among)
     pairs = (
         (out, into)
         for count in range(1, min(len(before), len(today)) + 1)
@@ -219,7 +255,7 @@ def _divisions(days: npt.NDArray[np.bool_]) -> Iterator[npt.NDArray[np.bool_]]:
         if count < len(today) or count < len(before)
     )
     for out, into in islice(pairs, _DIVISIONS):
-        other = days.copy()
+        other = days & among
         other[list(out)], other[list(into)] = False, True
         yield other
 

@@ -174,7 +174,7 @@ def in_model_as_given(found: Explanation) -> Explanation:
     """Return what the names explain while the rigid body stays as it is."""
     arm, evidence, fitted = found.given, found.evidence, found.fitted
     if found.prior is not None and found.baseline is not None:
-        fitted = as_change(fitted, found.prior, found.baseline)
+        fitted = as_change(fitted, evidence, found.prior, found.baseline)
     reference = fit(arm, (), evidence, None)
     alone = with_values_of(fitted, arm, evidence)
     return replace(found, base=None, prior=None, fitted=alone, reference=reference)

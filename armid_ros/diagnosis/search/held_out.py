@@ -32,12 +32,14 @@ from armid_ros.diagnosis.data.rows import (
 )
 from armid_ros.diagnosis.data.trajectory import fold_rows
 from armid_ros.diagnosis.search.fit import Fitted
+from armid_ros.diagnosis.search.round import Before, Nuisance
 from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
     informative_basis,
+    informative_solution,
     NormalEquations,
     UNINFORMATIVE,
 )
@@ -268,25 +270,29 @@ def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: flo
     return _with_deviation(fitted, np.sqrt(np.maximum(found, unit)))
 
 
-def as_change(fitted: Fitted, prior: Prior, baseline: Baseline) -> Fitted:
+def as_change(fitted: Fitted, evidence: Evidence, prior: Prior, baseline: Baseline) -> Fitted:
     """
-    Widen standard deviations by the value that each name seems to have had in the baseline.
+    Widen standard deviations by how far values move if names had values in the baseline, too.
 
-    The values are those of now, of which a part may have been there before. That something has
-    changed is another question, which the recordings of both days answer.
+    Values of then and now are fitted jointly with a body common to both days. What that body takes
+    up as well moves nothing.
 
     Parameters
     ----------
     fitted : Fitted
         The arm with all names.
+    evidence : Evidence
+        The data.
     prior : Prior
         Information of the baseline about the base parameters.
     baseline : Baseline
         Those recordings.
 
     """
-    before = _seen_before(fitted, prior, baseline)
-    return _with_deviation(fitted, np.hypot(_known(fitted), before))
+    if not fitted.named:
+        return fitted
+    moved = _moved_by_values_before(fitted, evidence, prior, baseline)
+    return _with_deviation(fitted, np.hypot(_known(fitted), moved))
 
 
 def _known(fitted: Fitted) -> FloatArray:
@@ -331,22 +337,27 @@ def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[NormalEquati
     return [NormalEquations.of_rows(x, y).and_zeros(named) for x, y in recordings]
 
 
-def _seen_before(fitted: Fitted, prior: Prior, baseline: Baseline) -> FloatArray:
+def _moved_by_values_before(
+    fitted: Fitted, evidence: Evidence, prior: Prior, baseline: Baseline
+) -> FloatArray:
     """
-    Return the values that names seem to have had in the baseline, (p,).
+    Return how far values move if names had values in the baseline that are still there, (p,).
 
-    Base parameters are fitted jointly. No value is expected to be larger than now: its present
-    size is the standard deviation of its prior, about zero. Shapes are as now.
+    No value is expected to have been larger than now: its present size is the standard deviation
+    of its prior, about zero.
 
     """
-    result = np.zeros(len(fitted.estimate.values))
-    residual = prior.residual - prior.columns @ fitted.change
-    for own, values, (places, _) in zip(fitted.named, fitted.values, fitted.places, strict=True):
-        kept = list(own.kept)
-        pair = np.column_stack([baseline.columns(fitted.arm, own.effect, kept), residual])
-        pair -= prior.columns @ prior.nearest(pair)
-        size = np.maximum(np.abs(values[kept]), 1e-300)
-        scaled = pair[:, :-1] * size
-        precision = scaled.T @ scaled + np.eye(len(kept))
-        result[list(places)] = size * np.linalg.solve(precision, scaled.T @ pair[:, -1])
-    return result
+    robot, rank = fitted.arm.robot, len(fitted.change)
+    problem = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns))
+    now = problem.x.reshape(-1, problem.x.shape[2])
+    there = [k for values, _ in fitted.places for k in values]
+    candidates = [Candidate(own.effect, slice(0), own.kept, robot) for own in fitted.named]
+    nuisance = Nuisance(tuple(range(now.shape[1])), fitted.prior)
+    known = Before(baseline, prior, fitted.change).information(candidates, fitted.arm, nuisance)
+    rows = np.concatenate([now[:, [rank + k for k in there]], now], axis=1)
+    whole = known + NormalEquations.of_rows(rows, problem.y.ravel())
+    first = len(there)
+    scale = np.concatenate([np.abs(fitted.estimate.values[there]), np.ones(now.shape[1])])
+    products = whole.matrix * np.outer(scale, scale)
+    products[:first, :first] += np.eye(first)
+    return informative_solution(products, whole.vector * scale)[first + rank :]

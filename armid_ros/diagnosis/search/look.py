@@ -22,6 +22,7 @@ from armid_ros.diagnosis.search.acceptance import (
     changed,
     inside,
     material,
+    material_sizes,
     surely_changed,
     without_echo,
 )
@@ -215,21 +216,14 @@ def _survey(candidates: Sequence[Candidate], ranking: Sequence[Trial], here: Rou
     visible = {trial.candidate.effect.said_as for trial in ranking}
     seen = {trial.candidate.key[:2] for trial in ranking}
     whole = 0.0 if can_be_sure(here) else here.settings.thresholds.misfit_share
-    least = here.evidence.least_squares(here.settings, whole)
     return Survey(
         tuple(ranking),
-        {trial.candidate.key: _material_sizes(trial, least, here) for trial in ranking},
+        {trial.candidate.key: material_sizes(trial, here, whole) for trial in ranking},
         frozenset(candidate.effect.said_as for candidate in candidates) - visible,
         here.total,
         here.tried,
         tuple(dict.fromkeys(g.key[:2] for g in candidates if g.key[:2] not in seen)),
     )
-
-
-def _material_sizes(trial: Trial, least: FloatArray, here: Round) -> FloatArray:
-    """Return the sizes of values, (p,), that make the least squares (n,) in one of the joints."""
-    made = np.sum(here.own(trial.candidate) ** 2, axis=0) * trial.visible**2
-    return np.asarray(np.sqrt(np.min(least[:, np.newaxis] / np.maximum(made, 1e-300), axis=0)))
 
 
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
@@ -300,8 +294,8 @@ def _examined(
             continue
         there.append(change)
         takes = trial.joint_gains(*here.rows_of(trial.candidate))
-        matters = change.gain >= least or bool(np.any(takes > most * open_squares))
         size = _size(change, takes, here)
+        matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
         if not (matters and material(size, here, 0.0)):
             continue
         if material(size, here, whole) or surely_changed(trial, here):
