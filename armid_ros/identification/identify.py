@@ -23,6 +23,7 @@ from armid_ros.identification.fitting.identifiability import Unidentified, unide
 from armid_ros.identification.fitting.least_squares import Method
 from armid_ros.identification.fitting.nonlinear import fit_values, FittedValues, through, torques
 from armid_ros.identification.fitting.quasi_static import free_directions, with_uncertain_inertia
+from armid_ros.identification.fitting.scatter import scatter
 from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
 from armid_ros.identification.physical.physical_fit import fit_to_bodies
@@ -188,6 +189,8 @@ class Identification:
         What a person should know: joints at rest, outliers, grouped parameters.
     halves : HalvesError
         Torque error when either half of the data predicts the other.
+    scatter : ndarray, shape (K, r)
+        What values vary by from recording to recording; see `scatter`.
     physical : PhysicalCertificate or None
         What shows that the links are bodies, where that was asked.
     passes : int
@@ -206,6 +209,7 @@ class Identification:
     settings: IdentificationSettings
     notes: tuple[str, ...]
     halves: HalvesError
+    scatter: FloatArray
     physical: PhysicalCertificate | None = None
     passes: int = 1
 
@@ -321,6 +325,7 @@ def identify(
         halves=halves_error(fit.problem, fit.solution.weights, fit.base.values(whole.theta)),
         physical=certificate,
         passes=fit.passes,
+        scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )
 
 

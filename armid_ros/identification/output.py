@@ -58,6 +58,7 @@ def identification_document(
         'gravity': [float(g) for g in result.arm.robot.gravity],
         'parameters': parameter_table(estimate.parameters, estimate.values, list(estimate.std)),
         'covariance': [row[: k + 1].tolist() for k, row in enumerate(estimate.covariance)],
+        'scatter': result.scatter.tolist(),
         'grouping': list(result.base.terms),
         'not_identified': [
             {

@@ -51,6 +51,9 @@ class ParameterFile:
         Joints of the robot, where the file has them.
     kinematics : str
         What is the same for descriptions of one robot; empty where the file does not have it.
+    scatter : ndarray, shape (K, P)
+        What the values change by without each of K recordings, so that squares sum up to a
+        variance; K is zero if the file does not have it.
 
     """
 
@@ -62,6 +65,7 @@ class ParameterFile:
     terms: Mapping[ParameterName, Mapping[str, float]] = field(default_factory=dict)
     joints: tuple[str, ...] = ()
     kinematics: str = ''
+    scatter: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def std(self) -> FloatArray:
@@ -75,6 +79,13 @@ class ParameterFile:
         if self.covariance is None:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
+
+    def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
+        """Return what some values change by without each recording, shape (K, p)."""
+        order = {name: position for position, name in enumerate(self.values)}
+        if not len(self.scatter):
+            return np.zeros((0, len(names)))
+        return np.asarray(self.scatter[:, [order[name] for name in names]])
 
     def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """
@@ -125,7 +136,13 @@ class ParameterFile:
         told = [name for name, sure in zip(names, follows, strict=True) if sure]
         more = {n: (float(v), float(s)) for n, v, s in zip(told, values, std, strict=True)}
         terms = {**self.terms, **{name: other.terms[name] for name in told}}
-        return replace(self, values={**self.values, **more}, covariance=covariance, terms=terms)
+        return replace(
+            self,
+            values={**self.values, **more},
+            covariance=covariance,
+            terms=terms,
+            scatter=self.scatter @ factors.T if len(self.scatter) else self.scatter,
+        )
 
 
 def read_parameters(path: str | Path) -> ParameterFile:
@@ -272,6 +289,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         terms,
         tuple(str(joint) for joint in about.get('joints', ())),
         str(about.get('kinematics', '')),
+        _scatter(document.get('scatter', ()), len(values)),
     )
 
 
@@ -282,6 +300,14 @@ def _value(row: Mapping[str, Any], name: ParameterName) -> tuple[float, float]:
     if std < 0.0:
         raise ValueError(f'the std of {which} is negative: {std:g}')
     return value, std
+
+
+def _scatter(rows: Sequence[Sequence[Any]], size: int) -> FloatArray:
+    """Return changes of all values, a row for each recording."""
+    if any(len(row) != size for row in rows):
+        raise ValueError(f'a scatter whose rows are not of {size} values')
+    named = [[finite(value, 'a scatter') for value in row] for row in rows]
+    return np.array(named).reshape(len(rows), size)
 
 
 def _terms(row: Mapping[str, Any]) -> dict[str, float]:

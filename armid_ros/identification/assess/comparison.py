@@ -7,6 +7,10 @@ With dozens of parameters one in twenty is outside its 95 % interval by chance, 
 held against each other (Holm 1979): a change is called one if the whole list of changes is free of
 chance finds with 95 % probability.
 
+A model gets something wrong of every motion, and other motions give other values. What values vary
+by from recording to recording widens the deviations of each joint, where the files have it. Few
+recordings show that badly: Student's distribution holds then, and that of Fisher for groups.
+
 Where both have their covariance, the effects of each joint and the links are looked at as a whole
 too: parameters that are hard to tell apart can differ together beyond doubt and none of them
 alone. A change of the links is held against that of a load on one of them.
@@ -25,8 +29,7 @@ from armid_ros.identification.assess.load_change import find_load, LoadChange
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.motion import FloatArray
 import numpy as np
-from scipy.special import erfc
-from scipy.stats import chi2
+from scipy.stats import chi2, f, norm, t
 
 SCHEMA = 'armid/comparison/1'
 #: Probability that the list of changes has a chance find in it.
@@ -202,17 +205,23 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
             f'{before.source} and {after.source} have no identified parameter in common; '
             'are they of one robot, in one gravity?'
         )
-    pairs = np.array([(*first.values[name], *second.values[name]) for name in shared])
-    difference = pairs[:, 2] - pairs[:, 0]
+    sides = [_Side.of(one, shared) for one in (first, second)]
+    difference = sides[1].values - sides[0].values
     covariance = first.covariance_of(shared) + second.covariance_of(shared)
+    scatter = np.concatenate([one.scatter for one in sides])
     joint = before.covariance is not None and after.covariance is not None
     groups = _groups(shared) if joint else []
     chance = CHANCE / 2.0 if groups else CHANCE
-    single = _beyond_chance(_single_chances(pairs), chance)
-    together = [_group_chance(difference[g], covariance[np.ix_(g, g)]) for g in groups]
+    single = _beyond_chance(_single_chances(*sides), chance)
+    freedom = sum(one.freedom for one in sides)
+    together = [
+        _group_chance(difference[g], covariance[np.ix_(g, g)], scatter[:, g], freedom)
+        for g in groups
+    ]
+    rows = np.array([sides[0].values, sides[1].values, sides[0].std, sides[1].std]).T.tolist()
     changes = tuple(
-        ParameterChange(name, pair[0], pair[2], pair[1], pair[3], sure)
-        for name, pair, sure in zip(shared, pairs.tolist(), single, strict=True)
+        ParameterChange(name, row[0], row[1], row[2], row[3], sure)
+        for name, row, sure in zip(shared, rows, single, strict=True)
     )
     found = tuple(
         GroupChange(
@@ -229,10 +238,11 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
     load = None
     if joint and moved:
+        noise = covariance[np.ix_(rigid, rigid)]
         load = find_load(
             [first.terms.get(shared[k], {}) for k in rigid],
             difference[rigid],
-            covariance[np.ix_(rigid, rigid)],
+            _inflation(noise, scatter[:, rigid]) * noise,
         )
     return Comparison(
         before,
@@ -270,28 +280,93 @@ def _groups(names: Sequence[ParameterName]) -> list[list[int]]:
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _single_chances(pairs: FloatArray) -> list[float]:
-    """Return how likely each difference is by chance; rows are value, std, value, std."""
-    std = np.hypot(pairs[:, 1], pairs[:, 3])
-    size = np.abs(pairs[:, 2] - pairs[:, 0])
+@dataclass(frozen=True)
+class _Side:
+    """
+    The parameters that two identifications share, in one of them.
+
+    Attributes
+    ----------
+    values, std : ndarray, shape (p,)
+        Values and their standard deviations: those of noise, and in each joint as many times as
+        much as its values vary from recording to recording.
+    scatter : ndarray, shape (K, p)
+        Changes of the values without each recording.
+    freedom : int
+        Recordings less one.
+    freedoms : ndarray, shape (p,)
+        Degrees of freedom of each deviation: the mean of squares of n values with correlations R
+        has n^2 over the sum of R^2 times those of one (Satterthwaite). Infinite for noise.
+
+    """
+
+    values: FloatArray
+    std: FloatArray
+    scatter: FloatArray
+    freedom: int
+    freedoms: FloatArray
+
+    @classmethod
+    def of(cls, known: ParameterFile, names: Sequence[ParameterName]) -> _Side:
+        """Return the values of one file."""
+        values, std = np.array([known.values[name] for name in names]).T
+        scatter = known.scatter_of(names)
+        freedom = max(len(scatter) - 1, 0)
+        freedoms = np.full(len(names), np.inf)
+        if freedom and np.all(std > 0.0):
+            squares = np.sum((scatter / std) ** 2, axis=0)
+            alike = (known.covariance_of(names) / np.outer(std, std)) ** 2
+            std = std.copy()
+            for joint in {name.joint for name in names}:
+                own = [k for k, name in enumerate(names) if name.joint == joint]
+                inflation = float(np.mean(squares[own]))
+                if inflation > 1.0:
+                    std[own] *= np.sqrt(inflation)
+                    freedoms[own] = freedom * len(own) ** 2 / np.sum(alike[np.ix_(own, own)])
+        return cls(values, std, scatter, freedom, freedoms)
+
+
+def _single_chances(before: _Side, after: _Side) -> list[float]:
+    """Return how likely each difference is by chance, with freedoms of a sum (Welch)."""
+    size, std = np.abs(after.values - before.values), np.hypot(before.std, after.std)
     safe = np.where(std > 0.0, std, 1.0)
-    with np.errstate(over='ignore'):  # infinitely many deviations have no chance
-        missed = size / safe / np.sqrt(2.0)
-    chances = np.where(std > 0.0, erfc(missed), (size == 0.0).astype(float))
-    return [float(chance) for chance in chances]
+    shares = [((side.std / safe) ** 4) / side.freedoms for side in (before, after)]
+    with np.errstate(over='ignore', divide='ignore'):  # infinitely many deviations have no chance
+        missed, freedom = size / safe, 1.0 / (shares[0] + shares[1])
+    known = np.isfinite(freedom)
+    chances = 2.0 * np.where(known, t.sf(missed, np.where(known, freedom, 1.0)), norm.sf(missed))
+    return [float(p) for p in np.where(std > 0.0, chances, (size == 0.0).astype(float))]
 
 
-def _group_chance(difference: FloatArray, covariance: FloatArray) -> float:
+def _group_chance(
+    difference: FloatArray, covariance: FloatArray, scatter: FloatArray, freedom: int
+) -> float:
     """Return how likely differences are by chance, all together."""
-    std = np.sqrt(np.diag(covariance))
-    if not np.all(std > 0.0):
+    if not np.all(np.diag(covariance) > 0.0):
         return 1.0
+    squares, rank = _squares(difference[np.newaxis], covariance)
+    inflation = _inflation(covariance, scatter)
+    if inflation == 1.0:
+        return float(chi2.sf(squares, rank))
+    return float(f.sf(squares / rank / inflation, rank, rank * freedom))
+
+
+def _inflation(covariance: FloatArray, scatter: FloatArray) -> float:
+    """Return how many times the squares that noise makes recordings show, at least one."""
+    if not (len(scatter) and np.all(np.diag(covariance) > 0.0)):
+        return 1.0
+    squares, rank = _squares(scatter, covariance)
+    return max(1.0, squares / rank)
+
+
+def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
+    """Return the sum of the squares of rows (K, p) over a covariance, and its rank."""
+    std = np.sqrt(np.diag(covariance))
     sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
     kept = sizes > _ROUNDING * sizes[-1]
     with np.errstate(over='ignore'):
-        along = axes[:, kept].T @ (difference / std)
-        squares = float(np.sum(along**2 / sizes[kept]))
-    return float(chi2.sf(squares, int(kept.sum())))
+        along = (rows / std) @ axes[:, kept]
+        return float(np.sum(along**2 / sizes[kept])), int(kept.sum())
 
 
 def _beyond_chance(chances: Sequence[float], allowed: float) -> list[bool]:

@@ -147,6 +147,56 @@ def test_a_motion_that_shows_less_is_compared_with_one_that_shows_more():
         assert change.std == pytest.approx(np.sqrt(0.09 + 0.05))
 
 
+def recorded(rng, truth, size, noise, source='a'):
+    """Return means of values of three recordings, which differ by more than noise does."""
+    own = truth + size * rng.normal(size=(3, len(truth)))
+    names = [ParameterName(f'p{k}', f'joint_{k % 5}', 'kg m') for k in range(len(truth))]
+    values, others = own.mean(axis=0), (own.sum(axis=0) - own) / 2.0
+    table = {name: (float(v), noise) for name, v in zip(names, values, strict=True)}
+    scatter = np.sqrt(2.0 / 3.0) * (others - values)
+    covariance = noise**2 * np.eye(len(truth))
+    return ParameterFile(source, 'arm', table, 5.0, covariance, scatter=scatter)
+
+
+def test_what_differs_from_recording_to_recording_is_no_change():
+    """A model gets something else wrong of every motion; noise alone makes a tenth of it."""
+    rng = np.random.default_rng(3)
+    found, without = 0, 0
+    for _ in range(200):
+        sides = [recorded(rng, np.zeros(40), 1.0, 0.1) for _ in range(2)]
+        found += compare(*sides).anything
+        without += compare(*(replace(one, scatter=np.zeros((0, 0))) for one in sides)).anything
+    assert without == 200
+    assert found < 0.085 * 200
+
+
+def test_a_change_beyond_what_recordings_differ_by_is_found():
+    rng = np.random.default_rng(4)
+    after = np.arange(40) == 7
+    for _ in range(20):
+        rough, exact = (recorded(rng, np.zeros(40), size, 0.2 * size) for size in (1.0, 0.05))
+        changed = recorded(rng, after, 0.05, 0.01)
+        assert 'p7' not in [one.parameter.name for one in compare(rough, changed).changed]
+        first = compare(exact, changed).changed[0]
+        assert first.parameter.name == 'p7'
+        assert 0.02 < first.std < 0.08
+
+
+def test_a_grouping_varies_as_its_parameters_do():
+    rng = np.random.default_rng(5)
+    both = [ParameterName(name, 'elbow', 'kg m') for name in ('mx1', 'my1')]
+    together = ParameterName('mx1 + 2 my1', 'elbow', 'kg m')
+    rows = rng.normal(size=(3, 2))
+    terms = {name: {name.name: 1.0} for name in both}
+    table = {both[0]: (1.0, 0.1), both[1]: (2.0, 0.1)}
+    rich = ParameterFile('a', 'arm', table, 5.0, 0.01 * np.eye(2), terms, scatter=rows)
+    poor = ParameterFile('b', 'arm', {together: (7.0, 0.3)}, 5.0, np.array([[0.09]]))
+    poor = replace(poor, terms={together: {'mx1': 1, 'my1': 2}})
+    regrouped = rich.regrouped_as(poor)
+    np.testing.assert_allclose(regrouped.scatter_of([together]), rows @ [[1.0], [2.0]])
+    assert poor.scatter_of([together]).shape == (0, 1)
+
+
 def test_a_change_of_two_links_is_no_load():
     rng = np.random.default_rng(0)
     terms = {name: {name.name: 1.0} for name in LINKS}
@@ -216,6 +266,7 @@ def written(tmp_path, **changes):
         'robot': 'arm',
         'parameters': [{**row, **{k: v for k, v in changes.items() if k in row}}],
         'covariance': [[changes.get('variance', 0.01)]],
+        'scatter': changes.get('scatter', [[0.1], [0.2]]),
         'training': {'relative_error_percent': changes.get('error', 5.0)},
     }
     (tmp_path / 'identification.json').write_text(json.dumps(document))
@@ -232,6 +283,8 @@ def written(tmp_path, **changes):
         ({'variance': -0.01}, 'a negative variance'),
         ({'variance': float('nan')}, 'not finite'),
         ({'error': 'x'}, 'relative_error_percent'),
+        ({'scatter': [[0.1, 0.2]]}, 'a scatter whose rows are not of 1 values'),
+        ({'scatter': [[float('inf')]]}, 'a scatter has to be a finite number'),
     ],
 )
 def test_numbers_that_no_estimate_has_are_refused(tmp_path, changes, message):
