@@ -303,8 +303,7 @@ def identify(
                 theory, fit, recordings, used, settings.least_squares, rng
             )
     fit, said = refined(settings.method, arm, fit, recordings, used, rng)
-    notes += said
-    notes += _remarks(fit, theory)
+    notes += said + _remarks(fit, theory)
     certificate = None
     if settings.physical is not None:
         fit, certificate = fit_to_bodies(

@@ -60,15 +60,7 @@ def identification_document(
         'covariance': [row[: k + 1].tolist() for k, row in enumerate(estimate.covariance)],
         'scatter': result.scatter.tolist(),
         'grouping': list(result.base.terms),
-        'not_identified': [
-            {
-                'name': lost.parameter.name,
-                'joint': lost.parameter.joint,
-                'unit': lost.parameter.unit,
-                'reason': lost.reason,
-            }
-            for lost in result.unidentified
-        ],
+        'not_identified': _lost(result),
         'condition_number': result.condition_number,
         'rank': result.base.rank,
         'training': {
@@ -100,6 +92,19 @@ def identification_document(
             'left_out': list(verification.left_out),
         }
     return document
+
+
+def _lost(result: Identification) -> list[dict[str, str]]:
+    """Return what the data do not tell, and why."""
+    return [
+        {
+            'name': lost.parameter.name,
+            'joint': lost.parameter.joint,
+            'unit': lost.parameter.unit,
+            'reason': lost.reason,
+        }
+        for lost in result.unidentified
+    ]
 
 
 def write_document(path: str | Path, document: Mapping[str, Any]) -> None:
