@@ -156,6 +156,14 @@ def share_of_misfit(trial: Trial, here: Round) -> float:
     return _share((1, 1) if here.before is None else _showing_more(trial, here), here)
 
 
+def shows_beside_misfit(size: FloatArray, trial: Trial, here: Round) -> bool:
+    """Return whether squares of the torque of a change, (n,), are enough; see `share_of_misfit`."""
+    whole, least = here.settings.thresholds.misfit_share, least_share_of_misfit(here)
+    if not material(size, here, least):
+        return False
+    return material(size, here, whole) or material(size, here, share_of_misfit(trial, here))
+
+
 def least_share_of_misfit(here: Round) -> float:
     """Return that share where no other division of all recordings shows more."""
     if here.before is None:

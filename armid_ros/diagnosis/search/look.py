@@ -24,6 +24,7 @@ from armid_ros.diagnosis.search.acceptance import (
     material,
     material_sizes,
     share_of_misfit,
+    shows_beside_misfit,
     without_echo,
 )
 from armid_ros.diagnosis.search.candidates import refine
@@ -296,7 +297,7 @@ def _examined(
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
         if not (matters and material(size, here, 0.0)):
             continue
-        if material(size, here, share_of_misfit(trial, here)):
+        if shows_beside_misfit(size, trial, here):
             large.append((trial, change))
     best = [trial for trial, _ in large[:_COMPARED]]
     others = [trial for trial in ranking if not any(trial is one for one in best)]
