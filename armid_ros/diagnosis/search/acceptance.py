@@ -157,7 +157,7 @@ def share_of_misfit(trial: Trial, here: Round) -> float:
 
 
 def shows_beside_misfit(size: FloatArray, trial: Trial, here: Round) -> bool:
-    """Return whether squares of the torque of a change, (n,), are enough; see `share_of_misfit`."""
+    """Return whether the squares that a change makes, (n,), are that share of the misfit."""
     whole, least = here.settings.thresholds.misfit_share, least_share_of_misfit(here)
     if not material(size, here, least):
         return False
