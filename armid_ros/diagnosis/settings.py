@@ -39,14 +39,13 @@ class Thresholds:
         over what happens between two days.
     misfit_share : float
         Power of a cause over that of the model's own misfit, summed over joints, below which it is
-        small print where recordings divide in three ways, as two a day do, and in proportion less
-        where they divide in more: of 38 arms to which nothing happened, two recordings a day, 6,
-        3, 2 and 1 have a candidate of 0.3, 0.5, 0.98 and 2.5 of it.
+        small print: a quarter of it names a change in one of five arms to which nothing happened.
     of_state : float
         Share of a misfit, root mean square, that is a function of position and velocity: 0.4 to
         0.8 in half of the joints of 14 arms.
     exchanged : float
         Share of the divisions of all recordings that may show as much of a change as the days do.
+        Where there are so many of them that one is less than that, smaller changes are seen, too.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print; recordings hardly show causes that take less than this share of what they

@@ -33,8 +33,6 @@ import numpy.typing as npt
 
 #: Most divisions that are tried; those that exchange fewest recordings first.
 _DIVISIONS = 200
-#: Ways in which two recordings a day divide, for which the share of the misfit is.
-_WAYS = 3
 
 
 def acceptable(trial: Trial, here: Round) -> bool:
@@ -142,47 +140,32 @@ def changed(trial: Trial, here: Round) -> bool:
     if here.before is None:
         return True
     more, divisions = _showing_more(trial, here)
-    return more == 0 or more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
+    return more == 0 or _seldom(more, divisions, here)
 
 
-def share_of_misfit(trial: Trial, here: Round) -> float:
-    """
-    Return the share of the misfit that the power of a candidate has to have.
-
-    Where nothing happened, one misfit in W looks like a change if recordings divide in W ways, and
-    the candidates of a size r or more are as 1 / r: what is r W times as rare is as sure.
-
-    """
-    return _share((1, 1) if here.before is None else _showing_more(trial, here), here)
+def surely_changed(trial: Trial, here: Round) -> bool:
+    """Return whether the permutation test is significant: the change may be below the misfit."""
+    return can_be_sure(here) and _seldom(*_showing_more(trial, here), here)
 
 
-def shows_beside_misfit(size: FloatArray, trial: Trial, here: Round) -> bool:
-    """Return whether the squares that a change makes, (n,), are that share of the misfit."""
-    whole, least = here.settings.thresholds.misfit_share, least_share_of_misfit(here)
-    if not material(size, here, least):
-        return False
-    return material(size, here, whole) or material(size, here, share_of_misfit(trial, here))
-
-
-def least_share_of_misfit(here: Round) -> float:
-    """Return that share where no other division of all recordings shows more."""
+def can_be_sure(here: Round) -> bool:
+    """Return whether there are so many divisions that the permutation test can be significant."""
     if here.before is None:
-        return _share((1, 1), here)
+        return False
     first = count_recordings(here.before.prior.data)
     second = count_recordings(here.evidence.data)
     second += 0 if here.before.later is None else len(here.before.later.residual)
-    return _share((0, min(count_divisions(first, second), _DIVISIONS)), here)
+    return _seldom(0, min(count_divisions(first, second), _DIVISIONS), here)
 
 
-def _share(shown: tuple[int, int], here: Round) -> float:
-    """Return the share of the misfit from how many divisions show more, and of how many."""
-    more, divisions = shown
-    return here.settings.thresholds.misfit_share * min(1.0, _WAYS * (more + 1) / (divisions + 1))
+def _seldom(more: int, divisions: int, here: Round) -> bool:
+    """Return whether the p-value of the permutation test is within its level."""
+    return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
 
 
 def count_divisions(first: int, second: int) -> int:
     """Return the number of other divisions of recordings into groups of two sizes."""
-    return comb(first + second, first) // (2 if first == second else 1) - 1
+    return comb(first + second, first) - 1 - (first == second)
 
 
 def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
@@ -260,7 +243,7 @@ def _divisions(
     """
     Yield the second group of other divisions of some recordings, shape (m,).
 
-    Groups are of the same sizes; where both are, their exchange is no other division.
+    Groups are of the same sizes; the exchange of both is no other division.
 
     """
     before, today = np.flatnonzero(~days & among), np.flatnonzero(days & among)
@@ -269,7 +252,7 @@ def _divisions(
         for count in range(1, min(len(before), len(today)) + 1)
         for out in combinations(today, count)
         for into in combinations(before, count)
-        if len(before) != len(today) or before[0] not in into
+        if count < len(today) or count < len(before)
     )
     for out, into in islice(pairs, _DIVISIONS):
         other = days & among

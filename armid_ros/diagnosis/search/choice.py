@@ -281,8 +281,8 @@ def few_recordings(first: int, second: int) -> tuple[str, ...]:
 
 
 def _ways(first: int, second: int) -> int:
-    """Return in how many ways recordings divide."""
-    return 1 + count_divisions(first, second)
+    """Return in how many ways recordings divide; groups of equal sizes may be exchanged."""
+    return 1 + count_divisions(first, second) // (2 if first == second else 1)
 
 
 def _doubt(baseline: Baseline, joints: Sequence[str]) -> str:

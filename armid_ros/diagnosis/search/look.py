@@ -18,13 +18,12 @@ from armid_ros.diagnosis.data.rows import (
 )
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
+    can_be_sure,
     changed,
     inside,
-    least_share_of_misfit,
     material,
     material_sizes,
-    share_of_misfit,
-    shows_beside_misfit,
+    surely_changed,
     without_echo,
 )
 from armid_ros.diagnosis.search.candidates import refine
@@ -119,13 +118,15 @@ class Look:
         likely = sorted(
             best.values(), key=lambda t: (frequency(t, here) is Frequency.NEVER, rarity(t))
         )
+        whole = here.settings.thresholds.misfit_share
+        least = 0.0 if surely_changed(winner, here) else whole
         return Step(
             winner,
             tuple(likely[:_RIVALS]),
             self.ranking,
             self.survey.total,
             self.survey.tried,
-            share_of_misfit(winner, here),
+            least,
         )
 
 
@@ -214,10 +215,10 @@ def _survey(candidates: Sequence[Candidate], ranking: Sequence[Trial], here: Rou
     assert here.total is not None
     visible = {trial.candidate.effect.said_as for trial in ranking}
     seen = {trial.candidate.key[:2] for trial in ranking}
-    least = least_share_of_misfit(here)
+    whole = 0.0 if can_be_sure(here) else here.settings.thresholds.misfit_share
     return Survey(
         tuple(ranking),
-        {trial.candidate.key: material_sizes(trial, here, least) for trial in ranking},
+        {trial.candidate.key: material_sizes(trial, here, whole) for trial in ranking},
         frozenset(candidate.effect.said_as for candidate in candidates) - visible,
         here.total,
         here.tried,
@@ -281,7 +282,7 @@ def _examined(
     """
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
-    most = here.settings.thresholds.open_share
+    whole, most = here.settings.thresholds.misfit_share, here.settings.thresholds.open_share
     open_squares = _open_squares(here)
     there: list[Trial] = []
     large: list[tuple[Trial, Trial]] = []
@@ -297,7 +298,7 @@ def _examined(
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
         if not (matters and material(size, here, 0.0)):
             continue
-        if shows_beside_misfit(size, trial, here):
+        if material(size, here, whole) or surely_changed(trial, here):
             large.append((trial, change))
     best = [trial for trial, _ in large[:_COMPARED]]
     others = [trial for trial in ranking if not any(trial is one for one in best)]

@@ -283,8 +283,9 @@ class Step:
     tried : int
         Candidates that were tried, every shape for itself.
     misfit_share : float
-        Share of the misfit that it has to take, less where recordings divide in more ways. None
-        for friction and offsets without given values, which only have to be significant.
+        Share of the misfit that it has to take: zero where the permutation test is significant, so
+        that a misfit does not hide the change. None for friction and offsets without given values,
+        which only have to be significant.
 
     """
 
