@@ -74,18 +74,20 @@ class ParameterFile:
 
     def covariance_of(self, names: Sequence[ParameterName]) -> FloatArray:
         """Return the covariance of some values; diagonal if the file has but deviations."""
-        order = {name: position for position, name in enumerate(self.values)}
-        chosen = [order[name] for name in names]
+        chosen = self._positions(names)
         if self.covariance is None:
             return np.asarray(np.diag(self.std[chosen] ** 2))
         return np.asarray(self.covariance[np.ix_(chosen, chosen)])
 
     def scatter_of(self, names: Sequence[ParameterName]) -> FloatArray:
         """Return what some values change by without each recording, shape (K, p)."""
-        order = {name: position for position, name in enumerate(self.values)}
         if not len(self.scatter):
             return np.zeros((0, len(names)))
-        return np.asarray(self.scatter[:, [order[name] for name in names]])
+        return np.asarray(self.scatter[:, self._positions(names)])
+
+    def _positions(self, names: Sequence[ParameterName]) -> list[int]:
+        order = {name: position for position, name in enumerate(self.values)}
+        return [order[name] for name in names]
 
     def information(self, parameters: Sequence[ParameterName]) -> FloatArray | None:
         """

@@ -31,7 +31,7 @@ def asked(first, second):
     free = np.concatenate([one.free for one in rows])
     left = np.concatenate([one.residual for one in rows])
     known = NormalEquations.of_rows(free, left)
-    more, _divisions = showing_more(first, second, known, np.array([1e-9]))
+    more, _divisions = showing_more(first, second, known, np.array([1e-9]), 0.0)
     return more == 0
 
 
@@ -63,7 +63,7 @@ def test_values_that_no_motion_shows_hide_no_change():
     wide = [Rows(one.free, np.hstack([one.own, 1e-12 * one.own]), one.residual) for one in days]
     free, left = (np.concatenate([getattr(one, n) for one in days]) for n in ('free', 'residual'))
     known = NormalEquations.of_rows(free, left)
-    assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3])) == (0, 34)
+    assert showing_more(wide[:3], wide[3:], known, np.array([1e-9, 0.3]), 0.0) == (0, 34)
 
 
 def faintly(rng, value, share):

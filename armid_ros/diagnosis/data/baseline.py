@@ -23,7 +23,6 @@ from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_
 from armid_ros.effects import Effect
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.normal_equations import (
-    informative_solution,
     NormalEquations,
     scaled_inverse,
 )
@@ -76,10 +75,6 @@ class Prior:
     def of_change(self) -> NormalEquations:
         """Normal equations of a change of the r base parameters."""
         return NormalEquations.of_rows(self.columns, self.residual)
-
-    def nearest(self, columns: FloatArray) -> FloatArray:
-        """Return the changes of base parameters that fit columns (S, p) best, shape (r, p)."""
-        return informative_solution(self.of_change.matrix, self.columns.T @ columns)
 
     def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Yield the columns of each recording, (S, r), and its residual after a change, (S,)."""

@@ -190,7 +190,7 @@ def showing_more(
     second: Sequence[Rows],
     known: NormalEquations,
     precision: FloatArray,
-    faint: float = 0.0,
+    faint: float,
 ) -> tuple[int, int]:
     """
     Return how many other divisions show a larger change than two groups do, and of how many.

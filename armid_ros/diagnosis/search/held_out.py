@@ -319,8 +319,8 @@ def _by_part(fitted: Fitted, evidence: Evidence) -> list[NormalEquations]:
 
 def _values(known: NormalEquations, size: int) -> tuple[FloatArray, FloatArray]:
     """Return the posterior means of the last values, and their standard deviations, each (p,)."""
-    basis = informative_basis(known.matrix)
-    return (basis @ (basis.T @ known.vector))[-size:], np.sqrt(np.sum(basis[-size:] ** 2, axis=1))
+    means, std = known.solution()
+    return means[-size:], std[-size:]
 
 
 def _recordings_before(fitted: Fitted, prior: Prior | None) -> list[NormalEquations]:
@@ -348,16 +348,14 @@ def _moved_by_values_before(
 
     """
     robot, rank = fitted.arm.robot, len(fitted.change)
-    problem = make_problem(evidence.data, evidence.sigma, fitted.residual, list(fitted.columns))
-    now = problem.x.reshape(-1, problem.x.shape[2])
     there = [k for values, _ in fitted.places for k in values]
+    today = sum(_by_part(fitted, evidence), start=NormalEquations.none(len(fitted.prior.vector)))
     candidates = [Candidate(own.effect, slice(0), own.kept, robot) for own in fitted.named]
-    nuisance = Nuisance(tuple(range(now.shape[1])), fitted.prior)
+    every, first = range(len(today.vector)), len(there)
+    nuisance = Nuisance(tuple(every), fitted.prior)
     known = Before(baseline, prior, fitted.change).information(candidates, fitted.arm, nuisance)
-    rows = np.concatenate([now[:, [rank + k for k in there]], now], axis=1)
-    whole = known + NormalEquations.of_rows(rows, problem.y.ravel())
-    first = len(there)
-    scale = np.concatenate([np.abs(fitted.estimate.values[there]), np.ones(now.shape[1])])
+    whole = known + today.among([*(rank + k for k in there), *every])
+    scale = np.concatenate([np.abs(fitted.estimate.values[there]), np.ones(len(every))])
     products = whole.matrix * np.outer(scale, scale)
     products[:first, :first] += np.eye(first)
     return informative_solution(products, whole.vector * scale)[first + rank :]

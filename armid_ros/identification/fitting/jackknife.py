@@ -31,6 +31,13 @@ def jackknife(
     Statistics 14, 1986.
 
     """
+    return np.asarray(np.sum(changes(values, std, held_values, held_std) ** 2, axis=0))
+
+
+def changes(
+    values: FloatArray, std: FloatArray, held_values: FloatArray, held_std: FloatArray
+) -> FloatArray:
+    """Return what values change by without each part, (K, p), whose squares `jackknife` sums."""
     seen = held_std > 0.0
-    told = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0) ** 2
-    return np.asarray(np.sum(told * (held_values - values) ** 2, axis=0))
+    told = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
+    return np.asarray(told * (held_values - values))

@@ -59,6 +59,11 @@ class NormalEquations:
         matrix[:size, :size], vector[:size] = self.matrix, self.vector
         return NormalEquations(matrix, vector)
 
+    def solution(self) -> tuple[FloatArray, FloatArray]:
+        """Return means and standard deviations, each (f,); zero where nothing is told."""
+        basis = informative_basis(self.matrix)
+        return basis @ (basis.T @ self.vector), np.sqrt(np.sum(basis**2, axis=1))
+
     def after(self, change: FloatArray) -> NormalEquations:
         """Return what is known of what is still to be added to values (f,)."""
         return replace(self, vector=self.vector - self.matrix @ change)

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.identification.fitting.normal_equations import informative_basis, NormalEquations
+from armid_ros.identification.fitting.jackknife import changes
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -51,17 +52,5 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
     if len(parts) < 2:
         return np.zeros((0, len(values)))
     whole = sum(parts.values(), start=NormalEquations.none(len(values)))
-    fitted, std = _solved(whole)
-    changes = []
-    for recording in parts.values():
-        found, held = _solved(whole - recording)
-        told = held > 0.0
-        share = np.where(told, std / np.where(told, held, 1.0), 0.0)
-        changes.append(share * (found - fitted))
-    return np.array(changes)
-
-
-def _solved(known: NormalEquations) -> tuple[FloatArray, FloatArray]:
-    """Return the solution of normal equations and its deviations, zero where nothing is told."""
-    basis = informative_basis(known.matrix)
-    return basis @ (basis.T @ known.vector), np.sqrt(np.sum(basis**2, axis=1))
+    held = [(whole - recording).solution() for recording in parts.values()]
+    return changes(*whole.solution(), *np.array(held).transpose(1, 0, 2))
