@@ -28,6 +28,7 @@ class Regressors:
 
     def __init__(self) -> None:
         self._known: dict[tuple[object, ...], tuple[Motion, FloatArray]] = {}
+        self._in_rows: dict[int, FloatArray | None] = {}
         self._room = _MOST
 
     def of(self, arm: ArmModel, motion: Motion) -> FloatArray | None:
@@ -41,7 +42,19 @@ class Regressors:
                 return None
             self._room -= size
             self._known[key] = motion, regressor(arm.body, arm.felt(motion))
+            self._in_rows[id(self._known[key][1])] = None
         return self._known[key][1]
+
+    def in_rows(
+        self, columns: FloatArray, reduce: Callable[[FloatArray], FloatArray]
+    ) -> FloatArray:
+        """Return columns in rows; a regressor of a motion has one filter."""
+        if id(columns) not in self._in_rows:
+            return reduce(columns)
+        rows = self._in_rows[id(columns)]
+        if rows is None:
+            rows = self._in_rows[id(columns)] = reduce(columns)
+        return rows
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,6 +112,10 @@ class _Memoized(ArmModel):
             return known
         columns: FloatArray = self._once('body', motion, super().body_columns)
         return columns
+
+    def rigid_rows(self, motion: Motion, reduce: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """Return the sensitivities to the rigid parameters in rows, shape (M, n, 10 n)."""
+        return self.regressors.in_rows(self.rigid_columns(motion), reduce)
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
         """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The weighted rows and what free columns leave of them."""
 
+from types import SimpleNamespace
+
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, project
-from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.data.trajectory import block_rows, trajectories
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.explain import nuisance_of
 from armid_ros.diagnosis.search.fit import fit, Start
@@ -31,6 +33,15 @@ def test_more_columns_are_weighted_and_come_last(problem):
     np.testing.assert_array_equal(more.x[:, :, :4], problem.x)
     weighted = columns * problem.weight[:, :, np.newaxis]
     np.testing.assert_array_equal(more.x[:, :, 4:], weighted)
+
+
+@pytest.mark.parametrize('rows', [1, 2, 7, 13, 60, 200])
+def test_every_block_has_rows(rows):
+    """A short stretch makes folds of a row or two."""
+    parts = [SimpleNamespace(fold=k, rows=np.arange(count)) for k, count in enumerate((rows, 90))]
+    block, fold = block_rows(parts)
+    assert np.all(np.bincount(block, minlength=len(fold)) > 0)
+    assert len(block) == rows + 90
 
 
 def test_a_loss_is_the_mean_over_the_rows_that_count(problem):

@@ -100,7 +100,7 @@ def excited(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
     """Return the base parameters that the motion excites, and their columns in rows."""
-    columns = [part.reduce(arm.columns(part.motion)[:, :, theory.independent]) for part in data]
+    columns = [part.base_columns(arm, arm.effects, theory.independent) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
     kept = group_columns(stacked, names, tolerance=EXCITED)
@@ -263,9 +263,7 @@ class Baseline:
         It is the arm whose misfit was measured, or that with more effects whose values are zero.
 
         """
-        rows = [
-            part.reduce(arm.columns(part.motion)[:, :, base.independent]) for part in self.data
-        ]
+        rows = [part.base_columns(arm, arm.effects, base.independent) for part in self.data]
         rest = self._weighted(self.residual)
         return Prior(self.data, self._weighted(rows), rest, described_precision(base, arm))
 

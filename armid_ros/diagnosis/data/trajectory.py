@@ -17,7 +17,7 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.identification.assess.data_faults import Stretch
-from armid_ros.identification.rows.checks import check_stamps
+from armid_ros.identification.rows.checks import check_stamps, REST_RANGE
 from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.signals import (
     Conditioning,
@@ -135,6 +135,34 @@ class Trajectory:
         if effect.smooth:
             return arm.columns_of(effect, self.at_rows)
         return self.reduce(arm.columns_of(effect, self.motion))
+
+    def base_columns(
+        self, arm: ArmModel, effects: Sequence[Effect], chosen: npt.NDArray[np.intp]
+    ) -> FloatArray:
+        """
+        Return chosen columns of rigid parameters and of effects of an arm, in rows, (M, n, r).
+
+        Parameters
+        ----------
+        arm : ArmModel
+            Where the columns are taken.
+        effects : sequence of Effect
+            Effects whose parameters come after the rigid ones.
+        chosen : ndarray of int, shape (r,)
+            The parameters.
+
+        """
+        rigid = len(arm.robot.rigid_parameters)
+        result = np.empty((len(self.rows), self.motion.n_joints, len(chosen)))
+        own = chosen >= rigid
+        if not own.all():
+            rows = arm.rigid_rows(self.motion, self.reduce)
+            result[:, :, ~own] = rows[:, :, chosen[~own]]
+        if own.any():
+            columns = [arm.columns_of(effect, self.motion) for effect in effects]
+            picked = np.concatenate(columns, axis=2)[:, :, chosen[own] - rigid]
+            result[:, :, own] = self.reduce(picked)
+        return result
 
     @property
     def t(self) -> FloatArray:
@@ -257,7 +285,7 @@ def block_rows(
     owner: list[int] = []
     for k in np.unique(fold):
         rows = np.flatnonzero(fold == k)
-        pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS))
+        pieces = min(BLOCKS, max(2, len(rows) // _LEAST_ROWS), len(rows))
         for piece in np.array_split(rows, pieces):
             block[piece] = len(owner)
             owner.append(int(k))
@@ -281,6 +309,14 @@ def weighted_rows(
 def count_recordings(data: Sequence[Trajectory]) -> int:
     """Return the number of recordings that trajectories are stretches of."""
     return len({part.fold for part in data})
+
+
+def at_rest(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that are at rest throughout; none without data."""
+    if not data:
+        return ()
+    moves = np.max([np.ptp(part.motion.q, axis=0) for part in data], axis=0) >= REST_RANGE
+    return tuple(joint for joint, moved in zip(joints, moves.tolist(), strict=True) if not moved)
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

@@ -153,7 +153,7 @@ def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -
     model, motion = memoized_arm(state.model), part.motion
     blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
     if base is not None:
-        blocks.append(part.reduce(_base_columns(state, model, motion, base)))
+        blocks.append(part.base_columns(model, state.arm.effects, base.independent))
     for named in state.named:
         columns = model.columns_of(named.effect, motion)[:, :, list(named.kept)]
         blocks.append(part.reduce(columns))
@@ -161,17 +161,6 @@ def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -
             position = len(model.effects) - 1 - model.effects[::-1].index(named.effect)
             blocks.append(part.reduce(_shape_columns(model, position, motion)))
     return np.concatenate(blocks, axis=2)
-
-
-def _base_columns(
-    state: Patch, model: ArmModel, motion: Motion, base: BaseParameters
-) -> FloatArray:
-    """Return the columns of the base parameters, shape (N, n, r)."""
-    own = [model.columns_of(effect, motion) for effect in state.arm.effects]
-    rigid = len(state.arm.robot.rigid_parameters)
-    if base.rank and base.independent.min() >= rigid:
-        return np.asarray(np.concatenate(own, axis=2)[:, :, base.independent - rigid])
-    return np.concatenate([model.rigid_columns(motion), *own], axis=2)[:, :, base.independent]
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
