@@ -39,13 +39,17 @@ class Thresholds:
         over what happens between two days.
     misfit_share : float
         Power of a cause over that of the model's own misfit, summed over joints, below which it is
-        small print: a quarter of it names a change in one of five arms to which nothing happened.
+        small print where recordings do not tell a change from another motion's misfit.
     of_state : float
         Share of a misfit, root mean square, that is a function of position and velocity: 0.4 to
         0.8 in half of the joints of 14 arms.
-    exchanged : float
-        Share of the divisions of all recordings that may show as much of a change as the days do.
-        Where there are so many of them that one is less than that, smaller changes are seen, too.
+    unlikely : float
+        Probability of as large a change where nothing has changed, up to which a candidate has: of
+        1100 candidates of 38 arms to which nothing happened 0.6 % have that, and none of the few
+        that would matter has four times that.
+    usual : float
+        Degrees of freedom that what other candidates differ by from recording to recording counts
+        for: variances of candidates of one arm scatter as if they had 4, the median of 38 arms.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print; recordings hardly show causes that take less than this share of what they
@@ -99,7 +103,8 @@ class Thresholds:
     far: float = 0.25
     misfit_share: float = 1.0
     of_state: float = 0.6
-    exchanged: float = 0.01
+    unlikely: float = 0.001
+    usual: float = 4.0
     headline: float = 0.1
     same_fit: float = 1.5
     uncertain: float = 0.25

@@ -1,38 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Which candidates may be named: significant, possible, material, not made of noise, and changed.
-
-The misfit of a model differs from motion to motion, and of hundreds of candidates some resemble
-the difference of two days. Where nothing happened the recordings of both days are exchangeable:
-divided into two groups in another way they show as much of a candidate. A candidate has changed
-between the days if no other division shows more of it, or of many divisions hardly one: a
-permutation test, which needs no distribution of the misfit.
-
-"""
+"""Which candidates may be named: significant, possible, material, not made of noise, changed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations, islice
-from math import comb
+from collections.abc import Sequence
+from dataclasses import replace
 
-from armid_ros.diagnosis.data.trajectory import count_recordings
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import Round, worth
-from armid_ros.diagnosis.search.trial import ROUNDING, Trial
-from armid_ros.identification.fitting.normal_equations import (
-    independent_inverse,
-    informative_basis,
-    NormalEquations,
-)
+from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.variance import Recordings, Tested, Usual
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-
-#: Most divisions that are tried; those that exchange fewest recordings first.
-_DIVISIONS = 200
 
 
 def acceptable(trial: Trial, here: Round) -> bool:
@@ -108,184 +90,72 @@ def without_echo(trial: Trial, here: Round) -> Trial:
     return replace(trial, cross=trial.cross - made)
 
 
-@dataclass(frozen=True)
-class Rows:
-    """
-    Rows of one recording, weighted by the unit of the gap.
-
-    Attributes
-    ----------
-    free : ndarray, shape (S, f)
-        Nuisance columns.
-    own : ndarray, shape (S, p)
-        Columns of the candidate.
-    residual : ndarray, shape (S,)
-        Residual.
-
-    """
-
-    free: FloatArray
-    own: FloatArray
-    residual: FloatArray
-
-
 def changed(trial: Trial, here: Round) -> bool:
-    """
-    Return whether a candidate has changed since the baseline; true where there is none.
-
-    Either no other division of the recordings shows more of it, or the p-value of the permutation
-    test is within its level.
-
-    """
-    if here.before is None:
+    """Return whether a candidate has changed since the baseline; true where nothing tells."""
+    if here.tested is None:
         return True
-    more, divisions = _showing_more(trial, here)
-    return more == 0 or _seldom(more, divisions, here)
+    chance = here.tested.chances.get(trial.candidate.key, 1.0)
+    return chance <= here.settings.thresholds.unlikely
 
 
-def surely_changed(trial: Trial, here: Round) -> bool:
-    """Return whether the permutation test is significant: the change may be below the misfit."""
-    return can_be_sure(here) and _seldom(*_showing_more(trial, here), here)
+def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
+    """
+    Test whether candidates have changed between the days; None where nothing tells.
 
+    Nothing does without a baseline, or of one recording a day.
 
-def can_be_sure(here: Round) -> bool:
-    """Return whether there are so many divisions that the permutation test can be significant."""
+    """
     if here.before is None:
-        return False
-    first = count_recordings(here.before.prior.data)
-    second = count_recordings(here.evidence.data)
-    second += 0 if here.before.later is None else len(here.before.later.residual)
-    return _seldom(0, min(count_divisions(first, second), _DIVISIONS), here)
-
-
-def _seldom(more: int, divisions: int, here: Round) -> bool:
-    """Return whether the p-value of the permutation test is within its level."""
-    return more + 1 <= here.settings.thresholds.exchanged * (divisions + 1)
-
-
-def count_divisions(first: int, second: int) -> int:
-    """Return the number of other divisions of recordings into groups of two sizes."""
-    return comb(first + second, first) - 1 - (first == second)
-
-
-def _showing_more(trial: Trial, here: Round) -> tuple[int, int]:
-    """Return how many other divisions show more of a candidate than the days, and of how many."""
-    assert here.before is not None
-    first, second = _before(trial, here), _today(trial, here)
-    nuisance, later = here.nuisance, here.before.later
-    if later is not None:
-        more = later.own(here.work.arm, trial.candidate)
-        second += [Rows(*rows) for rows in zip(later.free, more, later.residual, strict=True)]
-    free = here.free.reshape(-1, len(nuisance.free))
-    known = nuisance.prior + NormalEquations.of_rows(free, here.problem.y.ravel())
-    if later is not None:
-        for columns, residual in zip(later.free, later.residual, strict=True):
-            known = known + NormalEquations.of_rows(columns, residual)
-    faint = here.settings.thresholds.tie
-    return showing_more(first, second, known, trial.candidate.precision, faint)
-
-
-def showing_more(
-    first: Sequence[Rows],
-    second: Sequence[Rows],
-    known: NormalEquations,
-    precision: FloatArray,
-    faint: float,
-) -> tuple[int, int]:
-    """
-    Return how many other divisions show a larger change than two groups do, and of how many.
-
-    Recordings that hardly show the candidate are not divided: to exchange them makes no other
-    division. What one of the groups hardly shows has not changed as far as they tell.
-
-    Parameters
-    ----------
-    first, second : sequence of Rows
-        Recordings of the two groups.
-    known : NormalEquations
-        Of the nuisance parameters: all of these recordings, and their prior.
-    precision : ndarray, shape (p,)
-        Prior precision of the values of the candidate, about zero.
-    faint : float
-        Share of the squares of every column up to which a recording hardly shows the candidate.
-
-    """
-    rows = [*first, *second]
-    basis = informative_basis(known.matrix)
-    free = basis @ (basis.T @ known.vector)
-    border = np.array([basis.T @ (one.free.T @ one.own) for one in rows])
-    own = np.array([one.own.T @ one.own for one in rows])
-    aim = np.array([one.own.T @ (one.residual - one.free @ free) for one in rows])
-    squares = np.diag(own.sum(axis=0)) + precision  # a planar arm shows some values of a body only
-
-    def explained(members: npt.NDArray[np.bool_]) -> float:
-        """Return the squares that values common to all, and a change in some, explain."""
-        both = np.concatenate([border.sum(axis=0), border[members].sum(axis=0)], axis=1)
-        part = own[members].sum(axis=0)
-        products = np.block([[own.sum(axis=0), part], [part, part]]) - both.T @ both
-        products += np.diag(np.tile(precision, 2))
-        wanted = np.concatenate([aim.sum(axis=0), aim[members].sum(axis=0)])
-        return float(wanted @ independent_inverse(products, np.tile(squares, 2)) @ wanted)
-
-    days = np.arange(len(rows)) >= len(first)
-    shares = np.diagonal(own, axis1=1, axis2=2) / np.maximum(np.diag(own.sum(axis=0)), 1e-300)
-    clear = np.max(shares, axis=1) > faint
-    if not (np.any(clear & days) and np.any(clear & ~days)):
-        return 1, 1
-    least = explained(days & clear) * (1.0 + ROUNDING)
-    others = [explained(other) for other in _divisions(days, clear)]
-    return sum(other > least for other in others), len(others)
-
-
-def _divisions(
-    days: npt.NDArray[np.bool_], among: npt.NDArray[np.bool_]
-) -> Iterator[npt.NDArray[np.bool_]]:
-    """
-    Yield the second group of other divisions of some recordings, shape (m,).
-
-    Groups are of the same sizes; the exchange of both is no other division.
-
-    """
-    before, today = np.flatnonzero(~days & among), np.flatnonzero(days & among)
-    pairs = (
-        (out, into)
-        for count in range(1, min(len(before), len(today)) + 1)
-        for out in combinations(today, count)
-        for into in combinations(before, count)
-        if count < len(today) or count < len(before)
+        return None
+    thresholds, both = here.settings.thresholds, _recordings(here)
+    found = {
+        trial.candidate.key: both.variance(
+            _own(trial, here), trial.candidate.precision, trial.freedom, thresholds.tie
+        )
+        for trial in trials
+    }
+    seen = {key: one for key, one in found.items() if one is not None}
+    usual = Usual.of(seen.values(), thresholds.usual)
+    if usual is None:
+        return None
+    most = max(sum(one.freedom) for one in seen.values())
+    ratio = np.count_nonzero(both.today) / np.count_nonzero(~both.today)
+    return Tested(
+        {key: usual.chance(one) for key, one in seen.items()},
+        usual.deviations(thresholds.unlikely, most) * float(np.sqrt(1.0 + ratio)),
     )
-    for out, into in islice(pairs, _DIVISIONS):
-        other = days & among
-        other[list(out)], other[list(into)] = False, True
-        yield other
 
 
-def _before(trial: Trial, here: Round) -> list[Rows]:
-    """Return the recordings of the baseline; columns of what was named since are zero in them."""
+def _recordings(here: Round) -> Recordings:
+    """Return the recordings of the baseline, those in question, and those nothing is fitted to."""
     assert here.before is not None
-    prior, change = here.before.prior, here.before.change
-    candidate = trial.candidate
-    own = here.before.baseline.columns(here.work.arm, candidate.effect, candidate.kept)
-    result, start = [], 0
-    for columns, residual in prior.recordings(change):
-        free = np.zeros((len(residual), len(here.nuisance.free)))
-        free[:, : columns.shape[1]] = columns
-        result.append(Rows(free, own[start : start + len(residual)], residual))
-        start += len(residual)
+    later, rank = here.before.later, len(here.nuisance.free)
+    before = list(here.before.prior.recordings(here.before.change))
+    days = [(here.free[rows], here.problem.y[rows]) for rows in _today(here)]
+    today = [(free.reshape(-1, rank), y.ravel()) for free, y in days]
+    if later is not None:
+        today += zip(later.free, later.residual, strict=True)
+    known = sum((NormalEquations.of_rows(*rows) for rows in today), start=here.nuisance.prior)
+    free, residual = zip(*before, *today, strict=True)
+    return Recordings.of(free, residual, [False] * len(before) + [True] * len(today), known)
+
+
+def _own(trial: Trial, here: Round) -> list[FloatArray]:
+    """Return the columns of a candidate in these recordings, each (S, p)."""
+    assert here.before is not None
+    baseline, arm, candidate = here.before.baseline, here.work.arm, trial.candidate
+    before = baseline.columns(arm, candidate.effect, candidate.kept)
+    sizes = [len(rest) for _, rest in here.before.prior.recordings(here.before.change)]
+    own = here.own(candidate)
+    result = np.split(before, np.cumsum(sizes)[:-1])
+    result += [own[rows].reshape(-1, candidate.size) for rows in _today(here)]
+    if here.before.later is not None:
+        result += here.before.later.own(arm, candidate)
     return result
 
 
-def _today(trial: Trial, here: Round) -> list[Rows]:
-    """Return the recordings in question."""
+def _today(here: Round) -> list[npt.NDArray[np.bool_]]:
+    """Return the rows of each recording in question, each (R,)."""
     data = here.evidence.data
     fold = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
-    result = []
-    for one in np.unique(fold):
-        rows = fold == one
-        free, own, y = (
-            here.free[rows],
-            here.own(trial.candidate)[rows],
-            here.problem.y[rows].ravel(),
-        )
-        result.append(Rows(free.reshape(len(y), -1), own.reshape(len(y), -1), y))
-    return result
+    return [fold == one for one in np.unique(fold)]

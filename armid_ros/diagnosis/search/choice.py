@@ -21,7 +21,6 @@ from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
 from armid_ros.diagnosis.prepare import Prepared
-from armid_ros.diagnosis.search.acceptance import count_divisions
 from armid_ros.diagnosis.search.candidates import as_given, fitted_anew, Question
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
@@ -59,9 +58,6 @@ _ONE_EACH = (
     'It may be the misfit of another motion: more than one recording a day tells that from a '
     'change.'
 )
-#: From so many divisions of the recordings on a misfit passes for a change in no more than 5 % of
-#: cases, and no note says that they are few.
-_MANY_WAYS = 20
 
 
 @dataclass(frozen=True)
@@ -89,6 +85,8 @@ class Explainer:
         Further data of the day in question, which nothing is fitted to.
     information : ndarray, shape (P, P), or None
         What is known of the parameters of the model, where there is no baseline.
+    known : ndarray, shape (n,), or None
+        Misfit that the model is known to have in motions like the baseline [N m].
 
     """
 
@@ -101,6 +99,7 @@ class Explainer:
     written: FloatArray | None = None
     unseen: Sequence[Trajectory] = ()
     information: FloatArray | None = None
+    known: FloatArray | None = None
 
     def chosen(self) -> Chosen:
         """Return the explanation that is given of the gap."""
@@ -184,7 +183,7 @@ class Explainer:
 
     def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
-        arm, prepared = self.arm, self.prepared
+        prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
         usual = float(np.median([part.period_recorded for part in baseline.data]))
@@ -196,17 +195,55 @@ class Explainer:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
             more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
         found = self._changes(evidence, misfit, baseline, more)
-        chosen = Chosen(found, misfit, OWN_MISFIT, doubt=_doubt(baseline, arm.robot.joints))
+        chosen = Chosen(found, misfit, OWN_MISFIT, doubt=self._doubt(baseline))
         if not found.steps:
             return chosen
         first = count_recordings(baseline.data)
         second = count_recordings(prepared.data) + count_recordings(self.unseen)
+        untested = _ONE_EACH if first == second == 1 else ''
         return replace(
             chosen,
             explanation=in_model_as_given(found),
             rest=found,
-            notes=few_recordings(first, second),
-            untested='' if count_divisions(first, second) else _ONE_EACH,
+            notes=(untested,) if untested else (),
+            untested=untested,
+        )
+
+    def _doubt(self, baseline: Baseline) -> str:
+        """Say that the model is poor on the baseline itself, or nothing if it is not."""
+        return self._unlike(baseline) or self._poor(baseline)
+
+    def _unlike(self, baseline: Baseline) -> str:
+        """Say that the model leaves much more of a baseline than when it was identified."""
+        if self.known is None:
+            return ''
+        thresholds, joints = self.settings.thresholds, self.arm.robot.joints
+        usual = thresholds.predicted * thresholds.same_fit * np.maximum(baseline.varies, 1.0)
+        times = baseline.misfit / np.maximum(self.known, 1e-300)
+        worst = int(np.argmax(times / np.sqrt(usual)))
+        if times[worst] ** 2 <= usual[worst]:
+            return ''
+        return (
+            f'In the baseline the model leaves {times[worst]:.1f} times as much in '
+            f'{joints[worst]} as when it was identified: it is not what the model was identified '
+            'from, or something had changed by then.'
+        )
+
+    def _poor(self, baseline: Baseline) -> str:
+        """Say that a model leaves much of the torque of a baseline."""
+        whole, each = baseline.errors
+        bad = [
+            f'{100.0 * error:.0f} % of the torque of {joint}'
+            for joint, error in zip(self.arm.robot.joints, each, strict=True)
+            if 100.0 * error > LIMITS.unusable
+        ]
+        if 100.0 * whole > LIMITS.poor:
+            bad.insert(0, f'{100.0 * whole:.0f} % of the torque of the arm')
+        if not bad:
+            return ''
+        return (
+            f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this '
+            'arm? A change of less is not seen.'
         )
 
     def _changes(
@@ -265,41 +302,6 @@ def _noise_within(
         for sigma, floor, part in zip(
             prepared.as_described, prepared.floors, prepared.data, strict=True
         )
-    )
-
-
-def few_recordings(first: int, second: int) -> tuple[str, ...]:
-    """Say how easily a misfit of another motion passes for a change in so few recordings."""
-    ways = _ways(first, second)
-    if ways >= _MANY_WAYS:
-        return ()
-    which = 'any misfit passes' if ways == 1 else f'one misfit in {ways} passes'
-    return (
-        f'recordings from before: {first}, since: {second}; of so few {which} for a change where '
-        f'motions differ, of four a day one in {_ways(4, 4)}',
-    )
-
-
-def _ways(first: int, second: int) -> int:
-    """Return in how many ways recordings divide; groups of equal sizes may be exchanged."""
-    return 1 + count_divisions(first, second) // (2 if first == second else 1)
-
-
-def _doubt(baseline: Baseline, joints: Sequence[str]) -> str:
-    """Say that the model is poor on the baseline itself, or nothing if it is not."""
-    whole, each = baseline.errors
-    bad = [
-        f'{100.0 * error:.0f} % of that of {joint}'
-        for joint, error in zip(joints, each, strict=True)
-        if 100.0 * error > LIMITS.unusable
-    ]
-    if 100.0 * whole > LIMITS.poor:
-        bad.insert(0, f'{100.0 * whole:.0f} % of the torque of the arm')
-    if not bad:
-        return ''
-    return (
-        f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this arm? '
-        'A change of less is not seen.'
     )
 
 

@@ -18,12 +18,11 @@ from armid_ros.diagnosis.data.rows import (
 )
 from armid_ros.diagnosis.search.acceptance import (
     acceptable,
-    can_be_sure,
     changed,
     inside,
     material,
     material_sizes,
-    surely_changed,
+    tested,
     without_echo,
 )
 from armid_ros.diagnosis.search.candidates import refine
@@ -88,8 +87,7 @@ class Look:
         """
         Return the step that accepts the best candidate that has changed; None if none passes.
 
-        A candidate that gains as much stays a rival of it, whether the permutation test says that
-        it has changed or not.
+        A candidate that gains as much stays a rival of it, whether it has surely changed or not.
 
         """
         here = self.here
@@ -118,15 +116,13 @@ class Look:
         likely = sorted(
             best.values(), key=lambda t: (frequency(t, here) is Frequency.NEVER, rarity(t))
         )
-        whole = here.settings.thresholds.misfit_share
-        least = 0.0 if surely_changed(winner, here) else whole
         return Step(
             winner,
             tuple(likely[:_RIVALS]),
             self.ranking,
             self.survey.total,
             self.survey.tried,
-            least,
+            _misfit_share(here),
         )
 
 
@@ -144,9 +140,10 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
     ranking = _best_per_key(seen, here)
     here = replace(here, tried=max(len(seen), 1))
+    refined, here = _with_refined_shapes(ranking, here)
+    here = replace(here, tested=tested(refined[:_LOOKED_AT], here))
     survey = _survey(candidates, ranking, here)
-    ranking, here = _with_refined_shapes(ranking, here)
-    ranking, there, closing = _examined(ranking, here)
+    ranking, there, closing = _examined(refined, here)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
     passing = tuple(_passing(ranking, closing, here))
     return Look(survey, passing, closing, tuple(ranking), here)
@@ -215,15 +212,27 @@ def _survey(candidates: Sequence[Candidate], ranking: Sequence[Trial], here: Rou
     assert here.total is not None
     visible = {trial.candidate.effect.said_as for trial in ranking}
     seen = {trial.candidate.key[:2] for trial in ranking}
-    whole = 0.0 if can_be_sure(here) else here.settings.thresholds.misfit_share
     return Survey(
         tuple(ranking),
-        {trial.candidate.key: material_sizes(trial, here, whole) for trial in ranking},
+        {trial.candidate.key: _least_sizes(trial, here) for trial in ranking},
         frozenset(candidate.effect.said_as for candidate in candidates) - visible,
         here.total,
         here.tried,
         tuple(dict.fromkeys(g.key[:2] for g in candidates if g.key[:2] not in seen)),
     )
+
+
+def _misfit_share(here: Round) -> float:
+    """Return the share of the misfit that a cause has to take: none where recordings tell."""
+    return here.settings.thresholds.misfit_share if here.tested is None else 0.0
+
+
+def _least_sizes(trial: Trial, here: Round) -> FloatArray:
+    """Return the sizes of values, (p,), from which on they are material, and have changed."""
+    least = material_sizes(trial, here, _misfit_share(here))
+    if here.tested is None:
+        return least
+    return np.maximum(least, here.tested.deviations * trial.std)
 
 
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
@@ -282,7 +291,7 @@ def _examined(
     """
     assert here.total is not None
     least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
-    whole, most = here.settings.thresholds.misfit_share, here.settings.thresholds.open_share
+    most = here.settings.thresholds.open_share
     open_squares = _open_squares(here)
     there: list[Trial] = []
     large: list[tuple[Trial, Trial]] = []
@@ -292,13 +301,12 @@ def _examined(
         (change,) = _changes([trial], here)
         if change is None or not acceptable(change, here):
             continue
-        there.append(change)
+        if changed(trial, here):
+            there.append(change)
         takes = trial.joint_gains(*here.rows_of(trial.candidate))
         size = _size(change, takes, here)
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
-        if not (matters and material(size, here, 0.0)):
-            continue
-        if material(size, here, whole) or surely_changed(trial, here):
+        if matters and material(size, here, _misfit_share(here)):
             large.append((trial, change))
     best = [trial for trial, _ in large[:_COMPARED]]
     others = [trial for trial in ranking if not any(trial is one for one in best)]

@@ -283,9 +283,9 @@ class Step:
     tried : int
         Candidates that were tried, every shape for itself.
     misfit_share : float
-        Share of the misfit that it has to take: zero where the permutation test is significant, so
-        that a misfit does not hide the change. None for friction and offsets without given values,
-        which only have to be significant.
+        Share of the misfit that it has to take: zero where recordings tell a change from another
+        motion's misfit. None for friction and offsets without given values, which only have to be
+        significant.
 
     """
 
@@ -315,7 +315,7 @@ class Survey:
     ranking : tuple of Trial
         All visible candidates in their best shape, best first.
     material : mapping of Key to ndarray, shape (p,)
-        Sizes of values of these from which on they are material.
+        Sizes of values of these from which on they are material, and have changed.
     hidden : frozenset of str
         Names of effects of which no candidate is visible beyond the nuisance columns.
     total : float

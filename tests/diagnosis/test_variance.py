@@ -1,0 +1,234 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A cause has changed between two days if recordings of one day do not differ by as much."""
+
+from dataclasses import dataclass, replace
+
+from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.search.round import Later
+from armid_ros.diagnosis.search.trial import Candidate
+from armid_ros.diagnosis.search.variance import Recordings, Usual, Variance
+from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.identification import identify
+from armid_ros.identification.fitting.normal_equations import NormalEquations
+from armid_ros.identification.rows.signals import Conditioning
+import numpy as np
+import pytest
+from scipy import stats
+
+ROWS = 12
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of one recording."""
+
+    free: np.ndarray
+    own: np.ndarray
+    residual: np.ndarray
+
+
+def recording(rng, value, share=1.0):
+    """Return rows of a recording in which a cause has a value, beside an unknown slope."""
+    free, own = rng.normal(size=(2, ROWS, 1)) * [[[1.0]], [[share]]]
+    return Rows(free, own, value * own[:, 0] + 0.7 * free[:, 0] + 0.05 * rng.normal(size=ROWS))
+
+
+def variance(first, second, faint=0.02, precision=(1e-9,)):
+    rows = [*first, *second]
+    free, left = ([getattr(one, n) for one in rows] for n in ('free', 'residual'))
+    known = NormalEquations.of_rows(np.concatenate(free), np.concatenate(left))
+    days = Recordings.of(free, left, [False] * len(first) + [True] * len(second), known)
+    return days.variance([one.own for one in rows], np.array(precision), 1.0, faint)
+
+
+def chance(first, second, usual):
+    return usual.chance(variance(first, second))
+
+
+#: Values of recordings have a variance of one, which is some 12 times that of white noise of a
+#: unit of one, as each has 12 rows.
+WHOLE = Usual(12.0, 4.0)
+#: What other candidates say does not count.
+ALONE = Usual(1.0, 1e-9)
+
+
+def test_it_is_the_analysis_of_variance_of_the_values_of_recordings():
+    """Of recordings that show the cause alike, without nuisance parameters or others."""
+    rng = np.random.default_rng(0)
+    for first, second in ((3, 4), (2, 5), (1, 3)):
+        values = rng.normal(size=first + second)
+        own = np.ones((ROWS, 1))
+        days = [Rows(np.zeros((ROWS, 1)), own, value * own[:, 0]) for value in values]
+        expected = stats.f_oneway(values[:first], values[first:]).pvalue
+        assert chance(days[:first], days[first:], ALONE) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize('usual', [ALONE, WHOLE], ids=['alone', 'with others'])
+def test_days_that_are_draws_of_one_process_are_as_unlikely_as_is_said(usual):
+    rng = np.random.default_rng(1)
+    chances = []
+    for _ in range(400):
+        days = [recording(rng, value) for value in rng.normal(size=7)]
+        chances.append(chance(days[:3], days[3:], usual))
+    assert stats.kstest(chances, 'uniform').pvalue > 0.01
+
+
+def test_heavy_tails_make_no_change_likelier():
+    rng = np.random.default_rng(1)
+    count = 0
+    for _ in range(400):
+        days = [recording(rng, value) for value in rng.standard_t(1.0, size=7)]
+        count += chance(days[:3], days[3:], ALONE) < 0.01
+    assert count <= 4
+
+
+def test_what_other_candidates_differ_by_makes_a_test_of_few_recordings_sharper():
+    rng = np.random.default_rng(2)
+    found = []
+    for _ in range(20):
+        values = rng.normal(size=4) + np.array([0, 0, 12, 12])
+        days = [recording(rng, value) for value in values]
+        found.append([chance(days[:2], days[2:], usual) for usual in (ALONE, WHOLE)])
+    alone, whole = np.array(found).T
+    assert np.median(whole) < 1e-3 < np.median(alone)
+
+
+def test_what_is_usual_is_the_variance_that_candidates_have_in_common():
+    rng = np.random.default_rng(3)
+    for freedom in (1, 2, 5):
+        within = 7.0 * rng.chisquare(freedom, size=4000) / freedom
+        found = [Variance(0.0, (freedom * one, 1e9), 1.0, (freedom, 3)) for one in within]
+        usual = Usual.of(found, 1e6)
+        assert usual.variance == pytest.approx(7.0, rel=0.1)
+    assert Usual.of([Variance(1.0, (0.0, 0.0), 1.0, (0, 0))], 4.0) is None
+
+
+def test_what_is_usual_is_what_nothing_was_wrong_with():
+    """Today counts where there was one recording before."""
+    today = Variance(1.0, (0.0, 8.0), 1.0, (0, 2))
+    both = Variance(1.0, (2.0, 800.0), 1.0, (2, 2))
+    before = Usual.of([both], 4.0)
+    assert Usual.of([today], 4.0).variance == pytest.approx(4.0 * before.variance)
+
+
+def test_a_value_changes_by_so_many_deviations_as_seldom_as_is_said():
+    """A change of that size is as unlikely as the level of the test."""
+    for freedom in (0, 2, 5):
+        square = WHOLE.deviations(1e-3, freedom) ** 2
+        found = Variance(square, (freedom * WHOLE.variance, 0.0), 1.0, (freedom, 0))
+        assert WHOLE.chance(found) == pytest.approx(1e-3)
+
+
+def test_values_that_no_motion_shows_hide_no_change():
+    """An arm in a plane shows four of the ten values of a payload."""
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=7) + np.array([0, 0, 0, 9, 9, 9, 9])
+    days = [recording(rng, value) for value in values]
+    wide = [replace(one, own=np.hstack([one.own, 1e-12 * one.own])) for one in days]
+    expected = variance(days[:3], days[3:])
+    found = variance(wide[:3], wide[3:], precision=(1e-9, 0.3))
+    assert found.between == pytest.approx(expected.between, rel=1e-6)
+    assert found.within == pytest.approx(expected.within, rel=1e-6)
+
+
+def test_a_recording_that_hardly_shows_a_cause_says_nothing_of_when_it_changed():
+    rng = np.random.default_rng(5)
+    days = [recording(rng, v) for v in (0.0, 0.1, 0.0, 1.0, 1.1, 0.9)]
+    faintly = recording(rng, 40.0, 0.01)
+    clear, besides = (variance(days[:3], [*days[3:], *more]) for more in ([], [faintly]))
+    assert besides.freedom == clear.freedom == (2, 2)
+    assert besides.within == pytest.approx(clear.within, rel=0.5)
+    counted = variance(days[:3], [*days[3:], faintly], faint=0.0)
+    assert counted.freedom == (2, 3)
+    assert counted.within[1] > 2.0 * clear.within[1]
+
+
+def test_a_cause_that_one_day_hardly_shows_has_not_changed_as_far_as_they_tell():
+    rng = np.random.default_rng(6)
+    before = [recording(rng, 1.0, 0.001) for _ in range(3)]
+    assert variance(before, [recording(rng, 1.0) for _ in range(3)]) is None
+
+
+def test_what_one_recording_of_the_day_before_had_as_well_is_no_change():
+    rng = np.random.default_rng(3)
+    values = [0.0, 3.0, 0.0, 1.0, 3.0, 1.0]
+    days = [recording(rng, value) for value in values]
+    assert chance(days[:3], days[3:], ALONE) > 0.1
+
+
+def test_one_recording_a_day_says_nothing_of_what_is_usual_but_is_tested_by_it():
+    rng = np.random.default_rng(4)
+    found = variance([recording(rng, 0.0)], [recording(rng, 9.0)])
+    assert (found.within, found.freedom) == ((0.0, 0.0), (0, 0))
+    assert Usual.of([found], 4.0) is None
+    assert WHOLE.chance(found) == pytest.approx(stats.f.sf(found.between / 12.0, 1, 4))
+
+
+def with_offsets(bench, seed, offsets):
+    """Return recordings of an elbow that has another offset in each [N m]."""
+
+    def on_elbow(offset):
+        return lambda motion, tau: np.column_stack([0.0 * motion.t, 0.0 * motion.t + offset])
+
+    return [bench.recordings(on_elbow(x), seed=seed)[k] for k, x in enumerate(offsets)]
+
+
+@pytest.mark.parametrize(
+    'before, after, named',
+    [
+        ((0.0, 0.8, 0.1), (0.45, 0.55, 0.5), False),
+        ((0.0, 0.05, 0.1), (0.45, 0.55, 0.5), True),
+    ],
+    ids=['one recording from before had it', 'none had it'],
+)
+def test_an_offset_that_differs_from_recording_to_recording(bench, before, after, named):
+    rng = np.random.default_rng(0)
+    old = with_offsets(bench, 1, before)
+    arm = bench.arm.with_effect(make_effect('torque_offset', bench.robot))
+    arm = identify(arm, old, rng=rng).arm
+    new, unseen = with_offsets(bench, 2, after), with_offsets(bench, 3, after)[:1]
+    found = diagnose(arm, new, validate=unseen, baseline=old, rng=rng)
+    assert [one.name for one in found.findings] == ['torque_offset'] * named, found.summary
+
+
+def worn(bench, seeds, coulomb):
+    """Return recordings of arms that no model describes, with another dry friction each [N m]."""
+
+    def hidden(motion, tau):
+        bumps = 0.5 * np.sin(9.0 * motion.q[:, ::-1] + motion.q)
+        return bumps + np.column_stack([0.0 * motion.t, coulomb * np.sign(motion.dq[:, 1])])
+
+    return [bench.recordings(hidden, seed=seed)[seed % 3] for seed in seeds]
+
+
+@pytest.mark.parametrize('count', [2, 6])
+def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench, count):
+    rng = np.random.default_rng(0)
+    old = worn(bench, range(1, count + 1), 0.0)
+    new = worn(bench, range(11, count + 11), 0.4)
+    arm = identify(bench.arm, old, rng=rng).arm
+    found = diagnose(arm, new, baseline=old, rng=rng)
+    assert [(one.name, one.joints) for one in found.findings] == [
+        ('coulomb_friction', ('elbow',))
+    ] * (count > 2), found.summary
+
+
+def test_stretches_of_one_recording_are_one_recording_of_the_test(bench):
+    """Unbroken stretches of one recording are no more independent than its halves are."""
+    data = trajectories(bench.recordings(), Conditioning(200.0, 20.0, 5))
+    stretches = [data[0], replace(data[1], fold=0), data[2]]
+    unit = tuple(np.ones(2) for _ in data)
+    evidence = Evidence(tuple(stretches), unit, unit)
+    rng = np.random.default_rng(0)
+    columns = [rng.normal(size=(*part.torque.shape, 3)) for part in data]
+    later = Later.of(evidence, columns, [part.torque for part in data])
+    rows = [part.torque.size for part in data]
+    assert [len(one) for one in later.residual] == [rows[0] + rows[1], rows[2]]
+    assert [one.shape for one in later.free] == [(rows[0] + rows[1], 3), (rows[2], 3)]
+    effect = CATALOGUE['torque_offset'].on(bench.robot, ('elbow',))
+    candidate = Candidate(effect, slice(0, 1), (0,), bench.robot)
+    wider = later.and_columns(bench.arm, candidate)
+    assert [one.shape[1] for one in wider.free] == [4, 4]
