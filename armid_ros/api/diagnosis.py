@@ -169,9 +169,9 @@ class DiagnosisResult(Shown):
 
     def tone(self) -> str:
         """Return the colour of the verdict."""
-        from armid_ros.report.diagnosis_report import TONES
+        from armid_ros.report.diagnosis_report import tone_of
 
-        return TONES.get(self.verdict, 'bad')
+        return tone_of(self.core)
 
     def sections(self) -> list[Section]:
         """Return the gap of every joint, before and after."""
@@ -262,7 +262,7 @@ def diagnose(
         looked_at,
         validate=held_out,
         baseline=before,
-        misfit=None if before else _misfit(arm, model),
+        misfit=_misfit(arm, model),
         settings=DiagnosisSettings(signals=SignalSettings(cutoff, decimation)),
         rng=generator(rng),
     )

@@ -17,7 +17,7 @@ from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
-from armid_ros.diagnosis.data.trajectory import trajectories, Trajectory
+from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajectory
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
@@ -95,7 +95,8 @@ def diagnose(
         Recordings from when nothing was wrong, such as those the model was identified from: their
         residual is the model's own misfit, and the diagnosis asks what has changed since.
     misfit : Misfit, optional
-        Misfit of the model when it was identified, where there is no baseline to measure it.
+        Misfit of the model when it was identified. A baseline measures it, and is doubted where
+        the model leaves much more of it.
     settings : DiagnosisSettings, optional
         Library and thresholds.
     rng : numpy.random.Generator
@@ -162,10 +163,15 @@ def diagnose(
         found = tied(arm, recordings, prepared, settings)
         if found is not None:
             return _said(found, notes, asked)
-    written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
+    written, then = (
+        None if misfit is None or part is None else misfit.of(arm.robot, torque_rms(part.data))
+        for part in (prepared, known)
+    )
     information = None if misfit is None else misfit.information
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
-    explainer = Explainer(arm, prepared, known, rng, tell, settings, written, seen, information)
+    explainer = Explainer(
+        arm, prepared, known, rng, tell, settings, written, seen, information, then
+    )
     return _said(explainer.chosen(), notes, asked)
 
 
@@ -229,7 +235,14 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *_unpatched(found, worse), *_doubts(chosen, word)]),
+        summary=' '.join(
+            [
+                word.summary,
+                *_unpatched(found, worse),
+                *_doubts(chosen, word),
+                *_not_checked(at_rest(evidence.data, arm.robot.joints)),
+            ]
+        ),
         findings=found,
         minor=minor,
         where=_where(explanation, shown, settings) or places_held(arm, resting),
@@ -262,6 +275,13 @@ def _doubts(chosen: Chosen, verdict: Verdict) -> list[str]:
     """Say what would tell an unknown change from a misfit, and why the model may be wrong."""
     remedy = chosen.untested if verdict.word == 'unknown' else ''
     return [text for text in (remedy, chosen.doubt) if text]
+
+
+def _not_checked(joints: Sequence[str]) -> list[str]:
+    """Say which joints did not move, if any."""
+    if not joints:
+        return []
+    return [f'Not checked: {", ".join(joints)} did not move.']
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:
@@ -349,7 +369,9 @@ def _hides(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
     evidence = explanation.evidence
     limits = evidence.limits(explanation.fitted.residual, settings) * settings.thresholds.predicted
     misfit = np.sqrt(np.mean([own**2 for own in evidence.sigma], axis=0))
-    share = misfit / np.maximum(evidence.torque_rms, 1e-300)
+    still = at_rest(evidence.data, explanation.given.robot.joints)
+    asked = (evidence.count > 0) & ~np.isin(explanation.given.robot.joints, still)
+    share = np.where(asked, misfit / np.maximum(evidence.torque_rms, 1e-300), 0.0)
     return Hiding(share, np.sqrt(np.maximum(limits - 1.0, 0.0)) * share)
 
 

@@ -34,7 +34,13 @@ from armid_ros.report.sources import short_names, with_names
 from armid_ros.residual import Residual
 
 #: Colour of each verdict; the others are bad.
-TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
+_TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
+
+
+def tone_of(diagnosis: Diagnosis) -> str:
+    """Return the colour of a verdict; none is good if the model is doubted, or a joint rests."""
+    tone = _TONES.get(diagnosis.verdict, 'bad')
+    return 'fair' if tone == 'good' and (diagnosis.at_rest or diagnosis.doubt) else tone
 
 
 @dataclass(frozen=True)
@@ -157,7 +163,7 @@ def diagnosis_report(
 
 
 def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> VerdictSection:
-    tone = TONES.get(diagnosis.verdict, 'bad')
+    tone = tone_of(diagnosis)
     notes = [with_names(note, names) for note in diagnosis.notes]
     summary = with_names(diagnosis.summary, names).replace('+-', '±')
     return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)

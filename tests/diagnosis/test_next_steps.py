@@ -22,6 +22,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
         left=(),
         not_visible=(),
         doubt='',
+        at_rest=(),
         arm=SimpleNamespace(effects=effects),
         explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
     )

@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """A joint that stands still is held by dry friction, or by more than that."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.verdict.gap import standing
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
+from armid_ros.report.diagnosis_report import tone_of
 import numpy as np
 import pytest
 
@@ -103,3 +106,29 @@ def test_what_a_model_gets_wrong_may_grow_with_the_torque_that_it_predicts(bench
     loud = np.where(turning, 60.0, 1.0)
     assert excess_of(bench, left, loud, ~turning) == 0.0
     assert excess_of(bench, left, 1.0 + left, ~turning) > 2.0
+
+
+@pytest.mark.parametrize('baseline', [False, True])
+def test_a_joint_that_never_moves_is_said_not_to_be_checked(bench, baseline):
+    """Nothing of it is known: not how much may hide there, and not that the model may be used."""
+    rng = np.random.default_rng(0)
+
+    def without_elbow(seed):
+        for part in coming_to_rest(bench, 0.0, seed):
+            q = part.q * [1.0, 0.0]
+            dq = np.gradient(q, 1.0 / RATE, axis=0)
+            motion = Motion(part.joints, part.t, q, dq, np.gradient(dq, 1.0 / RATE, axis=0))
+            yield replace(part, q=q, tau=bench.torque(motion) + 0.03 * rng.normal(size=q.shape))
+
+    before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
+    found = diagnose(bench.arm, list(without_elbow(0)), baseline=before, rng=rng)
+    assert found.verdict == 'consistent', found.summary
+    assert found.at_rest == ('elbow',)
+    assert found.summary.endswith('Not checked: elbow did not move.')
+    assert 'In elbow' not in found.summary
+    assert 'Move elbow as well, and record again.' in next_steps(found)
+    assert not any('simulation and control' in step for step in next_steps(found))
+    moved = replace(found, data=())
+    tones = [tone_of(one) for one in (found, moved, replace(moved, doubt='It is poor.'))]
+    assert tones == ['fair', 'good', 'fair']
+    assert tone_of(replace(found, verdict='unknown')) == 'bad'

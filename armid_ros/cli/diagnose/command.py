@@ -228,7 +228,7 @@ def diagnose(
         everything=asked.everything,
     )
     given, data = data, data if beside is not None else data.since(asked.model)
-    misfit = None if asked.model is None or data.baseline else read_misfit(asked.model, arm)
+    misfit = None if asked.model is None else read_misfit(asked.model, arm)
     if data.baseline != given.baseline:
         say(f'baseline: {", ".join(map(str, data.baseline))}, which the model was identified from')
     with progress('reading') as tick:
@@ -250,7 +250,7 @@ def diagnose(
             options.kept_source(robot.robot_source, loaded, out),
             DiagnosedRecordings(recordings, held_out, before),
             settings,
-            misfit,
+            None if data.baseline else misfit,
             provenance([*data.bags, *data.validate, *data.baseline], seed=seed),
             asked.residual is not None,
         )

@@ -51,7 +51,9 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
     elif no_run:
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
-    if verdict in ('named', 'consistent'):
+    if diagnosis.at_rest:
+        steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
+    elif verdict in ('named', 'consistent'):
         steps.append(_ANEW if diagnosis.doubt else _USE)
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)

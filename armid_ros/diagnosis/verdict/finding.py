@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
-from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.data.trajectory import at_rest, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.estimate import ParameterName
@@ -71,6 +71,9 @@ class Finding:
     of_joint : tuple of (str, float)
         Where its share of the whole gap is next to nothing, the joint in which it explains most of
         what the other names leave, and that share; empty otherwise.
+    added_to : tuple of float
+        Values of the same parameters in the given model, which its values are added to; empty
+        where none is known.
 
     """
 
@@ -90,6 +93,7 @@ class Finding:
     weighs: bool = False
     together: tuple[str, ...] = ()
     of_joint: tuple[str, float] = ('', 0.0)
+    added_to: tuple[float, ...] = ()
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
@@ -230,6 +234,11 @@ class Diagnosis:
     baseline: str
     harmful: bool = False
     doubt: str = ''
+
+    @property
+    def at_rest(self) -> tuple[str, ...]:
+        """Joints that are at rest throughout: what has changed in them does not show."""
+        return at_rest(self.data, self.arm.robot.joints)
 
     def __repr__(self) -> str:
         """Return the verdict and its sentence."""

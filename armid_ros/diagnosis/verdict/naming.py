@@ -42,6 +42,8 @@ def findings(
     """Return the findings: effects of one name together, the largest share of the gap first."""
     said = _in_words(explanation, arm)
     taken = _without_later(explanation.steps)
+    given = zip(explanation.given.parameters, explanation.given.theta.tolist(), strict=True)
+    had = {(parameter.name, parameter.joint): value for parameter, value in given}
     merged: dict[str, list[int]] = {}
     for index, parts in enumerate(said):
         for part in parts:
@@ -79,6 +81,7 @@ def findings(
                 parts[0].effect.weighs,
                 tuple(own for own, where in merged.items() if where == indices and own != name),
                 _of_joint(explanation, indices, attribution.share(indices)),
+                tuple(had.get((row[0].name, row[0].joint), 0.0) for row in rows),
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
@@ -104,7 +107,7 @@ def small_print(
         effect, kept = trial.candidate.effect, list(trial.candidate.kept)
         names = effect.parameters(arm.robot)
         spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
-        share, wide = trial.gain / total, 2.0 * float(spread) / total
+        share, wide = min(trial.gain / total, 1.0), 2.0 * float(spread) / total
         result.append(
             Finding(
                 effect.said_as,

@@ -10,7 +10,6 @@ from typing import Literal
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
-from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
@@ -133,14 +132,12 @@ def _consistent(
     small = [sentence(one) for one in minor[:1] if one.share >= SAID]
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         text = f'The model explains the recordings: what is left is {floor_in_words}'
-        if floor_in_words == NOISE and small:
-            return f'{text}, or too small to matter. {small[0]}'
-        return f'{text}.'
+        return f'{text}, or too small to matter. {small[0]}' if small else f'{text}.'
     worst = int(np.argmax(as_it_is.ratio))
     text = (
         'The model explains the recordings once its rigid body and friction are fitted: what is '
-        f'left is {floor_in_words}. As it is, the error of {robot.joints[worst]} is '
-        f'{_larger(np.sqrt(as_it_is.ratio[worst]))} that can be.'
+        f'left is {floor_in_words}{", or too small to matter" if small else ""}. As it is, the '
+        f'error of {robot.joints[worst]} is {_larger(np.sqrt(as_it_is.ratio[worst]))} that can be.'
     )
     return ' '.join([text, *small])
 
@@ -258,12 +255,18 @@ def _values(finding: Finding) -> Iterator[str]:
 
     """
     before = ''
-    every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    added_to = finding.added_to or (0.0,) * len(finding.values)
+    every = list(zip(finding.parameters, finding.values, finding.std, added_to, strict=True))
     not_zero = [row for row in every if excludes_zero(row[1], row[2])]
-    for p, value, std in not_zero or every:
+    for p, value, std, had in not_zero or every:
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '
-        yield f'{name}{_with_degrees(value, std, p.unit)}'
+        yield f'{name}{_with_degrees(value, std, p.unit)}{added(had)}'
         before = p.name
+
+
+def added(had: float) -> str:
+    """Say what a value is added to; nothing where that is zero."""
+    return f', added to {had:.4g}' if had else ''
 
 
 def _weight(finding: Finding) -> str:

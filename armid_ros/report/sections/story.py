@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.words import share_in_words
+from armid_ros.diagnosis.verdict.words import added, share_in_words
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import (
     digits,
@@ -165,8 +165,8 @@ def _cause(finding: Finding) -> str:
     places = ', '.join(finding.place_of(joint) for joint in finding.joints)
     where = f' at {places}' if places else ', whole arm'
     values = [
-        f'{name.name.replace("_", " ")} {with_interval(value, std, name.unit)}'
-        for name, value, std in _values(finding)
+        f'{name.name.replace("_", " ")} {with_interval(value, std, name.unit)}{added(had)}'
+        for name, value, std, had in _values(finding)
     ]
     more = len(finding.values) - len(values)
     listed = ', '.join([*values, f'{more} more'] if more else values)
@@ -189,5 +189,6 @@ def _taken(one: JointResidual) -> str:
 
 
 def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
-    rows = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+    had = finding.added_to or (0.0,) * len(finding.values)
+    rows = list(zip(finding.parameters, finding.values, finding.std, had, strict=True))
     return rows[:_VALUES]
