@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -302,10 +302,6 @@ class ArmModel:
         """Return the sensitivities to the rigid parameters, shape (N, n, 10 n)."""
         columns = self.body_columns(motion)
         return self._as_read(motion, self.with_load_friction(motion, columns))
-
-    def rigid_rows(self, motion: Motion, reduce: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Return the same in rows, (M, n, 10 n), by a filter of that motion."""
-        return reduce(self.rigid_columns(motion))
 
     def columns_of(self, effect: Effect, motion: Motion) -> FloatArray:
         """

@@ -113,10 +113,6 @@ class _Memoized(ArmModel):
         columns: FloatArray = self._once('body', motion, super().body_columns)
         return columns
 
-    def rigid_rows(self, motion: Motion, reduce: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Return the sensitivities to the rigid parameters in rows, shape (M, n, 10 n)."""
-        return self.regressors.in_rows(self.rigid_columns(motion), reduce)
-
     def gravity_columns(self, motion: Motion) -> FloatArray:
         """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
         columns: FloatArray = self._once('gravity', motion, super().gravity_columns)
@@ -153,3 +149,13 @@ def memoized_arm(arm: ArmModel) -> ArmModel:
 def plain_arm(arm: ArmModel) -> ArmModel:
     """Return the arm without what it has computed."""
     return ArmModel(arm.robot, arm.effects, arm.values, arm.quasi_static)
+
+
+def rigid_rows(
+    arm: ArmModel, motion: Motion, reduce: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """Return the sensitivities to rigid parameters in rows, (M, n, 10 n), by a motion's filter."""
+    columns = arm.rigid_columns(motion)
+    return (
+        arm.regressors.in_rows(columns, reduce) if isinstance(arm, _Memoized) else reduce(columns)
+    )

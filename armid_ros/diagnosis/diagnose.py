@@ -42,6 +42,7 @@ from armid_ros.diagnosis.verdict.where import Excess, locate, Where
 from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -163,16 +164,21 @@ def diagnose(
         found = tied(arm, recordings, prepared, settings)
         if found is not None:
             return _said(found, notes, asked)
-    written, then = (
-        None if misfit is None or part is None else misfit.of(arm.robot, torque_rms(part.data))
-        for part in (prepared, known)
-    )
+    written, then = (_left(misfit, arm, part) for part in (prepared, known))
     information = None if misfit is None else misfit.information
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
-    explainer = Explainer(
-        arm, prepared, known, rng, tell, settings, written, seen, information, then
-    )
+    beside = written, seen, information, then
+    explainer = Explainer(arm, prepared, known, rng, tell, settings, *beside)
     return _said(explainer.chosen(), notes, asked)
+
+
+def _left(
+    misfit: Misfit | None, arm: ArmModel, part: Prepared | Baseline | None
+) -> FloatArray | None:
+    """Return what a model left when it was identified, in motions like some data, (n,) [N m]."""
+    if misfit is None or part is None:
+        return None
+    return misfit.of(arm.robot, torque_rms(part.data))
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
@@ -235,14 +241,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join(
-            [
-                word.summary,
-                *_unpatched(found, worse),
-                *_doubts(chosen, word),
-                *_not_checked(at_rest(evidence.data, arm.robot.joints)),
-            ]
-        ),
+        summary=' '.join([word.summary, *_unpatched(found, worse), *_doubts(asked, chosen, word)]),
         findings=found,
         minor=minor,
         where=_where(explanation, shown, settings) or places_held(arm, resting),
@@ -271,17 +270,12 @@ def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
     return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
 
 
-def _doubts(chosen: Chosen, verdict: Verdict) -> list[str]:
-    """Say what would tell an unknown change from a misfit, and why the model may be wrong."""
+def _doubts(asked: _Asked, chosen: Chosen, verdict: Verdict) -> list[str]:
+    """Say what would tell a change from a misfit, why a model may be wrong, what did not move."""
     remedy = chosen.untested if verdict.word == 'unknown' else ''
-    return [text for text in (remedy, chosen.doubt) if text]
-
-
-def _not_checked(joints: Sequence[str]) -> list[str]:
-    """Say which joints did not move, if any."""
-    if not joints:
-        return []
-    return [f'Not checked: {", ".join(joints)} did not move.']
+    still = ', '.join(at_rest(asked.prepared.data, asked.arm.robot.joints))
+    not_checked = f'Not checked: {still} did not move.' if still else ''
+    return [text for text in (remedy, chosen.doubt, not_checked) if text]
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:

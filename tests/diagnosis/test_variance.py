@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.round import Later
 from armid_ros.diagnosis.search.trial import Candidate
-from armid_ros.diagnosis.search.variance import Recordings, Usual, Variance
+from armid_ros.diagnosis.search.variance import Recordings, UsualSpread, Variance
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.fitting.normal_equations import NormalEquations
@@ -50,9 +50,9 @@ def chance(first, second, usual):
 
 #: Values of recordings have a variance of one, which is some 12 times that of white noise of a
 #: unit of one, as each has 12 rows.
-WHOLE = Usual(12.0, 4.0)
+WHOLE = UsualSpread(12.0, 4.0)
 #: What other candidates say does not count.
-ALONE = Usual(1.0, 1e-9)
+ALONE = UsualSpread(1.0, 1e-9)
 
 
 def test_it_is_the_analysis_of_variance_of_the_values_of_recordings():
@@ -101,17 +101,17 @@ def test_what_is_usual_is_the_variance_that_candidates_have_in_common():
     for freedom in (1, 2, 5):
         within = 7.0 * rng.chisquare(freedom, size=4000) / freedom
         found = [Variance(0.0, (freedom * one, 1e9), 1.0, (freedom, 3)) for one in within]
-        usual = Usual.of(found, 1e6)
+        usual = UsualSpread.of(found, 1e6)
         assert usual.variance == pytest.approx(7.0, rel=0.1)
-    assert Usual.of([Variance(1.0, (0.0, 0.0), 1.0, (0, 0))], 4.0) is None
+    assert UsualSpread.of([Variance(1.0, (0.0, 0.0), 1.0, (0, 0))], 4.0) is None
 
 
 def test_what_is_usual_is_what_nothing_was_wrong_with():
     """Today counts where there was one recording before."""
     today = Variance(1.0, (0.0, 8.0), 1.0, (0, 2))
     both = Variance(1.0, (2.0, 800.0), 1.0, (2, 2))
-    before = Usual.of([both], 4.0)
-    assert Usual.of([today], 4.0).variance == pytest.approx(4.0 * before.variance)
+    before = UsualSpread.of([both], 4.0)
+    assert UsualSpread.of([today], 4.0).variance == pytest.approx(4.0 * before.variance)
 
 
 def test_a_value_changes_by_so_many_deviations_as_seldom_as_is_said():
@@ -163,7 +163,7 @@ def test_one_recording_a_day_says_nothing_of_what_is_usual_but_is_tested_by_it()
     rng = np.random.default_rng(4)
     found = variance([recording(rng, 0.0)], [recording(rng, 9.0)])
     assert (found.within, found.freedom) == ((0.0, 0.0), (0, 0))
-    assert Usual.of([found], 4.0) is None
+    assert UsualSpread.of([found], 4.0) is None
     assert WHOLE.chance(found) == pytest.approx(stats.f.sf(found.between / 12.0, 1, 4))
 
 

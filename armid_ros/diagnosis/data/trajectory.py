@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import rigid_rows
 from armid_ros.effects import Effect
 from armid_ros.identification.assess.data_faults import Stretch
 from armid_ros.identification.rows.checks import check_stamps, REST_RANGE
@@ -156,7 +157,7 @@ class Trajectory:
         result = np.empty((len(self.rows), self.motion.n_joints, len(chosen)))
         own = chosen >= rigid
         if not own.all():
-            rows = arm.rigid_rows(self.motion, self.reduce)
+            rows = rigid_rows(arm, self.motion, self.reduce)
             result[:, :, ~own] = rows[:, :, chosen[~own]]
         if own.any():
             columns = [arm.columns_of(effect, self.motion) for effect in effects]

@@ -10,7 +10,7 @@ from dataclasses import replace
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import Round, worth
 from armid_ros.diagnosis.search.trial import Trial
-from armid_ros.diagnosis.search.variance import Recordings, Tested, Usual
+from armid_ros.diagnosis.search.variance import Recordings, Tested, UsualSpread
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -115,7 +115,7 @@ def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
         for trial in trials
     }
     seen = {key: one for key, one in found.items() if one is not None}
-    usual = Usual.of(seen.values(), thresholds.usual)
+    usual = UsualSpread.of(seen.values(), thresholds.usual)
     if usual is None:
         return None
     most = max(sum(one.freedom) for one in seen.values())

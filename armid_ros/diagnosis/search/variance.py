@@ -148,7 +148,7 @@ class Recordings:
 
 
 @dataclass(frozen=True)
-class Usual:
+class UsualSpread:
     """
     What values of candidates usually differ by from recording to recording.
 
@@ -165,7 +165,7 @@ class Usual:
     freedom: float
 
     @classmethod
-    def of(cls, found: Iterable[Variance], freedom: float) -> Usual | None:
+    def of(cls, found: Iterable[Variance], freedom: float) -> UsualSpread | None:
         """
         Return what is usual of some candidates on the first day that has two recordings.
 
