@@ -134,11 +134,18 @@ def _residual(change: ResidualChange, comparison: Comparison) -> str:
     said = ''
     if errors[0] is not None and errors[1] is not None:
         said = f' ({errors[0]:.2g} % of it before, {errors[1]:.2g} % after)'
-    ask = '' if comparison.unusable else '; armid diagnose finds what does'
     return (
         f'Of the torque of {change.joint} the {ranks[0]} model leaves {times:.2g} times as much '
-        f'as the {ranks[1]}{said}: no parameter of either explains that{ask}.'
+        f'as the {ranks[1]}{said}: {_why_left(comparison)}.'
     )
+
+
+def _why_left(comparison: Comparison) -> str:
+    """Say what a residual that differs may come from."""
+    if any(one.why == 'effect' for one in comparison.not_compared):
+        return 'the models have other effects, which may be why'
+    ask = '' if comparison.unusable else '; armid diagnose finds what does'
+    return f'no parameter of either explains that{ask}'
 
 
 def _load(comparison: Comparison) -> str:

@@ -168,6 +168,19 @@ def test_what_a_model_leaves_is_a_change_where_no_parameter_is(tmp_path):
     assert document['unusable'] == []
 
 
+def test_models_of_other_effects_leave_other_residuals(tmp_path):
+    first = identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0))
+    second = identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0))
+    file = second / 'identification.json'
+    file.write_text(file.read_text().replace(FRICTION[0], 'spring_stiffness'))
+    document = json.loads(file.read_text())
+    document['parameters'][1]['value'] = 0.501
+    file.write_text(json.dumps(document))
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert '30 times as much' in result.output and 'may be why' in result.output
+    assert 'no parameter of either' not in result.output
+
+
 def test_one_result_given_twice_is_refused(tmp_path):
     first = identified(tmp_path / 'a', 0.08)
     copy = identified(tmp_path / 'b', 0.08)
