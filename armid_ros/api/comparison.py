@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-import json
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import Shown, Summary
-from armid_ros.files import write_file
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.comparison import compare as run
 from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
@@ -44,7 +43,7 @@ class ComparisonResult(Shown):
 
     @property
     def anything(self) -> bool:
-        """Whether something changed beyond chance."""
+        """Whether something changed beyond chance: parameters, or what a model leaves."""
         return self.core.anything
 
     @property
@@ -73,14 +72,13 @@ class ComparisonResult(Shown):
         """Write comparison.json and report.html as ``armid compare`` does."""
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(self.document(), indent=1)
-        write_file(out / 'comparison.json', text)
+        write_file(out / 'comparison.json', json_text(self.document(), indent=1))
         self.report(out / 'report.html')
         return out
 
     def summary(self) -> Summary:
         """Return what changed, the surest first."""
-        from armid_ros.report.compare_report import tell
+        from armid_ros.report.compare_report import tell, verdict
 
         rows = [
             (
@@ -93,13 +91,14 @@ class ComparisonResult(Shown):
             for change in self.core.changed
         ]
         heads = ('parameter', 'joint', 'before', 'after', 'std') if rows else ()
-        badge = 'changed' if self.anything else 'unchanged'
         first, *more = tell(self.core)
-        return Summary(first, badge, heads, rows, lines=more[:1])
+        return Summary(first, verdict(self.core)[0], heads, rows, lines=more[:1])
 
     def tone(self) -> str:
-        """Return the colour that stands for a change."""
-        return 'fair' if self.anything else 'good'
+        """Return the colour that stands for a change, or for models that describe no arm."""
+        from armid_ros.report.compare_report import verdict
+
+        return verdict(self.core)[1]
 
     def sections(self) -> list[Section]:
         """Return the parameters, those that changed first to be seen."""
@@ -127,7 +126,7 @@ def compare(
     Raises
     ------
     ArmidError
-        A folder has no result, or the two are not of one robot.
+        A folder has no result, both are the same, or they are not of one robot.
 
     Examples
     --------

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from armid_ros.arm.model_check import checked_model
 from armid_ros.errors import ModelError
-from armid_ros.files import finite, parsed_yaml, read_text, reading
+from armid_ros.files import finite, read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -118,12 +119,12 @@ def load_misfit(path: str | Path) -> Misfit | None:
     path = Path(path)
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        document = parsed_yaml(text, ModelError)
-        block = document.get('misfit') if isinstance(document, dict) else None
-        return None if block is None else _misfit(block)
+        block = checked_model(text).get('misfit')
+        return None if block is None else misfit_of_block(block)
 
 
-def _misfit(block: Any) -> Misfit:
+def misfit_of_block(block: Any) -> Misfit:
+    """Return what the block ``misfit`` of a model.yaml says."""
     try:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)

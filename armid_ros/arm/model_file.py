@@ -20,18 +20,16 @@ from typing import Any
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit
+from armid_ros.arm.model_check import checked_model, SCHEMA, wrong_unit
 from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.effects.tied import tied_kind
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.files import finite, is_file, parsed_yaml, read_text, reading, write_file
+from armid_ros.files import finite, is_file, read_text, reading, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 import yaml
-
-SCHEMA = 'armid/model/1'
-_KEYS = 'schema', 'robot', 'gravity', 'rigid_parameters', 'effects', 'misfit'
 
 
 def parameter_table(
@@ -185,7 +183,7 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
         robot = load_robot(str(robot))
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        document = _document(text)
+        document = checked_model(text)
         return _arm(document, robot or _described(path, str(document['robot'])))
 
 
@@ -209,23 +207,13 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
 
     """
     with reading(source, ModelError):
-        return _arm(_document(text), robot)
+        return _arm(checked_model(text), robot)
 
 
 def model_text(arm: ArmModel, robot: str, estimate: Estimate | None = None) -> str:
     """Return what model.yaml holds; arguments as of `model_document`."""
     document = model_document(arm, robot, estimate)
     return str(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99))
-
-
-def _document(text: str) -> dict[str, Any]:
-    document = parsed_yaml(text, ModelError)
-    if not isinstance(document, dict) or document.get('schema') != SCHEMA:
-        raise ModelError(f"not an arm model; its 'schema' has to be {SCHEMA}")
-    strange = [str(key) for key in document if key not in _KEYS]
-    if strange:
-        raise ModelError(f"no key '{strange[0][:40]}' is known; a model has {', '.join(_KEYS)}")
-    return document
 
 
 def _gravity(given: Any) -> FloatArray:
@@ -272,4 +260,9 @@ def _values(rows: Sequence[dict[str, Any]], names: Sequence[ParameterName]) -> F
             f"parameter '{missing[0].name}' of joint '{missing[0].joint}' is missing; "
             'is the file of another robot?'
         )
+    units = {(name.name, name.joint): [name.unit] for name in names}
+    for row in rows:
+        said = wrong_unit(row, units.get((str(row['name']), str(row['joint'])), ()))
+        if said:
+            raise ModelError(said)
     return np.array([table[name.name, name.joint] for name in names])

@@ -21,8 +21,9 @@ import click
 @click.argument('before', metavar='A', type=click.Path(path_type=Path))
 @click.argument('after', metavar='B', type=click.Path(path_type=Path))
 @options.folder
+@click.option('--strict', is_flag=True, help='End with code 3 if one of them is unusable.')
 @options.as_json
-def compare(before: Path, after: Path, out: Path, as_json: bool) -> None:
+def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -> None:
     """
     Say what changed between two identifications of one robot.
 
@@ -39,7 +40,9 @@ def compare(before: Path, after: Path, out: Path, as_json: bool) -> None:
     write_file(out / 'comparison.json', json_text(document, indent=1))
     if as_json:
         click.echo(json_text(document))
-        return
-    for sentence in tell(comparison):
-        say(sentence)
-    say(f'{out}: report.html, comparison.json')
+    else:
+        for sentence in tell(comparison):
+            say(sentence)
+        say(f'{out}: report.html, comparison.json')
+    if strict and comparison.unusable:
+        click.get_current_context().exit(3)

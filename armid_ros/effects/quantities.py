@@ -96,6 +96,10 @@ class Shape:
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:
     """Return a unit as it is on the joint: 'N m' is 'N' on a prismatic one."""
-    if joint and robot.prismatic[robot.joints.index(joint)]:
-        return _PRISMATIC_UNITS.get(unit, unit)
-    return unit
+    slides = joint and robot.prismatic[robot.joints.index(joint)]
+    return slide_unit(unit) if slides else unit
+
+
+def slide_unit(unit: str) -> str:
+    """Return what a unit of a revolute joint is on a prismatic one."""
+    return _PRISMATIC_UNITS.get(unit, unit)

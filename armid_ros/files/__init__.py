@@ -10,7 +10,14 @@ error of the package with the path. Every writer of results goes through `write_
 
 """
 
-from armid_ros.files.documents import finite, load_json, load_yaml, parsed_yaml, reading
+from armid_ros.files.documents import (
+    finite,
+    load_json,
+    load_yaml,
+    parsed_yaml,
+    reading,
+    yaml_line,
+)
 from armid_ros.files.limits import available_memory, default_memory_limit, size_text
 from armid_ros.files.output import json_text, result_folder, write_file
 from armid_ros.files.regular import is_file, open_regular, read_text
@@ -21,6 +28,7 @@ __all__ = [
     'read_text',
     'load_yaml',
     'parsed_yaml',
+    'yaml_line',
     'load_json',
     'reading',
     'finite',

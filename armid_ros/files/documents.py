@@ -10,7 +10,7 @@ what it raises for content it did not expect becomes one error that names the fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import csv
 import json
@@ -110,6 +110,34 @@ def load_yaml(text: str) -> Any:
     """
     _check_size(text)
     return yaml.load(text, Loader=_LOADER)
+
+
+def yaml_line(text: str, place: Sequence[str | int]) -> int:
+    """
+    Return the line of a place in a text in YAML, from 1.
+
+    Parameters
+    ----------
+    text : str
+        As `load_yaml` takes it.
+    place : sequence of str or int
+        Keys and positions that lead there; where they end in nothing, the last that is there.
+
+    """
+    node: Any = yaml.compose(text, Loader=_LOADER)
+    mark = node.start_mark
+    for part in place:
+        if isinstance(node, yaml.MappingNode):
+            pairs = {key.value: (key, value) for key, value in node.value}
+        elif isinstance(node, yaml.SequenceNode):
+            pairs = {k: (value, value) for k, value in enumerate(node.value)}
+        else:
+            break
+        if part not in pairs:
+            break
+        key, node = pairs[part]
+        mark = key.start_mark
+    return int(mark.line) + 1
 
 
 def load_json(text: str) -> Any:

@@ -4,17 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from armid_ros.arm import ArmModel, load_misfit, Misfit
+from armid_ros.arm.model_check import checked_model
+from armid_ros.arm.model_check import SCHEMA as MODEL
+from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.files import finite, is_file, load_json, load_yaml, read_text, reading
 from armid_ros.identification.description import kinematics_digest
+from armid_ros.identification.fitting.identifiability import NOT_SHOWN
 from armid_ros.identification.fitting.normal_equations import scaled_inverse
+from armid_ros.identification.known_fit import known_fit, KnownFit
 from armid_ros.model.base_parameters import symbol
 from armid_ros.motion import FloatArray
 from armid_ros.robots import load_robot
@@ -25,7 +30,8 @@ import yaml
 _SAME_GROUPING = 1e-6
 #: Relative; what is written has 16 digits.
 _ROUNDING = 1e-9
-_SCHEMAS = ('armid/identification/1', 'armid/model/1')
+_IDENTIFICATION = 'armid/identification/1'
+_SCHEMAS = (_IDENTIFICATION, MODEL)
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,12 @@ class ParameterFile:
     scatter : ndarray, shape (K, P)
         What the values change by without each of K recordings, so that squares sum up to a
         variance; K is zero if the file does not have it.
+    without_std : mapping of ParameterName to float
+        Values of the parameters that the file has no standard deviation of.
+    not_shown : frozenset of (name, joint)
+        Parameters that the motion did not show.
+    fit : KnownFit or None
+        How well the model fits, where the file says it.
 
     """
 
@@ -66,6 +78,9 @@ class ParameterFile:
     joints: tuple[str, ...] = ()
     kinematics: str = ''
     scatter: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    without_std: Mapping[ParameterName, float] = field(default_factory=dict)
+    not_shown: frozenset[tuple[str, str]] = frozenset()
+    fit: KnownFit | None = None
 
     @property
     def std(self) -> FloatArray:
@@ -174,15 +189,62 @@ def read_parameters(path: str | Path) -> ParameterFile:
         path = found[0]
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        try:
-            document = load_json(text) if path.suffix == '.json' else load_yaml(text)
-        except (ValueError, yaml.YAMLError) as error:
-            reason = ' '.join(str(error).split())
-            raise ModelError(f'neither JSON nor YAML: {reason}') from error
-        if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
-            raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
+        document = _document(text, path.suffix == '.json')
         read = parameters_of(str(path), document)
+    if document['schema'] == MODEL:
+        return _beside(path, document) or _with_robot(read, path, text)
     return read if read.kinematics else _with_robot(read, path)
+
+
+def _document(text: str, is_json: bool) -> dict[str, Any]:
+    """Return what a text says, of a kind that has parameters."""
+    try:
+        document = load_json(text) if is_json else load_yaml(text)
+    except (ValueError, yaml.YAMLError) as error:
+        reason = ' '.join(str(error).split())
+        raise ModelError(f'neither JSON nor YAML: {reason}') from error
+    if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
+        raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
+    return checked_model(text) if document['schema'] == MODEL else document
+
+
+def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
+    """
+    Return what the identification.json beside a model.yaml says, if it is of this model.
+
+    It has what the model was made from: groups of parameters, with their covariance. It is of the
+    model if the values of the model make those of every group.
+
+    """
+    file = path.with_name('identification.json')
+    if not is_file(file):
+        return None
+    text = read_text(file, ModelError)
+    with reading(file, ModelError):
+        document = load_json(text)
+        if not isinstance(document, dict) or document.get('schema') != _IDENTIFICATION:
+            return None
+        found = parameters_of(str(file), document)
+        values = {symbol(name): value for name, value in _model_values(model)}
+        known = all(key in values for row in found.terms.values() for key in row)
+        complete = len(found.terms) == len(found.values) > 0
+        if not (complete and known and document.get('gravity') == model['gravity']):
+            return None
+    for name, row in found.terms.items():
+        value, std = found.values[name]
+        made = sum(factor * values[key] for key, factor in row.items())
+        if abs(made - value) > _SAME_GROUPING * (std + abs(value)):
+            return None
+    return found if found.kinematics else _with_robot(found, file)
+
+
+def _model_values(model: Mapping[str, Any]) -> Iterator[tuple[ParameterName, float]]:
+    """Yield the parameters of a model.yaml, shapes of effects included."""
+    rows = [*model['rigid_parameters']]
+    for effect in model['effects']:
+        rows += [*effect['parameters'], *effect.get('shapes', ())]
+    for row in rows:
+        yield ParameterName(str(row['name']), str(row['joint']), ''), float(row['value'])
 
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
@@ -242,14 +304,21 @@ def identified_from(path: str | Path) -> tuple[Path, ...]:
     return tuple(place for place in found if place is not None)
 
 
-def _with_robot(found: ParameterFile, path: Path) -> ParameterFile:
-    """Look up the robot that a file without its kinematics names, where it is still there."""
+def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
+    """
+    Look up the robot that a file without its kinematics names, where it is still there.
+
+    A text of a model.yaml has to have all parameters of it.
+
+    """
     beside = path.parent / found.robot
     source = str(beside) if is_file(beside) else found.robot
     try:
         robot = load_robot(source)
     except ArmidError:
         return found
+    if model:
+        read_model(model, robot, str(path))
     return replace(found, joints=robot.joints, kinematics=kinematics_digest(robot))
 
 
@@ -267,20 +336,23 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     for effect in document.get('effects', []):
         rows += effect['parameters']
     values: dict[ParameterName, tuple[float, float]] = {}
+    without_std: dict[ParameterName, float] = {}
     for row in rows:
-        name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
-        if row['std'] is None:
-            continue
-        if name in values:
+        name = _parameter(row)
+        if name in values or name in without_std:
             raise ValueError(f'{name.name} of joint {name.joint} is given twice')
-        values[name] = _value(row, name)
+        if row.get('std') is None:
+            without_std[name] = finite(row['value'], f'{name.name} of joint {name.joint}')
+        else:
+            values[name] = _value(row, name)
     covariance = _covariance(document.get('covariance'), len(values))
     grouping = [_terms(row) for row in document.get('grouping', [])]
     terms = dict(zip(values, grouping, strict=False))
-    scores = [*document.get('validation', []), document.get('training')]
+    scores = [*document.get('validation', []), document.get('training'), document.get('misfit')]
+    told = next((score for score in scores if score), None)
     error = None
-    if scores[0]:
-        error = finite(scores[0]['relative_error_percent'], 'relative_error_percent')
+    if told is not None:
+        error = finite(told['relative_error_percent'], 'relative_error_percent')
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -292,7 +364,21 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         tuple(str(joint) for joint in about.get('joints', ())),
         str(about.get('kinematics', '')),
         _scatter(document.get('scatter', ()), len(values)),
+        without_std,
+        frozenset(
+            (str(row['name']), str(row['joint']))
+            for row in document.get('not_identified', ())
+            if row['reason'] == NOT_SHOWN
+        ),
+        known_fit(document),
     )
+
+
+def _parameter(row: Mapping[str, Any]) -> ParameterName:
+    """Return which parameter a row has."""
+    if 'unit' not in row:
+        raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}': no unit")
+    return ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
 
 
 def _value(row: Mapping[str, Any], name: ParameterName) -> tuple[float, float]:

@@ -42,6 +42,13 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     )
 
 
+def link_unit(name: str) -> tuple[str, ...]:
+    """Return the unit of an inertial parameter such as 'mx2'; none of what is called otherwise."""
+    units = dict(zip(LINK_PARAMETERS, _LINK_UNITS, strict=True))
+    unit = units.get(name.rstrip('0123456789'))
+    return () if unit is None else (unit,)
+
+
 class _Scratch(threading.local):
     """Space that Pinocchio works in, once for a robot and thread: to make it takes longer."""
 

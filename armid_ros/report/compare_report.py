@@ -5,11 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
+from armid_ros.identification.assess.residual_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
+from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.report.families import full_label
+from armid_ros.report.not_compared import tell_not_compared
 from armid_ros.report.notation import counted, measured, pretty, robot_label
 from armid_ros.report.page import Page
 from armid_ros.report.provenance import Provenance
@@ -18,8 +22,6 @@ from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
 
 #: Changes that get a sentence each; the table has all.
 _TOLD = 8
-#: Parameters that a line names.
-_NAMED = 6
 
 
 def compare_report(comparison: Comparison, provenance: Provenance | None = None) -> str:
@@ -39,15 +41,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
         One HTML file that loads nothing.
 
     """
-    sentences = tell(comparison)
-    changed = comparison.anything
     sections = [
-        VerdictSection(
-            'changed' if changed else 'unchanged',
-            'fair' if changed else 'good',
-            sentences,
-            _beware(comparison),
-        ),
+        VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
         Asked(_asked(comparison)),
         Changes(comparison),
         Origin(provenance or Provenance()),
@@ -58,22 +53,61 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
     return Page(title, subtitle, sections).html()
 
 
+def verdict(comparison: Comparison) -> tuple[str, str]:
+    """Return what was found in a word or three, and its colour: good, fair or bad."""
+    if comparison.unusable:
+        return 'unusable', 'bad'
+    if comparison.anything:
+        return 'changed', 'fair'
+    if comparison.not_compared:
+        return 'unchanged in part', 'fair'
+    return 'unchanged', 'good'
+
+
 def tell(comparison: Comparison) -> tuple[str, ...]:
     """Say in words what changed, the surest first; the first sentence is the sum of it."""
+    return (
+        *(_unusable(one) for one in comparison.unusable),
+        _sum(comparison),
+        *(_residual(one, comparison) for one in comparison.changed_residuals),
+        *tell_not_compared(comparison),
+        *_details(comparison),
+    )
+
+
+def _sum(comparison: Comparison) -> str:
     changed, count = comparison.changed, len(comparison.changes)
-    together = [_together(group) for group in comparison.changed_together]
-    if not comparison.anything:
+    left = len(comparison.not_compared)
+    both = ' that both have' if left else ''
+    also = f'; {left} more {"was" if left == 1 else "were"} not compared' if left else ''
+    if not changed and not comparison.changed_together:
+        but = ''
+        if comparison.unusable:
+            but = ', which is no evidence beside an unusable model'
+        elif comparison.changed_residuals:
+            but = ', but what the models leave of the torque did'
         return (
-            f'None of {counted(count, "parameter")} changed beyond its uncertainty.',
-            _least_visible(comparison.changes),
+            f'None of {counted(count, "parameter")}{both} changed beyond its uncertainty'
+            f'{but}{also}.'
         )
     joints = list(dict.fromkeys(c.parameter.joint for c in changed if c.parameter.joint))
     where = f', at {", ".join(joints)}' if joints else ''
-    first = f'{len(changed)} of {counted(count, "parameter")} changed beyond uncertainty{where}.'
+    return (
+        f'{len(changed)} of {counted(count, "parameter")}{both} changed beyond uncertainty'
+        f'{where}{also}.'
+    )
+
+
+def _details(comparison: Comparison) -> Sequence[str]:
+    """Say what changed as a whole and one by one, or how much would have been seen."""
+    if not comparison.anything:
+        return [_least_visible(comparison.changes)]
+    changed = comparison.changed
+    told = [_together(group) for group in comparison.changed_together]
     if comparison.load is not None:
-        together.insert(0, _load(comparison))
+        told.insert(0, _load(comparison))
     apart = [c for c in changed if comparison.load is None or not c.parameter.rigid]
-    told = [_sentence(change) for change in apart[:_TOLD]]
+    told += [_sentence(change) for change in apart[:_TOLD]]
     if len(apart) > _TOLD:
         told.append(f'The table has {len(apart) - _TOLD} more.')
     rigid = [c for c in changed if c.parameter.rigid]
@@ -83,7 +117,35 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
             f'Mostly inertial parameters changed, {last} the surest: a tool or load was added or '
             'taken away, or the gravity or mounting is another.'
         )
-    return (first, *together, *told)
+    return told
+
+
+def _unusable(one: ParameterFile) -> str:
+    assert one.fit is not None
+    reason = one.fit.reason.rstrip('.')
+    reason = reason[:1].lower() + reason[1:]
+    return f'{one.source} is unusable, and armid diagnose finds what the model lacks: {reason}.'
+
+
+def _residual(change: ResidualChange, comparison: Comparison) -> str:
+    errors = change.before_error, change.after_error
+    ranks = ('second', 'first') if change.ratio > 1.0 else ('first', 'second')
+    times = change.ratio if change.ratio > 1.0 else 1.0 / change.ratio if change.ratio else inf
+    said = ''
+    if errors[0] is not None and errors[1] is not None:
+        said = f' ({errors[0]:.2g} % of it before, {errors[1]:.2g} % after)'
+    return (
+        f'Of the torque of {change.joint} the {ranks[0]} model leaves {times:.2g} times as much '
+        f'as the {ranks[1]}{said}: {_why_left(comparison)}.'
+    )
+
+
+def _why_left(comparison: Comparison) -> str:
+    """Say what a residual that differs may come from."""
+    if any(one.why == 'effect' for one in comparison.not_compared):
+        return 'the models have other effects, which may be why'
+    ask = '' if comparison.unusable else '; armid diagnose finds what does'
+    return f'no parameter of either explains that{ask}'
 
 
 def _load(comparison: Comparison) -> str:
@@ -155,21 +217,20 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
 
 def _beware(comparison: Comparison) -> tuple[str, ...]:
     lines = []
-    for side, names in (
-        ('first', comparison.only_before),
-        ('second', comparison.only_after),
-    ):
-        if names:
-            lines.append(
-                f'{counted(len(names), "parameter")} in the {side} only cannot be compared: '
-                f'{_named(names)}. Different motions or effects group parameters differently.'
-            )
     for given in (comparison.before, comparison.after):
+        if given.fit is None:
+            lines.append(f'{given.source} does not say how well its model fits.')
         if given.covariance is None:
             lines.append(
                 f'{given.source} has deviations without covariance: parameters are compared one '
                 'by one alone, and changes that only show in several of them go unseen.'
             )
+    fits = comparison.before.fit, comparison.after.fit
+    if all(fits) and not comparison.residuals:
+        lines.append(
+            'What the two models leave of the torque is not compared: the files have it of other '
+            'rows, or not by joint.'
+        )
     known = comparison.before.kinematics and comparison.after.kinematics  # one robot, then
     if not known and comparison.before.robot != comparison.after.robot:
         lines.append(
@@ -177,11 +238,6 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
             f'{comparison.after.robot}, and nothing shows that they are one.'
         )
     return tuple(lines)
-
-
-def _named(names: Sequence[ParameterName]) -> str:
-    shown = ', '.join(full_label(name) for name in names[:_NAMED])
-    return shown + (f' and {len(names) - _NAMED} more' if len(names) > _NAMED else '')
 
 
 def _asked(comparison: Comparison) -> list[tuple[str, str]]:

@@ -2,13 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 
+from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.cli import main
 from armid_ros.cli.commands import COMMANDS
+from armid_ros.effects import make_effect
+from armid_ros.estimate import Estimate
 from armid_ros.files import result_folder
+from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.model.base_parameters import symbol
+from armid_ros.robots import load_robot
 from click.testing import CliRunner
+import numpy as np
 import pytest
 
 FRICTION = ('viscous_coefficient', 'elbow', 'N m s/rad')
+JOINTS = ('shoulder', 'elbow')
 INERTIA = ('Izz1 + Iyy2', 'shoulder', 'kg m^2')
 
 
@@ -17,8 +25,8 @@ def command(monkeypatch):
     monkeypatch.setitem(COMMANDS, 'compare', 'compare')
 
 
-def identified(folder, friction, robot='arm'):
-    """Write an identification with a given friction."""
+def identified(folder, friction, robot='arm', errors=(4.0, 4.0), **others):
+    """Write an identification with a given friction, and errors of shoulder and elbow [%]."""
     folder.mkdir()
     rows = [
         dict(zip(('name', 'joint', 'unit'), name, strict=True)) | {'value': value, 'std': std}
@@ -28,9 +36,14 @@ def identified(folder, friction, robot='arm'):
         'schema': 'armid/identification/1',
         'robot': robot,
         'parameters': rows,
-        'training': {'relative_error_percent': 4.0},
+        'training': {
+            'bags': [folder.name],
+            'relative_error_percent': max(errors),
+            'joint_relative_error_percent': dict(zip(JOINTS, errors, strict=True)),
+            'rms': dict(zip(JOINTS, (0.01 * error for error in errors), strict=True)),
+        },
         'validation': [],
-    }
+    } | others
     (folder / 'identification.json').write_text(json.dumps(document))
     return folder
 
@@ -104,3 +117,172 @@ def test_a_second_run_in_one_folder_is_refused(tmp_path):
     with result_folder(tmp_path / 'out', 'armid/comparison/1'):
         refused = armid('compare', first, second, '--out', tmp_path / 'out')
     assert refused.exit_code == 2 and 'another run is writing into it' in refused.stderr
+
+
+def unusable(folder, friction):
+    reasons = ['Halves of the data predict each other to 86.7 % in elbow, the most of all joints.']
+    return identified(folder, friction, errors=(4.0, 86.0), grade='unusable', reasons=reasons)
+
+
+def test_a_model_that_describes_no_arm_is_said_first_and_nothing_is_unchanged(tmp_path):
+    first, second = identified(tmp_path / 'a', 0.08), unusable(tmp_path / 'b', 0.081)
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert result.exit_code == 0, result.output
+    said = result.output.splitlines()[0]
+    assert said.startswith(f'{second / "identification.json"} is unusable')
+    assert '86.7 % in elbow' in said and 'armid diagnose finds what the model lacks' in said
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert 'class="verdict bad"' in page and '<span class="badge">unusable</span>' in page
+    assert 'unchanged' not in page
+    document = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    (one,) = document['unusable']
+    assert one['source'] == str(second / 'identification.json') and '86.7 %' in one['reason']
+
+
+def test_a_model_that_describes_no_arm_is_code_3_where_that_is_asked_for(tmp_path):
+    first, second, third = (
+        identified(tmp_path / 'a', 0.08),
+        unusable(tmp_path / 'b', 0.0805),
+        identified(tmp_path / 'c', 0.081),
+    )
+    for pair, code in (((first, second), 3), ((second, first), 3), ((first, third), 0)):
+        result = armid('compare', *pair, '--strict', '--out', tmp_path / 'out')
+        assert result.exit_code == code, result.output
+
+
+def test_what_a_model_leaves_is_a_change_where_no_parameter_is(tmp_path):
+    first = identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0))
+    second = identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0))
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert 'None of 2 parameters changed beyond its uncertainty, but what' in result.output
+    assert 'Of the torque of elbow the second model leaves 30 times as much' in result.output
+    assert '(1 % of it before, 30 % after)' in result.output
+    assert 'armid diagnose finds what does' in result.output
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert 'class="verdict fair"' in page and '<span class="badge">changed</span>' in page
+    document = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert {one['joint']: one['changed'] for one in document['residuals']} == {
+        'shoulder': False,
+        'elbow': True,
+    }
+    assert document['unusable'] == []
+
+
+def test_models_of_other_effects_leave_other_residuals(tmp_path):
+    first = identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0))
+    second = identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0))
+    file = second / 'identification.json'
+    file.write_text(file.read_text().replace(FRICTION[0], 'spring_stiffness'))
+    document = json.loads(file.read_text())
+    document['parameters'][1]['value'] = 0.501
+    file.write_text(json.dumps(document))
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert '30 times as much' in result.output and 'may be why' in result.output
+    assert 'no parameter of either' not in result.output
+
+
+def test_one_result_given_twice_is_refused(tmp_path):
+    first = identified(tmp_path / 'a', 0.08)
+    copy = identified(tmp_path / 'b', 0.08)
+    for second in (first, first / 'identification.json', copy):
+        result = armid('compare', first, second, '--out', tmp_path / 'out')
+        assert result.exit_code == 2
+        assert 'given twice' in result.stderr and len(result.stderr.splitlines()) == 1
+
+
+def test_what_is_not_compared_is_counted(tmp_path):
+    first = identified(tmp_path / 'a', 0.08)
+    lost = {'name': FRICTION[0], 'joint': FRICTION[1], 'unit': FRICTION[2]}
+    second = identified(
+        tmp_path / 'b',
+        0.08,
+        not_identified=[lost | {'reason': 'this motion does not show it'}],
+    )
+    file = second / 'identification.json'
+    document = json.loads(file.read_text())
+    document['parameters'] = [row | {'value': 0.501} for row in document['parameters'][1:]]
+    document['parameters'].append(
+        {'name': 'spring_stiffness', 'joint': 'elbow', 'unit': 'N m/rad', 'value': 1, 'std': 1}
+    )
+    file.write_text(json.dumps(document))
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    said = ' '.join(result.output.split())
+    assert 'None of 1 parameter that both have changed' in said
+    assert '2 more were not compared' in said
+    assert '1 parameter of the first only: the motion of the second does not show it' in said
+    assert '1 parameter of the second only: the model of the first does not have it' in said
+    assert '(spring stiffness of elbow)' in said
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert '<span class="badge">unchanged in part</span>' in page
+    assert '2 more were not compared' in page and 'the motion of the second' in page
+    found = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert found['not_compared'] == 2
+    assert [one['why'] for one in found['only_before'] + found['only_after']] == [
+        'motion',
+        'effect',
+    ]
+
+
+def modelled(folder, mass):
+    """Write a model, and the identification beside it that tells sums of its parameters alone."""
+    robot = load_robot('humanoid_arm')
+    pi = robot.rigid_parameters.copy()
+    pi[-10] += mass
+    friction = make_effect('viscous_friction', robot)
+    arm = ArmModel(robot).with_theta(pi).with_effect(friction, np.full(6, 0.1 + 1e-4 * mass))
+    folder.mkdir()
+    own = friction.parameters(robot)
+    estimate = Estimate(own, arm.values[0], np.diag(np.full(6, 1e-6)))
+    save_model(folder / 'model.yaml', arm, robot.name, estimate)
+    values = {symbol(n): float(v) for n, v in zip(arm.parameters, arm.theta, strict=True)}
+    terms = [{symbol(name): 1.0} for name in own] + [{'m6': 1.0, 'm5': 0.5}]
+    heads = [(name.name, name.joint, name.unit) for name in own] + [('m6 + 0.5 m5', 'wrist', 'kg')]
+    rows = [
+        dict(zip(('name', 'joint', 'unit'), head, strict=True))
+        | {'value': sum(f * values[key] for key, f in row.items()), 'std': 1e-3}
+        for head, row in zip(heads, terms, strict=True)
+    ]
+    document = {
+        'schema': 'armid/identification/1',
+        'robot': robot.name,
+        'gravity': [float(g) for g in robot.gravity],
+        'parameters': rows,
+        'covariance': [[0.0] * k + [1e-6] for k in range(len(rows))],
+        'grouping': terms,
+        'training': {'relative_error_percent': 1.0},
+    }
+    (folder / 'identification.json').write_text(json.dumps(document))
+    return folder
+
+
+def test_a_model_is_compared_by_the_identification_beside_it(tmp_path):
+    first, second = modelled(tmp_path / 'a', 0.0), modelled(tmp_path / 'b', 0.4)
+    files = [folder / 'model.yaml' for folder in (first, second)]
+    result = armid('compare', *files, '--out', tmp_path / 'out')
+    assert '1 of 7 parameters changed beyond uncertainty' in result.output
+    assert read_parameters(files[0]).source == str(first / 'identification.json')
+
+
+def test_parameters_without_a_deviation_are_counted_where_it_is_not_there(tmp_path):
+    first, second = modelled(tmp_path / 'a', 0.0), modelled(tmp_path / 'b', 0.4)
+    for folder in (first, second):
+        (folder / 'identification.json').unlink()
+    files = [folder / 'model.yaml' for folder in (first, second)]
+    result = armid('compare', *files, '--out', tmp_path / 'out')
+    said = ' '.join(result.output.split())
+    assert 'None of 6 parameters that both have' in said and '60 more were not compared' in said
+    assert f'60 parameters have no standard deviation in {files[0]} and {files[1]}' in said
+    page = (tmp_path / 'out' / 'report.html').read_text()
+    assert '60 parameters have no standard deviation' in page
+    assert '<span class="badge">unchanged</span>' not in page
+    document = json.loads((tmp_path / 'out' / 'comparison.json').read_text())
+    assert document['not_compared'] == len(document['left_out']) == 60
+
+
+def test_an_identification_of_another_model_is_left_alone(tmp_path):
+    folder = modelled(tmp_path / 'a', 0.0)
+    arm = load_model(folder / 'model.yaml')
+    theta = arm.theta.copy()
+    theta[-1] += 0.1
+    save_model(folder / 'model.yaml', arm.with_theta(theta), 'humanoid_arm')
+    assert read_parameters(folder / 'model.yaml').source == str(folder / 'model.yaml')

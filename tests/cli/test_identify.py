@@ -187,8 +187,8 @@ def test_a_folder_with_other_files_is_refused_before_any_work(bags, tmp_path):
 
 def test_one_robot_by_two_paths_is_one_and_two_robots_are_refused(bags, tmp_path):
     shutil.copy(load_robot(ROBOT).path, tmp_path / 'here.urdf')
-    for name, robot in (('a', ROBOT), ('b', tmp_path / 'here.urdf')):
-        armid('identify', bags[0], '--robot', robot, '--no-verify', '--out', tmp_path / name)
+    for name, robot, bag in (('a', ROBOT, bags[0]), ('b', tmp_path / 'here.urdf', bags[1])):
+        armid('identify', bag, '--robot', robot, '--no-verify', '--out', tmp_path / name)
     armid('compare', tmp_path / 'a', tmp_path / 'b', '--out', tmp_path / 'compared')
     assert 'different names' not in (tmp_path / 'compared' / 'report.html').read_text()
     document = json.loads((tmp_path / 'b' / 'identification.json').read_text())

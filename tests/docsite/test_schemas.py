@@ -3,6 +3,7 @@
 """What is written is what the schemas say, and the schemas describe every key of it."""
 
 import json
+import shutil
 
 import armid_ros as ar
 from armid_ros.cli import main
@@ -68,7 +69,9 @@ def test_a_diagnosis_and_its_model(recordings, at_desk):
 
 
 def test_a_comparison(at_desk):
-    for after in ('friday_result', 'monday_result'):
+    ar.identify('my_arm.urdf', 'today_1').save('today_result')
+    shutil.copy('friday_result/model.yaml', 'alone.yaml')
+    for after in ('friday_result', 'today_result', 'alone.yaml'):
         check('comparison', ar.compare('monday_result', after).document())
 
 

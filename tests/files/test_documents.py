@@ -3,7 +3,7 @@
 """Documents are bounded before they are built, and what a parser raises names the file."""
 
 from armid_ros.errors import ModelError, visible
-from armid_ros.files import finite, load_json, load_yaml, reading
+from armid_ros.files import finite, load_json, load_yaml, reading, yaml_line
 import pytest
 
 
@@ -14,6 +14,14 @@ def test_plain_documents_are_what_they_say():
         'd': {'c': None},
     }
     assert load_json('{"a": [1, 2.5, null]}') == {'a': [1, 2.5, None]}
+
+
+@pytest.mark.parametrize(
+    ('place', 'line'),
+    [(('a',), 1), (('b', 1), 4), (('b', 1, 'd'), 5), (('b', 1, 'e'), 4), (('c', 0), 1), ((), 1)],
+)
+def test_the_line_of_a_place_is_that_of_its_key_or_of_the_last_that_is_there(place, line):
+    assert yaml_line('a: 1\nb:\n- 2\n- c: 3\n  d: 4\n', place) == line
 
 
 def test_aliases_that_grow_beyond_measure_are_refused():

@@ -74,18 +74,19 @@ def excitation(folder):
     return {suffix: (folder / f'whole_run{suffix}').read_text() for suffix in ('.yaml', '.csv')}
 
 
-def identification():
-    """Return an identification.json as a document."""
+def identification(more=0.0):
+    """Return an identification.json as a document, with values that are larger by so much."""
     names = [('Izz1', 'a', 'kg m^2'), ('mx2', 'b', 'kg m')]
     names += [('viscous_coefficient', joint, 'N m s/rad') for joint in 'ab']
     values = [1.0, 0.2, 0.3, 0.4]
     covariance = 1e-4 * (np.eye(4) + 0.3)
+    std = float(np.sqrt(covariance[0, 0]))
     return {
         'schema': 'armid/identification/1',
         'robot': 'r',
         'gravity': [0.0, 0.0, -9.81],
         'parameters': [
-            {'name': n, 'joint': j, 'value': v, 'std': float(np.sqrt(covariance[0, 0])), 'unit': u}
+            {'name': n, 'joint': j, 'value': v + more, 'std': std, 'unit': u}
             for (n, j, u), v in zip(names, values, strict=True)
         ],
         'covariance': [row[: k + 1].tolist() for k, row in enumerate(covariance)],
@@ -224,10 +225,10 @@ def test_identification_text(folder, edits):
 
 
 def compared(path):
-    """Compare a mutant with what is whole."""
+    """Compare a mutant with another one that is whole."""
     whole = path.with_name('whole_identification.json')
     if not whole.exists():
-        whole.write_text(to_json(identification()))
+        whole.write_text(to_json(identification(more=0.01)))
     return compare(read_parameters(whole), read_parameters(path)).document()
 
 

@@ -1,5 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
 import json
 
 from armid_ros.identification import identification_document, identify, write_document
@@ -37,7 +38,8 @@ def test_covariance_survives_the_file(result, tmp_path):
     correlation = result.estimate.covariance / size
     np.testing.assert_allclose(read.covariance / size, correlation, rtol=1e-8, atol=1e-10)
     assert read.terms[result.base.parameters[0]] == result.base.terms[0]
-    assert not compare(read, read).anything
+    later = {name: (value + 1e-3 * std, std) for name, (value, std) in read.values.items()}
+    assert not compare(read, replace(read, values=later)).anything
 
 
 def test_a_row_of_numbers_is_a_line(result, tmp_path):

@@ -11,6 +11,9 @@ A model gets something wrong of every motion, and other motions give other value
 by from recording to recording widens the deviations of each joint, where the files have it. Few
 recordings show that badly: Student's distribution holds then, and that of Fisher for groups.
 
+What a model leaves of the torque of a joint is held against what the other leaves: no parameter
+has a change that neither model describes.
+
 Where both have their covariance, the effects of each joint and the links are looked at as a whole
 too: parameters that are hard to tell apart can differ together beyond doubt and none of them
 alone. A change of the links is held against that of a load on one of them.
@@ -20,12 +23,15 @@ alone. A change of the links is held against that of a load on one of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.identification.assess.comparable import nothing_shared, require_comparable
 from armid_ros.identification.assess.load_change import find_load, LoadChange
+from armid_ros.identification.assess.not_compared import NotCompared, only_in, without_deviation
+from armid_ros.identification.assess.residual_change import residual_changes, ResidualChange
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -116,7 +122,7 @@ class Comparison:
         What was compared.
     changes : tuple of ParameterChange
         Every parameter that both have, in the order of the first.
-    only_before, only_after : tuple of ParameterName
+    only_before, only_after : tuple of NotCompared
         What the other does not have.
     groups : tuple of GroupChange
         Effects of every joint and the rigid body as a whole; empty without covariances.
@@ -128,15 +134,33 @@ class Comparison:
     before: ParameterFile
     after: ParameterFile
     changes: tuple[ParameterChange, ...]
-    only_before: tuple[ParameterName, ...]
-    only_after: tuple[ParameterName, ...]
+    only_before: tuple[NotCompared, ...]
+    only_after: tuple[NotCompared, ...]
     groups: tuple[GroupChange, ...] = ()
     load: LoadChange | None = None
+    residuals: tuple[ResidualChange, ...] = ()
+    left_out: tuple[NotCompared, ...] = ()
 
     @property
     def anything(self) -> bool:
-        """Whether something changed, alone or as a whole."""
-        return any(c.changed for c in self.changes) or any(g.changed for g in self.groups)
+        """Whether something changed: a parameter, several as a whole, or what is left."""
+        return bool(self.changed or self.changed_residuals) or any(g.changed for g in self.groups)
+
+    @property
+    def unusable(self) -> tuple[ParameterFile, ...]:
+        """Return which of the two does not describe its recordings."""
+        both = self.before, self.after
+        return tuple(one for one in both if one.fit is not None and one.fit.unusable)
+
+    @property
+    def not_compared(self) -> tuple[NotCompared, ...]:
+        """Return every parameter that either has and that was not compared."""
+        return (*self.left_out, *self.only_before, *self.only_after)
+
+    @property
+    def changed_residuals(self) -> tuple[ResidualChange, ...]:
+        """Return the joints of which a model leaves much more than the other one."""
+        return tuple(one for one in self.residuals if one.changed)
 
     @property
     def changed_together(self) -> tuple[GroupChange, ...]:
@@ -179,8 +203,16 @@ class Comparison:
                 for g in self.groups
             ],
             'load': None if self.load is None else self.load.document(),
-            'only_before': [{'name': p.name, 'joint': p.joint} for p in self.only_before],
-            'only_after': [{'name': p.name, 'joint': p.joint} for p in self.only_after],
+            'residuals': [one.document() for one in self.residuals],
+            'unusable': [
+                {'source': one.source, 'reason': one.fit.reason}
+                for one in self.unusable
+                if one.fit is not None
+            ],
+            'not_compared': len(self.not_compared),
+            'left_out': [one.document() for one in self.left_out],
+            'only_before': [one.document() for one in self.only_before],
+            'only_after': [one.document() for one in self.only_after],
         }
 
 
@@ -191,27 +223,25 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     Raises
     ------
     ModelError
-        If they are of two robots, or have no parameter in common.
+        If they are of two robots, are the same, or have no parameter in common.
 
     """
-    _require_one_robot(before, after)
+    require_comparable(before, after)
     first, second = max(
         ((before.regrouped_as(after), after), (before, after.regrouped_as(before))),
         key=lambda pair: len(pair[0].values.keys() & pair[1].values.keys()),
     )
     shared = [name for name in first.values if name in second.values]
     if not shared:
-        raise ModelError(
-            f'{before.source} and {after.source} have no identified parameter in common; '
-            'are they of one robot, in one gravity?'
-        )
+        raise ModelError(nothing_shared(before, after))
     sides = [_Side.of(one, shared) for one in (first, second)]
     difference = sides[1].values - sides[0].values
     covariance = first.covariance_of(shared) + second.covariance_of(shared)
     scatter = np.concatenate([one.scatter for one in sides])
     joint = before.covariance is not None and after.covariance is not None
     groups = _groups(shared) if joint else []
-    chance = CHANCE / 2.0 if groups else CHANCE
+    residuals = residual_changes(before.fit, after.fit)
+    chance = CHANCE / sum((True, bool(groups), bool(residuals)))
     single = _beyond_chance(_single_chances(*sides), chance)
     freedom = sum(one.freedom for one in sides)
     together = [
@@ -248,28 +278,19 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
         before,
         after,
         changes,
-        tuple(name for name in before.values if name not in second.values),
-        tuple(name for name in after.values if name not in first.values),
+        only_in(before, second),
+        only_in(after, first),
         found,
         load,
+        _judged(residuals, chance),
+        without_deviation(before, after),
     )
 
 
-def _require_one_robot(before: ParameterFile, after: ParameterFile) -> None:
-    """Refuse robots whose joints differ, wherever their files are."""
-    known = before.kinematics and after.kinematics
-    if not known or before.kinematics == after.kinematics:
-        return
-    apart = set(before.joints).symmetric_difference(after.joints)
-    how = (
-        f'only one of them has {", ".join(sorted(apart))}'
-        if apart
-        else ('their joints are of the same names, and in other places')
-    )
-    raise ModelError(
-        f'{before.source} and {after.source} are of different robots, {before.robot} and '
-        f'{after.robot}: {how}; what changed can be said of one robot only'
-    )
+def _judged(residuals: Sequence[ResidualChange], allowed: float) -> tuple[ResidualChange, ...]:
+    """Tell which residuals differ by more than chance."""
+    beyond = _beyond_chance([one.p_value for one in residuals], allowed)
+    return tuple(replace(one, changed=sure) for one, sure in zip(residuals, beyond, strict=True))
 
 
 def _groups(names: Sequence[ParameterName]) -> list[list[int]]:

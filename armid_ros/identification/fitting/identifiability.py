@@ -12,6 +12,9 @@ from armid_ros.model import BaseParameters
 import numpy as np
 import numpy.typing as npt
 
+#: Why a parameter has no value, where the joint would have to move more.
+NOT_SHOWN: Literal['this motion does not show it'] = 'this motion does not show it'
+
 #: Half width of a 95 % interval in standard deviations.
 HALF_WIDTH = 1.96
 
@@ -75,9 +78,7 @@ def unidentified(
             found.append(
                 Unidentified(
                     name,
-                    'this motion shows it only together with others'
-                    if together
-                    else 'this motion does not show it',
+                    'this motion shows it only together with others' if together else NOT_SHOWN,
                 )
             )
     told = excludes_zero(estimate.values, estimate.std)

@@ -56,8 +56,9 @@ def drawn_as(parameters, covariance):
 
 def test_what_only_one_has_is_listed():
     comparison = compare(parameters([1.0], [0.1]), parameters([1.0, 2.0], [0.1, 0.1]))
-    assert [name.joint for name in comparison.only_after] == ['joint_2']
+    assert [one.parameter.joint for one in comparison.only_after] == ['joint_2']
     assert comparison.only_before == ()
+    assert comparison.document()['not_compared'] == 1
 
 
 def correlated(rng, size):
@@ -209,12 +210,49 @@ def test_a_change_of_two_links_is_no_load():
     assert comparison.load is None
 
 
+def test_why_a_parameter_is_not_compared_is_told_apart():
+    shared = {ParameterName('Izz1', 'a', 'kg m^2'): (1.0, 0.1)}
+    alone = {
+        ParameterName('viscous_coefficient', 'resting', 'N m s/rad'): 'motion',
+        ParameterName('spring_stiffness', 'elbow', 'N m/rad'): 'effect',
+        ParameterName('my2 + m3', 'elbow', 'kg m'): 'grouping',
+    }
+    group = list(alone)[2]
+    more = dict.fromkeys(alone, (1.0, 0.1))
+    unsure = {ParameterName('mx2', 'elbow', 'kg m'): 0.3}
+    before = ParameterFile('a', 'arm', shared | more, 5.0)
+    after = ParameterFile('b', 'arm', {k: (1.1, s) for k, (_, s) in shared.items()}, 5.0)
+    after = replace(
+        after,
+        without_std=unsure,
+        not_shown=frozenset({('viscous_coefficient', 'resting')}),
+    )
+    found = compare(before, after)
+    assert {one.parameter: one.why for one in found.only_before} == alone | {group: 'deviation'}
+    assert [one.why for one in found.left_out] == ['deviation']
+    assert len(found.not_compared) == found.document()['not_compared'] == 4
+    complete = compare(before, replace(after, without_std={}))
+    assert {one.parameter: one.why for one in complete.only_before} == alone
+
+
 def test_known_exactly_and_equal_is_no_change():
-    assert compare(parameters([1.0], [0.0]), parameters([1.0], [0.0])).changed == ()
+    before, after = parameters([1.0, 2.0], [0.0, 0.1]), parameters([1.0, 2.1], [0.0, 0.1])
+    assert compare(before, after).changed == ()
 
 
 class TestRefusals:
     """What cannot be compared is refused by name."""
+
+    @pytest.mark.parametrize(('other', 'said'), [('a', 'a;'), ('copy', r'copy \(is a\);')])
+    def test_one_result_under_one_name_or_two(self, other, said):
+        one, again = parameters([1.0], [0.1]), parameters([1.0], [0.1], source=other)
+        with pytest.raises(ModelError, match=f'^given twice: {said}'):
+            compare(one, again)
+
+    def test_a_file_without_any_deviation(self):
+        bare = replace(parameters([], []), without_std=dict.fromkeys(LINKS, 1.0), source='bare')
+        with pytest.raises(ModelError, match='bare has no standard deviation of any parameter'):
+            compare(parameters([1.0], [0.1]), bare)
 
     def test_nothing_in_common(self):
         other = ParameterFile('b', 'arm', {ParameterName('x', '', 'm'): (0.0, 1.0)}, None)

@@ -1,0 +1,60 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How well a model fits, as identification.json and model.yaml say."""
+
+from armid_ros.identification.known_fit import known_fit
+import pytest
+
+
+def score(rms, errors, **others):
+    joints = 'ab'
+    return {
+        'relative_error_percent': max(errors),
+        'joint_relative_error_percent': dict(zip(joints, errors, strict=True)),
+        'rms': dict(zip(joints, rms, strict=True)),
+    } | others
+
+
+def misfit(rms, torque):
+    return {
+        'unit': 'N m',
+        'data': 'held-out',
+        'rms': {'a': rms},
+        'relative_error_percent': 3.0,
+        'torque_rms': {'a': torque},
+    }
+
+
+def test_what_was_held_out_counts_and_what_was_fitted_where_nothing_was():
+    training = score([0.1, 0.2], [1.0, 2.0], bags=['x', 'y', 'z'])
+    held_out = [score([0.3, 0.4], [3.0, 4.0], bag='v'), score([0.4, 0.4], [4.0, 4.0], bag='w')]
+    fitted = known_fit({'training': training})
+    assert (fitted.recordings, fitted.rms, fitted.grade) == (3, {'a': 0.1, 'b': 0.2}, 'good')
+    predicted = known_fit({'training': training, 'validation': held_out})
+    assert predicted.recordings == 2
+    assert predicted.rms['a'] == pytest.approx((0.125) ** 0.5)
+    assert predicted.errors == pytest.approx({'a': (12.5) ** 0.5, 'b': 4.0})
+    assert predicted.torque('b') == pytest.approx(10.0)
+
+
+def test_a_grade_that_is_written_is_kept_with_its_reason():
+    document = {'grade': 'unusable', 'reasons': ['Because.', 'So.']}
+    found = known_fit(document | {'training': score([0.1, 0.1], [1.0, 1.0])})
+    assert found.unusable and found.reason == 'Because.'
+
+
+@pytest.mark.parametrize(('rms', 'grade'), [(0.1, 'good'), (0.3, 'poor'), (0.6, 'unusable')])
+def test_a_model_alone_is_graded_by_what_it_leaves_of_a_joint(rms, grade):
+    found = known_fit({'misfit': misfit(rms, 1.0)})
+    assert (found.grade, found.as_diagnosed) == (grade, True)
+    assert f'{100.0 * rms:g} %' in found.reason
+
+
+def test_a_file_without_a_score_says_nothing():
+    assert known_fit({}) is None
+
+
+@pytest.mark.parametrize('rms', [float('nan'), -0.1, 'much'])
+def test_numbers_that_no_residual_has_are_refused(rms):
+    with pytest.raises(ValueError, match='rms of a'):
+        known_fit({'training': score([rms, 0.1], [1.0, 1.0])})
