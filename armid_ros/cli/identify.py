@@ -49,16 +49,6 @@ from armid_ros.robots import Robot
 import click
 import numpy as np
 
-#: Files that a folder to be filled may hold already, from an identification before.
-OUTPUTS = (
-    'model.yaml',
-    'identification.json',
-    'report.html',
-    'identified.urdf',
-    'identified.mjcf.xml',
-    'robot.urdf',
-)
-
 
 @dataclass(frozen=True)
 class IdentificationData:
@@ -220,7 +210,6 @@ def identify(
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     options.hold(out, SCHEMA, robot.robot_source)
-    options.require_own(out, OUTPUTS, 'identify')
     loaded = robot.load(data.bags, tell=False)
     arm = options.with_effects(ArmModel(loaded, quasi_static=fit.quasi_static), fit.effects)
     known = bodies.settings(loaded)

@@ -122,7 +122,6 @@ def test_options_of_a_design_do_not_go_with_steps(tmp_path):
         ((*PHYSICAL, '--box', 'elbow_pitch=0:1'), 'JOINT=X,Y,Z:X,Y,Z'),
         ((*PHYSICAL, '--box', 'elbow_pitch=1,1,1:0,0,0'), 'has to be below'),
         ((*PHYSICAL, '--total-mass', -1), 'total mass -1'),
-        ((*PHYSICAL, '--total-mass', 'inf'), 'total mass inf'),
         ((*PHYSICAL[:-1], '--total-mass', 1), 'go with --physical'),
         (('simulate', '--robot', ROBOT, '--gravity', 'mars', '--out', 'o'), 'mars'),
         (('simulate', '--robot', ROBOT, '--effect', 'payload:m=1', '--out', 'o'), 'payload_m'),
@@ -146,6 +145,57 @@ def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_pat
     assert lines[0].startswith('armid: ')
     assert message.format(bag=bags[0]) in lines[0]
     assert not (tmp_path / 'o').exists()
+
+
+FILLING = {
+    'identify': ('identify', '{bag}', '--robot', ROBOT),
+    'diagnose': ('diagnose', '{bag}', '--robot', ROBOT),
+    'compare': ('compare', 'a', 'b'),
+    'excite': ('excite', '--robot', ROBOT),
+    'inspect': ('inspect', '{bag}'),
+}
+
+
+@pytest.mark.parametrize('command', FILLING)
+def test_no_command_replaces_a_page_or_adds_to_notes_of_somebody(command, bags, tmp_path):
+    arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
+    page = 'inspection.html' if command == 'inspect' else 'report.html'
+    for name, refusal in ((page, 'armid did not write'), ('notes.txt', 'does not write')):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / name).write_text('precious')
+        said = armid(*arguments, '--out', folder, code=2).stderr
+        assert f'{folder}: holds {name}, which' in said and refusal in said and '--force' in said
+        assert [path.read_text() for path in folder.iterdir()] == ['precious']
+
+
+@pytest.mark.parametrize('command', FILLING)
+def test_an_empty_out_does_not_fill_the_current_folder(command, bags, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
+    assert 'the path is empty' in armid(*arguments, '--out', '', code=2).stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_page_of_an_inspection_is_replaced_by_the_next_one(bags, tmp_path):
+    for _ in range(2):
+        armid('inspect', bags[0], '--out', tmp_path / 'look')
+
+
+@pytest.mark.parametrize('number', ['nan', 'inf', '-inf'])
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ('excite', '--robot', ROBOT, '--out', 'o', '--duration'),
+        ('simulate', '--robot', ROBOT, '--out', 'o', '--torque-noise'),
+        ('identify', 'bag', '--robot', ROBOT, '--out', 'o', '--memory-limit'),
+        (*PHYSICAL, '--total-mass'),
+        ('fleet', 'identify', 'bags', '--out', 'o', '--cutoff'),
+    ],
+)
+def test_a_number_that_is_not_finite_is_refused_with_its_option(arguments, number):
+    said = armid(*arguments, number, code=2).output
+    assert f"'{arguments[-1]}'" in said and f'{number} is not ' in said
 
 
 @pytest.mark.parametrize('effect', ['backlash@elbow_pitch', 'viscous_friction'])

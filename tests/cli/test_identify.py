@@ -181,7 +181,7 @@ def test_what_is_not_told_from_zero_is_printed_without_a_value(tmp_path):
 def test_a_folder_with_other_files_is_refused_before_any_work(bags, tmp_path):
     (tmp_path / 'notes.txt').write_text('mine')
     result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path, code=2)
-    assert 'holds notes.txt, which no identify wrote' in result.output
+    assert 'holds notes.txt, which this command does not write' in result.output
     assert [path.name for path in tmp_path.iterdir()] == ['notes.txt']
 
 

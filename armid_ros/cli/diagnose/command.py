@@ -32,6 +32,9 @@ from armid_ros.robots import Robot
 import click
 import numpy as np
 
+#: Verdicts with nothing to go on with, besides that on data that cannot be diagnosed.
+_OPEN = ('unknown', 'not_repeatable')
+
 
 class Percent(click.ParamType):  # type: ignore[type-arg]
     """A share that a person writes in per cent, with or without the sign."""
@@ -130,6 +133,8 @@ class AskedOptions:
         Whether those get into the model, too.
     residual : str or None
         How what is left without a name is learned.
+    strict : bool
+        Whether a verdict without a name is an error.
 
     """
 
@@ -138,6 +143,7 @@ class AskedOptions:
     material: float
     everything: bool
     residual: str | None
+    strict: bool
 
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
@@ -186,6 +192,12 @@ class AskedOptions:
     type=click.Choice(['gp']),
     help='Learn what is left without a name, where the verdict is partial or unknown, as a map '
     'with its uncertainty (gp: a Gaussian process of each joint), and suggest a law.',
+)
+@click.option(
+    '--strict',
+    is_flag=True,
+    help='End with code 3 if something is there and has no name (unknown, not_repeatable). Data '
+    'that cannot be diagnosed (bad_data) end with code 2 in any case.',
 )
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the data if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
@@ -260,9 +272,19 @@ def diagnose(
         document = write_results(out, result, case, extras)
     if as_json:
         click.echo(json_text(document))
-        return
-    show(result)
-    _show_extras(out, result, extras)
+    else:
+        show(result)
+        _show_extras(out, result, extras)
+    code = _code(result.verdict, asked.strict)
+    if code:
+        click.get_current_context().exit(code)
+
+
+def _code(verdict: str, strict: bool) -> int:
+    """Return what the command ends with."""
+    if verdict == 'bad_data':
+        return 2
+    return 3 if strict and verdict in _OPEN else 0
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
