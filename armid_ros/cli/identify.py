@@ -45,6 +45,7 @@ from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording, require_once
 from armid_ros.report import identification_report
 from armid_ros.report.identification_report import Assessment
+from armid_ros.report.judgement import residual_trends
 from armid_ros.robots import Robot
 import click
 import numpy as np
@@ -297,6 +298,10 @@ def _print(
     say(f'{work.graded.word}:')
     for reason in work.graded.reasons:
         say(f'  {reason}')
+    shown = [fit for fits in work.validation.values() for fit in fits] or result.training
+    trends = residual_trends(result.arm.robot.joints, shown)
+    if trends:
+        say(f'  {" ".join(trends.values())} The model lacks something there.')
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)

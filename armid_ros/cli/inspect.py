@@ -41,7 +41,7 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 )
 @click.option(
     '--out',
-    type=options.Place(file_okay=False, path_type=Path),
+    type=options.OutPath(file_okay=False, path_type=Path),
     help='Folder to put the page with all curves into.',
 )
 @options.force

@@ -36,7 +36,7 @@ Corners = tuple[Sequence[float], Sequence[float]]
 _FORCE, _CRC, _MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
 
 
-class Place(click.Path):
+class OutPath(click.Path):
     """A path to write to: an empty one, which would be the current folder, is refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -69,7 +69,7 @@ effects = click.option(
     help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
-    '--out', required=True, type=Place(file_okay=False, path_type=Path), help='Folder to fill.'
+    '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
 )
 force = click.option(
     '--force',
@@ -95,7 +95,7 @@ _memory = click.option(
     help='That a bag may take [MB]; a quarter of the memory by default.',
 )
 bag = click.option(
-    '--out', required=True, type=Place(path_type=Path), help='Bag to write; must not exist.'
+    '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
 )
 bags = click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
 validate = click.option(

@@ -145,6 +145,12 @@ class AskedOptions:
     residual: str | None
     strict: bool
 
+    def settings(self, filters: FilterOptions) -> DiagnosisSettings:
+        """Return what a diagnosis takes."""
+        return DiagnosisSettings(
+            signals=filters.settings(), material=self.material, everything=self.everything
+        )
+
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
 @options.bags
@@ -234,11 +240,7 @@ def diagnose(
     arm = ArmModel(loaded) if asked.model is None else _model_of(asked.model, loaded)
     arm = options.with_effects(arm, asked.effects)
     beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
-    settings = DiagnosisSettings(
-        signals=filters.settings(),
-        material=asked.material,
-        everything=asked.everything,
-    )
+    settings = asked.settings(filters)
     given, data = data, data if beside is not None else data.since(asked.model)
     misfit = None if asked.model is None or data.baseline else read_misfit(asked.model, arm)
     if data.baseline != given.baseline:
@@ -275,16 +277,15 @@ def diagnose(
     else:
         show(result)
         _show_extras(out, result, extras)
-    code = _code(result.verdict, asked.strict)
-    if code:
-        click.get_current_context().exit(code)
+    _end(result.verdict, asked.strict)
 
 
-def _code(verdict: str, strict: bool) -> int:
-    """Return what the command ends with."""
+def _end(verdict: str, strict: bool) -> None:
+    """End with a code of its own where a script must not go on."""
     if verdict == 'bad_data':
-        return 2
-    return 3 if strict and verdict in _OPEN else 0
+        click.get_current_context().exit(2)
+    if strict and verdict in _OPEN:
+        click.get_current_context().exit(3)
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
