@@ -2,6 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """The errors a user can cause; each message says what is wrong, where, and what to do."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+#: Likeness, from 0 to 1, from which a name is meant by another: one letter in four may differ.
+_ALIKE = 0.75
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Return the one of some names that was meant by a name; empty if none is like it."""
+    return next(iter(get_close_matches(name, list(names), 1, _ALIKE)), '')
+
+
+def meant(name: str, names: Iterable[str]) -> str:
+    """Return the question whether the nearest name was meant, to go into a message, or nothing."""
+    found = nearest(name, names)
+    return f"; did you mean '{found}'?" if found else ''
+
 
 def visible(text: str) -> str:
     """

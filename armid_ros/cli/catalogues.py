@@ -33,7 +33,7 @@ def effects(as_json: bool) -> None:
             'name': name,
             'what it is': effect.summary,
             'parameters': [_with_unit(q.name, q.unit) for q in effect.quantities],
-            **({'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes]} if as_json else {}),
+            'shapes': [_with_unit(s.name, s.unit) for s in effect.shapes],
         }
         for name, effect in CATALOGUE.items()
     ]
@@ -43,6 +43,8 @@ def effects(as_json: bool) -> None:
     for row in rows:
         say(_wrapped(f'{row["name"]}: {row["what it is"]}', '', '    '))
         say(_wrapped(', '.join(map(_unbroken, row['parameters'])), '    ', '    '))
+        if row['shapes']:
+            say(_wrapped(f'shape: {", ".join(map(_unbroken, row["shapes"]))}', '    ', '    '))
 
 
 def _unbroken(text: str) -> str:

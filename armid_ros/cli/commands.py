@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import errno
+from functools import cache, partial
 from importlib import import_module
+import math
 import sys
 from typing import Any
 
@@ -53,9 +56,7 @@ class Commands(click.Group):
         """Import a command."""
         if cmd_name not in COMMANDS:
             return None
-        module = import_module(f'armid_ros.cli.{COMMANDS[cmd_name]}')
-        command: click.Command = getattr(module, cmd_name)
-        return command
+        return _imported(cmd_name)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command without importing all of them, or an option."""
@@ -66,9 +67,11 @@ class Commands(click.Group):
         """Run a command."""
         try:
             result = super().invoke(ctx)
-            for note in ctx.meta.get(NOTES, ()):
-                click.echo(note, err=True)
+            _tell_notes(ctx)
             return result
+        except click.exceptions.Exit:  # with a code of its own
+            _tell_notes(ctx)
+            raise
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)
@@ -86,7 +89,48 @@ class Commands(click.Group):
             sys.exit(2)
 
 
+def _tell_notes(context: click.Context) -> None:
+    for note in context.meta.get(NOTES, ()):
+        click.echo(note, err=True)
+
+
+@cache
+def _imported(name: str) -> click.Command:
+    """Import a command; no option of it takes a number that is not finite."""
+    command: click.Command = getattr(import_module(f'armid_ros.cli.{COMMANDS[name]}'), name)
+    _refuse_infinite(command)
+    return command
+
+
+def _refuse_infinite(command: click.Command) -> None:
+    """Let a command, and those below it, refuse numbers that are not finite."""
+    for below in command.commands.values() if isinstance(command, click.Group) else ():
+        _refuse_infinite(below)
+    for parameter in command.params:
+        if isinstance(parameter.type, click.types.FloatParamType):
+            parameter.callback = partial(_finite, parameter.callback)
+
+
+def _finite(
+    callback: Callable[..., Any] | None,
+    context: click.Context,
+    parameter: click.Parameter,
+    value: Any,
+) -> Any:
+    """Check the numbers of an option before its own callback has them."""
+    for number in value if isinstance(value, tuple) else (value,):
+        if number is not None and not math.isfinite(number):
+            raise click.BadParameter(f'{number} is not a finite number', context, parameter)
+    return value if callback is None else callback(context, parameter, value)
+
+
 @click.group(cls=Commands, context_settings={'help_option_names': ['-h', '--help']})
 @click.version_option(__version__, prog_name='armid')
 def main() -> None:
-    """Identify a robot arm: excite, record, identify, and find what the model lacks."""
+    """
+    Identify a robot arm: excite, record, identify, and find what the model lacks.
+
+    Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 3 a result that is not to
+    be gone on with (--strict of identify and diagnose).
+
+    """

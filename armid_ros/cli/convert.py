@@ -28,7 +28,7 @@ import click
     help='Shipped name or path of a URDF, whose joints the columns become; without it, joints '
     'are called as the columns are.',
 )
-@click.option('--out', type=click.Path(path_type=Path), help='Bag to write; must not exist.')
+@click.option('--out', type=options.OutPath(path_type=Path), help='Bag to write; must not exist.')
 @click.option('--dry-run', is_flag=True, help='Show what would be read from where; write nothing.')
 @columns.options
 @options.reading

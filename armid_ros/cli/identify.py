@@ -45,19 +45,10 @@ from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording, require_once
 from armid_ros.report import identification_report
 from armid_ros.report.identification_report import Assessment
+from armid_ros.report.judgement import residual_trends
 from armid_ros.robots import Robot
 import click
 import numpy as np
-
-#: Files that a folder to be filled may hold already, from an identification before.
-OUTPUTS = (
-    'model.yaml',
-    'identification.json',
-    'report.html',
-    'identified.urdf',
-    'identified.mjcf.xml',
-    'robot.urdf',
-)
 
 
 @dataclass(frozen=True)
@@ -220,7 +211,6 @@ def identify(
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     options.hold(out, SCHEMA, robot.robot_source)
-    options.require_own(out, OUTPUTS, 'identify')
     loaded = robot.load(data.bags, tell=False)
     arm = options.with_effects(ArmModel(loaded, quasi_static=fit.quasi_static), fit.effects)
     known = bodies.settings(loaded)
@@ -308,6 +298,10 @@ def _print(
     say(f'{work.graded.word}:')
     for reason in work.graded.reasons:
         say(f'  {reason}')
+    shown = [fit for fits in work.validation.values() for fit in fits] or result.training
+    trends = residual_trends(result.arm.robot.joints, shown)
+    if trends:
+        say(f'  {" ".join(trends.values())} The model lacks something there.')
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)

@@ -14,6 +14,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection import Inspection, inspection_document
+from armid_ros.inspection.output import SCHEMA
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.contents import bag_contents, TopicContent
@@ -40,9 +41,10 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 )
 @click.option(
     '--out',
-    type=click.Path(file_okay=False, path_type=Path),
+    type=options.OutPath(file_okay=False, path_type=Path),
     help='Folder to put the page with all curves into.',
 )
+@options.force
 @columns.options
 @options.topic
 @options.gravity
@@ -67,6 +69,8 @@ def inspect(
     a robot whether identify takes it. Without --out it is printed only.
 
     """
+    if out is not None:
+        options.hold(out, SCHEMA, robot_source or '')
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, gravity, joints, [bag])
@@ -79,7 +83,6 @@ def inspect(
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = look(recording, robot, topics=topics, rng=np.random.default_rng(seed))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         page = inspection_report(
             found, robot=robot_source or '', provenance=provenance([bag], seed=seed)
         )

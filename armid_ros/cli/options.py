@@ -12,7 +12,7 @@ from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
 from armid_ros.effects import make_effect, USUAL_EFFECTS
-from armid_ros.errors import ModelError, RecordingError, RobotError, visible
+from armid_ros.errors import ModelError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
@@ -34,6 +34,17 @@ Corners = tuple[Sequence[float], Sequence[float]]
 
 #: Where the context keeps what its commands share.
 _FORCE, _CRC, _MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
+
+
+class OutPath(click.Path):
+    """A path to write to: an empty one, which would be the current folder, is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        if not str(value).strip():
+            self.fail('the path is empty; name a folder, or . for this one', param, ctx)
+        return super().convert(value, param, ctx)
+
 
 robot = click.option(
     '--robot',
@@ -58,17 +69,14 @@ effects = click.option(
     help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
-    '--out',
-    required=True,
-    type=click.Path(file_okay=False, path_type=Path),
-    help='Folder to fill.',
+    '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
 )
-_force = click.option(
+force = click.option(
     '--force',
     is_flag=True,
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({_FORCE: value}),
-    help='Write over results of another kind or robot.',
+    help='Write over results of another kind or robot, and over files of others.',
 )
 _crc = click.option(
     '--crc/--no-crc',
@@ -87,7 +95,7 @@ _memory = click.option(
     help='That a bag may take [MB]; a quarter of the memory by default.',
 )
 bag = click.option(
-    '--out', required=True, type=click.Path(path_type=Path), help='Bag to write; must not exist.'
+    '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
 )
 bags = click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
 validate = click.option(
@@ -104,7 +112,7 @@ as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result
 
 def folder(command: _Command) -> _Command:
     """Add --out, a folder of results, and --force, to write over others."""
-    return _out(_force(command))
+    return _out(force(command))
 
 
 def reading(command: _Command) -> _Command:
@@ -112,11 +120,25 @@ def reading(command: _Command) -> _Command:
     return _crc(_memory(command))
 
 
-def hold(out: Path, schema: str, robot: str = '') -> None:
-    """Make a folder, and keep it for the results of this command as long as the command runs."""
+def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> None:
+    """
+    Make a folder, and keep it for the results of this command as long as the command runs.
+
+    Parameters
+    ----------
+    out : Path
+        The folder.
+    schema : str
+        Of the results.
+    robot : str
+        What the results call the robot.
+    also : collection of str
+        Names of what the command writes beside such results.
+
+    """
     context = click.get_current_context()
-    force = bool(context.meta.get(_FORCE, False))
-    context.with_resource(result_folder(out, schema, robot, force=force))
+    forced = bool(context.meta.get(_FORCE, False))
+    context.with_resource(result_folder(out, schema, robot, also=also, force=forced))
 
 
 def read_settings() -> ReadSettings:
@@ -226,24 +248,6 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
             f"{', '.join(robot.joints)}; not '{text}'"
         )
     return np.broadcast_to(values, robot.n_joints).copy()
-
-
-def require_own(folder: Path, ours: Collection[str], command: str) -> None:
-    """
-    Refuse a folder that holds what a command does not write.
-
-    Raises
-    ------
-    RecordingError
-        Naming the folder and what is in it.
-
-    """
-    inside = folder.iterdir() if folder.is_dir() else ()
-    foreign = sorted(path.name for path in inside if path.name not in ours)
-    if foreign:
-        raise RecordingError(
-            f'{folder}: holds {foreign[0]}, which no {command} wrote; name a new folder'
-        )
 
 
 def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:

@@ -103,7 +103,8 @@ class NoiseOptions:
     'texts',
     multiple=True,
     metavar='NAME:k=v',
-    help=f'Such as {EXAMPLES}.',
+    help=f'Such as {EXAMPLES}. Every joint gets the values; for others in single joints give it '
+    'several times, as NAME@A:k=v and NAME@B:k=w.',
 )
 @click.option('--model', type=click.Path(path_type=Path), help='A model.yaml of armid identify.')
 @click.option(

@@ -26,7 +26,7 @@ from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.effects.unexplained import Unexplained
-from armid_ros.errors import ModelError
+from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion, read_only
@@ -153,7 +153,7 @@ class Effect(ABC):
         if unknown:
             raise ModelError(
                 f"{cls.name}: {robot.name} has no joint '{unknown[0]}'; "
-                f'its joints are {", ".join(robot.joints)}'
+                f'its joints are {", ".join(robot.joints)}{meant(unknown[0], robot.joints)}'
             )
         effect = cls(tuple(chosen))
         return effect.with_shape(effect._default_shape(robot)) if cls.shapes else effect

@@ -27,12 +27,13 @@ from armid_ros.effects.interaction import HumanInteraction, InterfaceSlack
 from armid_ros.effects.learned import LearnedTorque
 from armid_ros.effects.load import LinkInertia, Payload
 from armid_ros.effects.pairs import CoupledJointFriction, JointCoupling, TorqueCrosstalk
+from armid_ros.effects.quantities import Quantity
 from armid_ros.effects.registry import Catalogue
 from armid_ros.effects.sensing import EncoderOffset, TorqueDrift, TorqueGain, TorqueOffset
 from armid_ros.effects.springs import JointSpring, SoftLimit
 from armid_ros.effects.timing import TimeDelay, TorqueLag
 from armid_ros.effects.transmission import Backlash, JointElasticity
-from armid_ros.errors import ModelError
+from armid_ros.errors import meant, ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -191,18 +192,44 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
     shape_values = effect.shape_values
     for assignment in filter(None, assignments.split(',')):
         key, _, number = (part.strip() for part in assignment.partition('='))
-        try:
-            value = float(number)
-        except ValueError:
-            raise ModelError(
-                f"{text}: '{number}' is not a number; write {effect.name}:{key}=0.1"
-            ) from None
+        value = _number(text, effect, key, number)
         if key in quantities:
-            values[:, quantities.index(key)] = value
+            index = quantities.index(key)
+            _require_possible(effect.name, effect.quantities[index], value)
+            values[:, index] = value
         elif key in shapes:
             shape_values[:, shapes.index(key)] = value
         else:
             raise ModelError(
                 f"{effect.name} has no '{key}'; it has {', '.join(quantities + shapes)}"
+                f'{meant(key, quantities + shapes)}'
             )
     return effect.with_shape(shape_values), values.ravel()
+
+
+def _number(text: str, effect: Effect, key: str, number: str) -> float:
+    """Read the value of a quantity or a shape; say how joints get values of their own."""
+    try:
+        value = float(number)
+    except ValueError:
+        value = np.nan
+    if np.isfinite(value):
+        return value
+    if number or not effect.joints:
+        raise ModelError(f"{text}: '{number}' is not a number; write {effect.name}:{key}=0.1")
+    first = effect.quantities[0].name
+    raise ModelError(
+        f"{text}: '{key}' has no value. A value is that of every joint; for another one in each "
+        f'joint give the effect several times, as {effect.name}@{effect.joints[0]}:{first}=0.1'
+    )
+
+
+def _require_possible(name: str, quantity: Quantity, value: float) -> None:
+    """Refuse a value that no arm can have."""
+    if quantity.lower <= value <= quantity.upper:
+        return
+    bounds = f'{quantity.lower:g} or more'
+    if np.isfinite(quantity.upper):
+        bounds = f'from {quantity.lower:g} to {quantity.upper:g}'
+    unit = f' {quantity.unit}' if quantity.unit else ''
+    raise ModelError(f'{name}: {quantity.name} has to be {bounds}{unit}, not {value:g}')

@@ -21,7 +21,7 @@ from typing import Protocol
 
 from armid_ros.effects.base import Effect
 from armid_ros.effects.quantities import Quantity, Shape
-from armid_ros.errors import ModelError
+from armid_ros.errors import ModelError, nearest
 from armid_ros.robots import Robot
 
 #: Entry-point group of packages that bring effects.
@@ -91,11 +91,17 @@ class Catalogue(Mapping[str, type[Effect]]):
         Raises
         ------
         ModelError
-            If there is none; the message lists the names, and packages that cannot be loaded.
+            If there is none; the message has the nearest name, or lists them, and packages that
+            cannot be loaded.
 
         """
         if name in self:
             return self[name]
+        near = nearest(name, self)
+        if near:
+            raise ModelError(
+                f"no effect '{name}'; did you mean '{near}'? 'armid effects' lists all of them"
+            )
         lost = ''.join(f'; {package} cannot be loaded: {why}' for package, why in self.lost())
         raise ModelError(
             f"no effect '{name}'; the catalogue has {', '.join(self)}{lost}"

@@ -11,7 +11,7 @@ system lets go of the lock when the process ends, however it ends.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 import fcntl
 import json
@@ -22,6 +22,7 @@ from typing import Any
 
 from armid_ros.errors import OutputError
 from armid_ros.files.documents import load_json, load_yaml, reading
+from armid_ros.files.own import refuse_foreign
 from armid_ros.files.regular import read_text
 
 #: Files by whose schema a folder is known; each is the one that its command writes last.
@@ -79,7 +80,12 @@ def json_text(document: Any, indent: int | None = None) -> str:
 
 @contextmanager
 def result_folder(
-    path: Path, schema: str, robot: str = '', *, force: bool = False
+    path: Path,
+    schema: str,
+    robot: str = '',
+    *,
+    also: Collection[str] = (),
+    force: bool = False,
 ) -> Iterator[Path]:
     """
     Hold a folder for the results of one command.
@@ -92,14 +98,16 @@ def result_folder(
         Of the results, such as 'armid/identification/1'.
     robot : str
         What the results call the robot; empty where they have none.
+    also : collection of str
+        Names of what the command writes beside such results.
     force : bool
-        Whether to write over results of another kind or robot.
+        Whether to write over results of another kind or robot, and over files of others.
 
     Raises
     ------
     OutputError
         The folder cannot be written to, another run works on it, or it has results of another
-        kind or robot.
+        kind or robot, or files that the command did not write.
 
     """
     made = [one for one in (path, *path.parents) if not os.path.lexists(one)]
@@ -115,6 +123,7 @@ def result_folder(
         _try_to_write(path)
         if not force:
             _refuse_other_results(path, schema, robot)
+            refuse_foreign(path, schema, also)
         yield path
     finally:
         os.close(descriptor)

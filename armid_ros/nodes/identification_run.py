@@ -255,7 +255,7 @@ class IdentificationRunNode(ArmidNode):
         program = (command, *fitted, *validate, *given, *more, '--out', str(folder))
         self._program = self._start(program)
         yield f'armid {command} is under way', lambda: self._program.poll() is not None
-        if self._program.returncode:
+        if self._program.returncode and not _refuses_data(command, folder):
             known = f'; until then: {"; ".join(self._results)}' if self._results else ''
             raise ArmidError(
                 f'armid {command} ended with code {self._program.returncode}; the recordings are '
@@ -294,6 +294,14 @@ class IdentificationRunNode(ArmidNode):
             if status.name == wanted:
                 values = {value.key: value.value for value in status.values}
                 self._state = {**values, 'message': status.message}
+
+
+def _refuses_data(command: str, folder: Path) -> bool:
+    """Tell whether a diagnosis says that the data cannot be diagnosed, which is an answer."""
+    file = folder / _SAID['diagnose'][0]
+    if command != 'diagnose' or not file.is_file():
+        return False
+    return bool(json.loads(file.read_text(encoding='utf-8'))['verdict'] == 'bad_data')
 
 
 def _result(command: str, folder: Path) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from armid_ros.errors import RecordingError
+from armid_ros.errors import nearest, RecordingError
 from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
@@ -257,6 +257,18 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
     raise RecordingError(
         f'{where} does not name {_joint_list(missing)}; '
         f'its joints are {", ".join(decoder.names_seen)}'
+        f'{_renaming(missing[0], [name for name in decoder.names_seen if name not in joints])}'
+    )
+
+
+def _renaming(joint: str, others: Sequence[str]) -> str:
+    """Say how a joint that is missing is read from another one whose name is like it."""
+    found = nearest(joint, others)
+    if not found:
+        return ''
+    return (
+        f"; if '{found}' is '{joint}', say --rename {found}:{joint}; if it is another one, "
+        f'--joints names those to read'
     )
 
 

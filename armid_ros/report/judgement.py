@@ -192,19 +192,29 @@ def _error_findings(
     return findings
 
 
-def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
-    findings = []
-    coloured = []
-    for joint, name in enumerate(result.arm.robot.joints):
+def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> dict[str, str]:
+    """Say what the residual of joints goes with, by joint; nothing of one that goes with none."""
+    said = {}
+    for joint, name in enumerate(joints):
         shares = explained_shares(fits, joint)
         telling = [
             key for key in sorted(shares, key=lambda k: -shares[k]) if shares[key] > TELLING_SHARE
         ]
         if telling:
             parts = ', '.join(f'{key} ({100.0 * shares[key]:.0f} %)' for key in telling)
+            said[name] = f'The residual of {name} goes with {parts}.'
+    return said
+
+
+def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
+    findings = []
+    coloured = []
+    trends = residual_trends(result.arm.robot.joints, fits)
+    for joint, name in enumerate(result.arm.robot.joints):
+        if name in trends:
             findings.append(
                 Caution(
-                    f'The residual of {name} goes with {parts}.',
+                    trends[name],
                     'Diagnose what the residual that follows a variable is due to, and add it to '
                     'the effects.',
                 )

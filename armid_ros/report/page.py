@@ -18,6 +18,7 @@ from importlib.resources import files
 import re
 from typing import Any, ClassVar
 
+from armid_ros.files.own import GENERATOR
 from armid_ros.report.notation import counted, digits, pretty
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -75,6 +76,7 @@ class Page:
     def html(self) -> str:
         """Return the whole file, scripts and styles included."""
         assets = {
+            'generator': Markup(GENERATOR),
             'chart_library': asset('uPlot.iife.min.js'),
             'chart_licence': asset('uPlot.LICENSE'),
             'chart_style': asset('uPlot.min.css'),

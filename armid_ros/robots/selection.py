@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from armid_ros.errors import RobotError
+from armid_ros.errors import meant, RobotError
 from armid_ros.robots.description import Description, Joint
 from armid_ros.robots.robot import Robot
 
@@ -183,7 +183,10 @@ def _by_name(description: Description, names: Sequence[str], source: str) -> tup
     free = ', '.join(joint.name for joint in description.movable() if not joint.mimic)
     for name in names:
         if name not in known:
-            raise RobotError(f"{source}: no joint is named '{name}'; joints to drive: {free}")
+            raise RobotError(
+                f"{source}: no joint is named '{name}'; joints to drive: {free}"
+                f'{meant(name, known)}'
+            )
         if not known[name].movable:
             raise RobotError(f"{source}: joint '{name}' is fixed; joints to drive: {free}")
         if known[name].mimic:

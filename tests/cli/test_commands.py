@@ -3,7 +3,10 @@
 """The command line: what it writes, prints and refuses."""
 
 import json
+from pathlib import Path
+import re
 
+from armid_ros.arm import ArmModel
 from armid_ros.cli.commands import COMMANDS
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.elastic.identification import Accelerometers, read_runs
@@ -16,6 +19,7 @@ import pytest
 from .conftest import armid, ROBOT
 
 PHYSICAL = ('identify', '{bag}', '--robot', ROBOT, '--out', 'o', '--physical')
+VISCOUS = 'viscous_friction:viscous_coefficient'
 QUICK = ('--starts', 1, '--iterations', 5)
 
 
@@ -28,6 +32,10 @@ def test_robots_and_effects_are_listed_for_people_and_programs():
     assert ROBOT in armid('robots').output
     listed = json.loads(armid('effects', '--json').output)
     assert [row['name'] for row in listed] == list(CATALOGUE)
+    lines = armid('effects').output.splitlines()
+    (line,) = (k for k, text in enumerate(lines) if text.startswith('stribeck_friction:'))
+    shown = ' '.join(lines[line : line + 5])
+    assert 'stribeck_torque [N m]' in shown and 'shape: stribeck_velocity [rad/s]' in shown
 
 
 def test_excite_simulate_identify_in_three_lines(tmp_path):
@@ -122,10 +130,33 @@ def test_options_of_a_design_do_not_go_with_steps(tmp_path):
         ((*PHYSICAL, '--box', 'elbow_pitch=0:1'), 'JOINT=X,Y,Z:X,Y,Z'),
         ((*PHYSICAL, '--box', 'elbow_pitch=1,1,1:0,0,0'), 'has to be below'),
         ((*PHYSICAL, '--total-mass', -1), 'total mass -1'),
-        ((*PHYSICAL, '--total-mass', 'inf'), 'total mass inf'),
         ((*PHYSICAL[:-1], '--total-mass', 1), 'go with --physical'),
         (('simulate', '--robot', ROBOT, '--gravity', 'mars', '--out', 'o'), 'mars'),
         (('simulate', '--robot', ROBOT, '--effect', 'payload:m=1', '--out', 'o'), 'payload_m'),
+        (
+            ('simulate', '--robot', ROBOT, '--effect', f'{VISCOUS}=-1', '--out', 'o'),
+            'viscous_friction: viscous_coefficient has to be 0 or more N m s/rad, not -1',
+        ),
+        (
+            ('simulate', '--robot', ROBOT, '--effect', f'{VISCOUS}=nan', '--out', 'o'),
+            "'nan' is not a number",
+        ),
+        (
+            ('simulate', '--robot', ROBOT, '--effect', f'{VISCOUS}=0.6,0.8', '--out', 'o'),
+            'several times, as viscous_friction@shoulder_pitch:viscous_coefficient=0.1',
+        ),
+        (
+            ('simulate', '--robot', ROBOT, '--effect', 'viscous_fricton', '--out', 'o'),
+            "no effect 'viscous_fricton'; did you mean 'viscous_friction'?",
+        ),
+        (
+            ('simulate', '--robot', ROBOT, '--effect', 'joint_spring@elbow_ptch', '--out', 'o'),
+            "did you mean 'elbow_pitch'?",
+        ),
+        (
+            ('identify', '{bag}', '--robot', ROBOT, '--joints', 'elbow_ptch', '--out', 'o'),
+            "did you mean 'elbow_pitch'?",
+        ),
         (('simulate', '--robot', ROBOT, '--model', 'none.yaml', '--out', 'o'), 'none.yaml'),
         (('simulate', '--robot', ROBOT, '--out', '{bag}'), '{bag}'),
         (('recover', 'no.mcap', '--out', 'o'), 'no.mcap'),
@@ -146,6 +177,77 @@ def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_pat
     assert lines[0].startswith('armid: ')
     assert message.format(bag=bags[0]) in lines[0]
     assert not (tmp_path / 'o').exists()
+
+
+def test_a_joint_of_a_bag_with_another_name_is_read_as_the_error_says(bags, tmp_path):
+    text = Path(load_robot(ROBOT).path).read_text(encoding='utf-8')
+    other = tmp_path / 'other.urdf'
+    other.write_text(text.replace('"elbow_pitch"', '"ellbow_pitch"'), encoding='utf-8')
+    asked = ('inspect', bags[0], '--robot', other)
+    said = armid(*asked, code=2).stderr
+    assert "does not name joint 'ellbow_pitch'" in said and '--joints' in said
+    (rule,) = re.findall(r'--rename ([a-z_]+:[a-z_]+)', said)
+    armid(*asked, '--rename', rule)
+
+
+def test_joints_have_values_of_their_own_where_an_effect_is_given_for_each(tmp_path):
+    robot = load_robot(ROBOT)
+    given = {'elbow_pitch': 0.6, 'forearm_yaw': 0.8}
+    texts = [f'viscous_friction@{joint}:viscous_coefficient={v}' for joint, v in given.items()]
+    arm = ArmModel.of(ROBOT, effects=texts)
+    values = [arm.values_of(make_effect(f'viscous_friction@{j}', robot)) for j in given]
+    assert [float(v[0]) for v in values] == list(given.values())
+
+
+FILLING = {
+    'identify': ('identify', '{bag}', '--robot', ROBOT),
+    'diagnose': ('diagnose', '{bag}', '--robot', ROBOT),
+    'compare': ('compare', 'a', 'b'),
+    'excite': ('excite', '--robot', ROBOT),
+    'inspect': ('inspect', '{bag}'),
+}
+
+
+@pytest.mark.parametrize('command', FILLING)
+def test_no_command_replaces_a_page_or_adds_to_notes_of_somebody(command, bags, tmp_path):
+    arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
+    page = 'inspection.html' if command == 'inspect' else 'report.html'
+    for name, refusal in ((page, 'armid did not write'), ('notes.txt', 'does not write')):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / name).write_text('precious')
+        said = armid(*arguments, '--out', folder, code=2).stderr
+        assert f'{folder}: holds {name}, which' in said and refusal in said and '--force' in said
+        assert [path.read_text() for path in folder.iterdir()] == ['precious']
+
+
+@pytest.mark.parametrize('command', FILLING)
+def test_an_empty_out_does_not_fill_the_current_folder(command, bags, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
+    assert 'the path is empty' in armid(*arguments, '--out', '', code=2).stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_page_of_an_inspection_is_replaced_by_the_next_one(bags, tmp_path):
+    for _ in range(2):
+        armid('inspect', bags[0], '--out', tmp_path / 'look')
+
+
+@pytest.mark.parametrize('number', ['nan', 'inf', '-inf'])
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ('excite', '--robot', ROBOT, '--out', 'o', '--duration'),
+        ('simulate', '--robot', ROBOT, '--out', 'o', '--torque-noise'),
+        ('identify', 'bag', '--robot', ROBOT, '--out', 'o', '--memory-limit'),
+        (*PHYSICAL, '--total-mass'),
+        ('fleet', 'identify', 'bags', '--out', 'o', '--cutoff'),
+    ],
+)
+def test_a_number_that_is_not_finite_is_refused_with_its_option(arguments, number):
+    said = armid(*arguments, number, code=2).output
+    assert f"'{arguments[-1]}'" in said and f'{number} is not ' in said
 
 
 @pytest.mark.parametrize('effect', ['backlash@elbow_pitch', 'viscous_friction'])

@@ -6,6 +6,7 @@ import json
 
 from armid_ros.arm import load_misfit, load_model, Misfit, save_model
 from armid_ros.cli.diagnose.command import Percent
+from armid_ros.diagnosis import Diagnosis
 from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
@@ -204,6 +205,34 @@ def test_what_a_model_was_identified_from_is_the_baseline(doubtful, tmp_path):
         said, unit = floor(*more, of=of)
         assert 'baseline:' not in said
         assert unit == 'the misfit that the model had when it was identified'
+
+
+@pytest.mark.parametrize(
+    ('verdict', 'code', 'strict_code'),
+    [
+        ('consistent', 0, 0),
+        ('named', 0, 0),
+        ('ambiguous', 0, 0),
+        ('partial', 0, 0),
+        ('unknown', 0, 3),
+        ('not_repeatable', 0, 3),
+        ('bad_data', 2, 2),
+    ],
+)
+def test_a_script_learns_from_the_code_whether_to_go_on(
+    files, tmp_path, monkeypatch, verdict, code, strict_code
+):
+    """Whatever the code is, the folder has the result."""
+    urdf, model, bags = files
+    said = Diagnosis(
+        verdict, 'Said.', (), (), (), (), None, None, load_model(model), (), (), (), False, (), ''
+    )
+    monkeypatch.setattr('armid_ros.cli.diagnose.command.diagnose_beside', lambda *_, **__: said)
+    asked = ('diagnose', *bags, '--robot', urdf, '--model', model, '--no-baseline')
+    for more, expected in (((), code), (('--strict',), strict_code), (('--json',), code)):
+        armid(*asked, '--out', tmp_path / 'out', *more, code=expected)
+        document = json.loads((tmp_path / 'out' / 'diagnosis.json').read_text())
+        assert document['verdict'] == verdict
 
 
 @pytest.mark.parametrize(('text', 'share'), [('2%', 0.02), ('0.5', 0.005), ('0 %', 0.0)])

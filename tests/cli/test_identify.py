@@ -178,10 +178,22 @@ def test_what_is_not_told_from_zero_is_printed_without_a_value(tmp_path):
         assert 'includes 0' in line
 
 
+def test_the_terminal_says_with_what_a_residual_goes(bags, tmp_path):
+    """As the page does: friction that the model has not is a residual that goes with speed."""
+    asked = ('identify', bags[0], '--validate', bags[1], '--robot', ROBOT, '--no-verify')
+    for effects, said in (('torque_offset', True), ('viscous_friction', False)):
+        out = tmp_path / effects
+        text = armid(*asked, '--effects', effects, '--out', out).stdout
+        found = re.findall(r'The residual of [a-z_]+ goes with its speed \([0-9]+ %\)', text)
+        assert bool(found) == said == ('The model lacks something there.' in text)
+        page = (out / 'report.html').read_text()
+        assert all(sentence in page for sentence in found)
+
+
 def test_a_folder_with_other_files_is_refused_before_any_work(bags, tmp_path):
     (tmp_path / 'notes.txt').write_text('mine')
     result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path, code=2)
-    assert 'holds notes.txt, which no identify wrote' in result.output
+    assert 'holds notes.txt, which this command does not write' in result.output
     assert [path.name for path in tmp_path.iterdir()] == ['notes.txt']
 
 

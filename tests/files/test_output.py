@@ -116,7 +116,40 @@ def test_a_model_that_no_run_of_this_kind_left_is_kept_unless_forced(tmp_path, t
                 pass
     with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
         pass
-    with result_folder(tmp_path, 'armid/comparison/1', 'ur5'):  # which writes none
+
+
+PAGE = '<!DOCTYPE html>\n<head>\n<meta name="generator" content="armid_ros">\n</head>'
+OWN = {'model.yaml': 'schema: armid/model/1\nrobot: ur5\n'}
+
+
+@pytest.mark.parametrize(
+    ('files', 'refusal'),
+    [
+        ({}, None),
+        ({'report.html': PAGE}, None),
+        ({**OWN, 'report.html': PAGE, 'identified.urdf': '<robot/>'}, None),
+        ({'report.html': 'precious'}, 'holds report.html, which armid did not write; .*--force'),
+        ({**OWN, 'report.html': 'precious'}, 'holds report.html, which armid did not'),
+        ({'identified.urdf': '<robot/>'}, 'holds identified.urdf, which armid did not write'),
+        ({**OWN, 'notes.txt': 'mine'}, 'holds notes.txt, which this command does not write'),
+    ],
+)
+def test_what_the_command_did_not_write_is_kept_unless_forced(tmp_path, files, refusal):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    if refusal:
+        with pytest.raises(OutputError, match=refusal):
+            with result_folder(tmp_path, SCHEMA, 'ur5'):
+                pass
+    with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
+        pass
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == files
+
+
+def test_other_files_that_a_command_says_it_writes_are_no_strangers(tmp_path):
+    for name in ('model.yaml', 'story.png'):
+        (tmp_path / name).write_text(OWN['model.yaml'])
+    with result_folder(tmp_path, SCHEMA, 'ur5', also=['*.png']):
         pass
 
 

@@ -7,10 +7,12 @@ from html.parser import HTMLParser
 import re
 
 from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
+from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.motion import Motion
 from armid_ros.report import hash_files, identification_report, Provenance, versions
 from armid_ros.report.identification_report import Assessment
 from armid_ros.report.repeatability import Repeatability
+from armid_ros.report.sections.assessment import EncoderNoise
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.parameters import ParameterSection
 import numpy as np
@@ -184,6 +186,18 @@ def test_what_was_put_to_a_test_has_a_section(case, whole):
     ):
         assert expected in reader.text
     assert re.search(r'[0-9.]+ mrad, [0-9.]+ N m', reader.text)
+
+
+def test_a_test_that_fires_has_no_tick(case):
+    estimate = case.result.estimate
+    noise = np.full(6, 1e-6)
+    check = NoiseCheck(
+        90.0, 2.0, 1e-9, estimate, noise, 0.01 * estimate.std, 0.0 * estimate.std, estimate.std
+    )
+    for p_value, tick in ((1e-9, 'warn'), (0.5, 'fine')):
+        html = EncoderNoise(case.result.arm.robot, replace(check, p_value=p_value)).html()
+        assert f'<li class="{tick}">Durbin-Wu-Hausman test' in html
+        assert '<li class="fine">Position noise' in html
 
 
 def test_what_the_data_do_not_tell_is_no_number(case):

@@ -22,15 +22,15 @@ __all__ = ['excitation']
 class Programs:
     """Stand in for armid: write what it would, and end at once."""
 
-    def __init__(self, codes=(0, 0)):
-        self.called, self._codes = [], list(codes)
+    def __init__(self, codes=(0, 0), verdict='not_repeatable'):
+        self.called, self._codes, self._verdict = [], list(codes), verdict
 
     def __call__(self, program):
         self.called.append(program)
         folder = Path(program[-1])
         folder.mkdir(parents=True, exist_ok=True)
         (folder / 'identification.json').write_text(json.dumps({'grade': 'good'}))
-        document = {'verdict': 'not_repeatable', 'summary': 'nothing to name'}
+        document = {'verdict': self._verdict, 'summary': 'nothing to name'}
         (folder / 'diagnosis.json').write_text(json.dumps(document))
         return Ended(self._codes.pop(0))
 
@@ -137,6 +137,14 @@ def test_a_run_that_is_stopped_ends_it_with_the_reason(bench, arm, excitation, t
     assert not programs.called
     bench.settle()
     assert len(read_recording(tmp_path / 'run', joints=ROBOT.joints)) > 10
+
+
+def test_data_that_cannot_be_diagnosed_are_an_answer(bench, arm, excitation, tmp_path):
+    programs = Programs(codes=(0, 2), verdict='bad_data')
+    node, run = everything(bench, arm, excitation, tmp_path, programs, runs=1)
+    carry_on(bench, arm, node, run)
+    assert not run.failure
+    assert 'diagnose: bad data: nothing to name' in run.condition()[1]['results']
 
 
 def test_a_program_that_fails_is_said_with_what_there_is(bench, arm, excitation, tmp_path):

@@ -32,6 +32,9 @@ from armid_ros.robots import Robot
 import click
 import numpy as np
 
+#: Verdicts with nothing to go on with, besides that on data that cannot be diagnosed.
+_OPEN = ('unknown', 'not_repeatable')
+
 
 class Percent(click.ParamType):  # type: ignore[type-arg]
     """A share that a person writes in per cent, with or without the sign."""
@@ -130,6 +133,8 @@ class AskedOptions:
         Whether those get into the model, too.
     residual : str or None
         How what is left without a name is learned.
+    strict : bool
+        Whether a verdict without a name is an error.
 
     """
 
@@ -138,6 +143,13 @@ class AskedOptions:
     material: float
     everything: bool
     residual: str | None
+    strict: bool
+
+    def settings(self, filters: FilterOptions) -> DiagnosisSettings:
+        """Return what a diagnosis takes."""
+        return DiagnosisSettings(
+            signals=filters.settings(), material=self.material, everything=self.everything
+        )
 
 
 @click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
@@ -187,6 +199,12 @@ class AskedOptions:
     help='Learn what is left without a name, where the verdict is partial or unknown, as a map '
     'with its uncertainty (gp: a Gaussian process of each joint), and suggest a law.',
 )
+@click.option(
+    '--strict',
+    is_flag=True,
+    help='End with code 3 if something is there and has no name (unknown, not_repeatable). Data '
+    'that cannot be diagnosed (bad_data) end with code 2 in any case.',
+)
 @click.option('--cutoff', type=float, help='Of the position filter [Hz]; from the data if none.')
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @columns.options
@@ -222,11 +240,7 @@ def diagnose(
     arm = ArmModel(loaded) if asked.model is None else _model_of(asked.model, loaded)
     arm = options.with_effects(arm, asked.effects)
     beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
-    settings = DiagnosisSettings(
-        signals=filters.settings(),
-        material=asked.material,
-        everything=asked.everything,
-    )
+    settings = asked.settings(filters)
     given, data = data, data if beside is not None else data.since(asked.model)
     misfit = None if asked.model is None else read_misfit(asked.model, arm)
     if data.baseline != given.baseline:
@@ -260,9 +274,18 @@ def diagnose(
         document = write_results(out, result, case, extras)
     if as_json:
         click.echo(json_text(document))
-        return
-    show(result)
-    _show_extras(out, result, extras)
+    else:
+        show(result)
+        _show_extras(out, result, extras)
+    _end(result.verdict, asked.strict)
+
+
+def _end(verdict: str, strict: bool) -> None:
+    """End with a code of its own where a script must not go on."""
+    if verdict == 'bad_data':
+        click.get_current_context().exit(2)
+    if strict and verdict in _OPEN:
+        click.get_current_context().exit(3)
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:

@@ -205,8 +205,8 @@ def excite(
     plan = ExcitationPlan(arm, robot.robot_source, space, start, search.after, files, search.seed)
     folders = {s: out if len(motion.speeds) == 1 else out / f'{s}' for s in motion.speeds}
     for folder in folders.values():
-        options.hold(folder, SCHEMA, robot.robot_source)
         require_free(folder)
+        options.hold(folder, SCHEMA, robot.robot_source)
     known = _known(arm, settings, search.after, search.seed) if search.after else None
     task = _Task(plan, settings, rival, known)
     missing = list(folders)

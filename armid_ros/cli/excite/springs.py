@@ -40,8 +40,8 @@ def refuse_other_options(context: click.Context) -> None:
 def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: Path) -> None:
     """Write the trajectory as a bag."""
     robot = space.collision.robot
-    options.hold(out, SCHEMA, robot.name)
     require_free(out)
+    options.hold(out, SCHEMA, robot.name)
     bodies = space.bodies
 
     def clear(q: FloatArray) -> bool:

@@ -96,10 +96,27 @@ class NoiseCheck:
         """Whether no parameter is biased by a share of its deviation that matters."""
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
 
-    def sentences(self) -> tuple[str, ...]:
-        """Say in words what was found."""
+    def findings(self) -> tuple[tuple[str, bool], ...]:
+        """Say in words what was found, each with whether it is as it should be."""
+        test, bias = self.sentences()
+        return (test, self.consistent), (bias, self.harmless)
+
+    def sentences(self) -> tuple[str, str]:
+        """
+        Say in words what was found.
+
+        Where the test fires and the noise makes no bias that matters, something else sets the
+        two fits apart: what the model lacks, whose share of each is not the same.
+
+        """
         low, high = self.position_noise.min(), self.position_noise.max()
         found = 'no sign' if self.consistent else 'a sign'
+        found += ' that encoder noise biases the parameters'
+        if self.harmless and not self.consistent:
+            found = (
+                'a fit with instruments differs, by more than the noise of the encoders makes; an '
+                'effect that the model lacks is the likelier cause'
+            )
         worst = int(np.argmax(np.abs(self.relative_bias)))
         name = self.instrumental.parameters[worst]
         leader = name.name.split(' ')[0]
@@ -107,9 +124,8 @@ class NoiseCheck:
         size = float(abs(self.relative_bias[worst]))
         verdict = 'the intervals hold' if self.harmless else 'the intervals are off by that'
         return (
-            f'Durbin-Wu-Hausman test: {found} that encoder noise biases the parameters '
-            f'(statistic {self.statistic:.1f}, {self.freedom:.1f} degrees of freedom, '
-            f'p = {self.p_value:.2g})',
+            f'Durbin-Wu-Hausman test: {found} (statistic {self.statistic:.1f}, '
+            f'{self.freedom:.1f} degrees of freedom, p = {self.p_value:.2g})',
             f'position noise {low:.2g} to {high:.2g} rad (or m): the bias that it makes is at '
             f'most {size:.2g} standard deviations ({where}); {verdict}',
         )

@@ -18,7 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.joint_errors import beyond_noise
+from armid_ros.identification.assess.joint_errors import beyond_noise, moving
 from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
@@ -93,6 +93,7 @@ def grade(
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
         *_errors(result, validation),
+        *_resting(result, validation),
         *_clocks([*recordings, *held_out]),
     ]
     ordered = sorted(reasons, key=lambda reason: -_WORDS.index(reason.word))
@@ -213,13 +214,19 @@ class _Worst(NamedTuple):
     def of(cls, errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
         """Choose it among errors of joints as shares of their torque, shape (n,) [%]."""
         joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
-        worst = int(np.argmax(beyond))
+        moves = moving(fits)
+        largest = worst = int(np.argmax(np.where(moves, errors, -1.0)))
+        error = float(beyond.max())
+        if by_error(error) != by_error(errors[largest]):  # most of the largest error is noise
+            worst = int(np.lexsort((errors, beyond))[-1])
         said = f'{errors[worst]:.3g} %'
-        if by_error(beyond[worst]) != by_error(errors[worst]):
-            said += f' ({beyond[worst]:.3g} % without the noise)'
+        if by_error(error) != by_error(errors[worst]):
+            said += f' ({error:.3g} % without the noise)'
         if len(joints) > 1:
-            said += f' in {joints[worst]}, the most of all joints'
-        return cls(float(beyond[worst]), said)
+            of = 'all joints' if np.all(moves) else 'the joints that move'
+            said += f' in {joints[worst]}, the most of {of}'
+            said += ' without the noise of their torques' if worst != largest else ''
+        return cls(error, said)
 
 
 def _halves(result: Identification) -> _Reason:
@@ -253,6 +260,27 @@ def _elsewhere(
     motions = [fit.motion for fit in _fits(result, validation)]
     for found in held_elsewhere(description.robot, recordings, motions):
         yield _Reason('poor' if found.spoils else 'good', _sentence(found.text))
+
+
+def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[_Reason]:
+    """Say which joints nothing is known of, or are not checked, because they do not move."""
+    fitted = moving(result.training)
+    held_out = [fit for part in validation.values() for fit in part]
+    checked = moving(held_out) if held_out else fitted
+    joints = np.array(result.arm.robot.joints)
+    reasons = []
+    if not np.all(fitted):
+        names, others = ', '.join(joints[~fitted]), ','.join(joints[fitted])
+        text = (
+            f'not identified and not checked, as they do not move: {names}; record a motion of '
+            f'all joints, or ask for the others alone with --joints {others}'
+        )
+        reasons.append(_Reason('poor', _sentence(text)))
+    if np.any(fitted & ~checked):
+        names = ', '.join(joints[fitted & ~checked])
+        text = f'not checked, as they do not move in what was held out: {names}'
+        reasons.append(_Reason('good', _sentence(text)))
+    return reasons
 
 
 def _time_bases(recordings: Sequence[Recording], result: Identification) -> Iterator[_Reason]:

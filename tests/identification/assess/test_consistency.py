@@ -1,5 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.assess.consistency import check_noise
@@ -36,6 +38,24 @@ def test_encoder_noise_that_matters_is_found_and_sized(arm, structure, motion):
     np.testing.assert_allclose(check.position_noise, 3e-4, rtol=0.1)
     assert np.abs(check.relative_bias).max() > 1.0
     assert 'a sign that encoder noise' in check.sentences()[0]
+
+
+@pytest.mark.parametrize(
+    ('p_value', 'bias', 'said', 'fine'),
+    [
+        (0.5, 0.01, 'no sign that encoder noise', (True, True)),
+        (1e-9, 2.0, 'a sign that encoder noise', (False, False)),
+        (1e-9, 0.01, 'an effect that the model lacks is the likelier cause', (False, True)),
+    ],
+)
+def test_a_test_that_fires_is_not_fine_and_its_likelier_cause_is_said(
+    arm, structure, motion, p_value, bias, said, fine
+):
+    _, check = checked(arm, structure, motion, 0.05, 0.0)
+    check = replace(check, p_value=p_value, bias=bias * check.std)
+    findings = check.findings()
+    assert said in findings[0][0]
+    assert tuple(right for _, right in findings) == fine
 
 
 def test_simulated_bias_is_the_error_of_a_fit_without_torque_noise(arm, structure, motion):
