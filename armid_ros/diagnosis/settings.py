@@ -44,9 +44,9 @@ class Thresholds:
         Share of a misfit, root mean square, that is a function of position and velocity: 0.4 to
         0.8 in half of the joints of 14 arms.
     unlikely : float
-        Probability of as large a change where nothing has changed, up to which a candidate has: of
-        1100 candidates of 38 arms to which nothing happened 0.6 % have that, and none of the few
-        that would matter has four times that.
+        Probability of as large a change where nothing has changed, over all candidates that are
+        looked at, up to which one has: of 1100 candidates of 38 arms to which nothing happened two
+        have a third of that, and none that would matter.
     usual : float
         Degrees of freedom that what other candidates differ by from recording to recording counts
         for: variances of candidates of one arm scatter as if they had 4, the median of 38 arms.
@@ -103,7 +103,7 @@ class Thresholds:
     far: float = 0.25
     misfit_share: float = 1.0
     of_state: float = 0.6
-    unlikely: float = 0.001
+    unlikely: float = 0.01
     usual: float = 4.0
     headline: float = 0.1
     same_fit: float = 1.5

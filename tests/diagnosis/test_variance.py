@@ -114,12 +114,11 @@ def test_what_is_usual_is_what_nothing_was_wrong_with():
     assert UsualSpread.of([today], 4.0).variance == pytest.approx(4.0 * before.variance)
 
 
-def test_a_value_changes_by_so_many_deviations_as_seldom_as_is_said():
-    """A change of that size is as unlikely as the level of the test."""
-    for freedom in (0, 2, 5):
-        square = WHOLE.deviations(1e-3, freedom) ** 2
-        found = Variance(square, (freedom * WHOLE.variance, 0.0), 1.0, (freedom, 0))
-        assert WHOLE.chance(found) == pytest.approx(1e-3)
+@pytest.mark.parametrize('freedom', [0, 2, 5])
+def test_a_change_of_the_largest_size_is_as_unlikely_as_that(freedom):
+    square = WHOLE.largest(1e-3, freedom) * WHOLE.variance
+    found = Variance(square, (freedom * WHOLE.variance, 0.0), 1.0, (freedom, 0))
+    assert WHOLE.chance(found) == pytest.approx(1e-3)
 
 
 def test_values_that_no_motion_shows_hide_no_change():

@@ -92,17 +92,15 @@ def without_echo(trial: Trial, here: Round) -> Trial:
 
 def changed(trial: Trial, here: Round) -> bool:
     """Return whether a candidate has changed since the baseline; true where nothing tells."""
-    if here.tested is None:
-        return True
-    chance = here.tested.chances.get(trial.candidate.key, 1.0)
-    return chance <= here.settings.thresholds.unlikely
+    return here.tested is None or trial.candidate.key in here.tested.changed
 
 
 def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
     """
     Test whether candidates have changed between the days; None where nothing tells.
 
-    Nothing does without a baseline, or of one recording a day.
+    Nothing does without a baseline, or of one recording a day. Probabilities are corrected for the
+    candidates that are tested.
 
     """
     if here.before is None:
@@ -118,11 +116,11 @@ def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
     usual = UsualSpread.of(seen.values(), thresholds.usual)
     if usual is None:
         return None
-    most = max(sum(one.freedom) for one in seen.values())
-    ratio = np.count_nonzero(both.today) / np.count_nonzero(~both.today)
+    level = thresholds.unlikely / len(seen)
+    most = usual.largest(level, max(sum(one.freedom) for one in seen.values()))
     return Tested(
-        {key: usual.chance(one) for key, one in seen.items()},
-        usual.deviations(thresholds.unlikely, most) * float(np.sqrt(1.0 + ratio)),
+        frozenset(key for key, one in seen.items() if usual.chance(one) <= level),
+        float(np.sqrt(usual.variance * most / both.before)),
     )
 
 

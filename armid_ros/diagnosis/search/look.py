@@ -143,7 +143,7 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     refined, here = _with_refined_shapes(ranking, here)
     here = replace(here, tested=tested(refined[:_LOOKED_AT], here))
     survey = _survey(candidates, ranking, here)
-    ranking, there, closing = _examined(refined, here)
+    ranking, there, closing, here = _examined(refined, here)
     survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
     passing = tuple(_passing(ranking, closing, here))
     return Look(survey, passing, closing, tuple(ranking), here)
@@ -227,12 +227,18 @@ def _misfit_share(here: Round) -> float:
     return here.settings.thresholds.misfit_share if here.tested is None else 0.0
 
 
+def _beyond(here: Round) -> float:
+    """Return the power over that of the misfit that a misfit of no motion has."""
+    return here.settings.thresholds.predicted * here.settings.thresholds.same_fit
+
+
 def _least_sizes(trial: Trial, here: Round) -> FloatArray:
     """Return the sizes of values, (p,), from which on they are material, and have changed."""
     least = material_sizes(trial, here, _misfit_share(here))
     if here.tested is None:
         return least
-    return np.maximum(least, here.tested.deviations * trial.std)
+    beyond = material_sizes(trial, here, _beyond(here))
+    return np.maximum(least, np.minimum(here.tested.deviations * trial.std, beyond))
 
 
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
@@ -280,13 +286,14 @@ def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial]
 
 def _examined(
     ranking: Sequence[Trial], here: Round
-) -> tuple[list[Trial], list[Trial], dict[Key, bool]]:
+) -> tuple[list[Trial], list[Trial], dict[Key, bool], Round]:
     """
-    Return the ranking, the significant trials, and whether each that matters leaves no gap.
+    Return the ranking, what is there, whether each that matters leaves no gap, and the round.
 
     With a baseline it is the change that has to be significant and to matter: the values that a
     candidate had then are nuisance parameters. Candidates are compared jointly with such values of
-    all of them, since each may have been there before whichever of them changed.
+    all of them, since each may have been there before whichever of them changed. One that is
+    larger than any motion makes a misfit has changed, however few recordings tell.
 
     """
     assert here.total is not None
@@ -301,10 +308,13 @@ def _examined(
         (change,) = _changes([trial], here)
         if change is None or not acceptable(change, here):
             continue
-        if changed(trial, here):
-            there.append(change)
         takes = trial.joint_gains(*here.rows_of(trial.candidate))
         size = _size(change, takes, here)
+        if here.tested is not None and material(size, here, _beyond(here)):
+            both = here.tested.changed | {trial.candidate.key}
+            here = replace(here, tested=replace(here.tested, changed=both))
+        if changed(trial, here):
+            there.append(change)
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
         if matters and material(size, here, _misfit_share(here)):
             large.append((trial, change))
@@ -315,7 +325,7 @@ def _examined(
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     there.sort(key=lambda t: -worth(t, here))
-    return result, there, closing
+    return result, there, closing, here
 
 
 def _open_squares(here: Round) -> FloatArray:

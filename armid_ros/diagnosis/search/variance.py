@@ -17,7 +17,7 @@ Recordings are what is independent: all values of a candidate follow the same mi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from armid_ros.diagnosis.search.trial import Key
@@ -95,6 +95,12 @@ class Recordings:
         pairs = zip(free, residual, strict=True)
         rest = tuple(y - x @ theta[: x.shape[1]] for x, y in pairs)
         return cls(tuple(free), rest, np.array(today), basis)
+
+    @property
+    def before(self) -> float:
+        """Share of the entries that are of the first day."""
+        count = np.array([np.count_nonzero(rest) for rest in self.rest])
+        return float(count[~self.today].sum() / count.sum())
 
     def variance(
         self, own: Sequence[FloatArray], precision: FloatArray, values: float, faint: float
@@ -191,10 +197,9 @@ class UsualSpread:
         expected = (self.freedom * self.variance + sum(found.within)) / freedom
         return float(stats.f.sf(found.between / expected, found.values, freedom))
 
-    def deviations(self, chance: float, freedom: int) -> float:
-        """Return what a value may change by with some probability, over its deviation."""
-        most = stats.f.isf(chance, 1, self.freedom + freedom)
-        return float(np.sqrt(self.variance * most))
+    def largest(self, chance: float, freedom: int) -> float:
+        """Return the squares of a change of a value that are so unlikely, over the variance."""
+        return float(stats.f.isf(chance, 1, self.freedom + freedom))
 
 
 def _log_chi_square(freedom: float) -> float:
@@ -205,17 +210,17 @@ def _log_chi_square(freedom: float) -> float:
 @dataclass(frozen=True)
 class Tested:
     """
-    Test of the changes of candidates.
+    What a test of the changes of candidates says.
 
     Attributes
     ----------
-    chances : mapping of Key to float
-        Probability of as large a change where nothing has changed.
+    changed : frozenset of Key
+        Candidates that have changed.
     deviations : float
         Deviations for white noise by which a value has to differ from its baseline to have
         changed.
 
     """
 
-    chances: Mapping[Key, float]
+    changed: frozenset[Key]
     deviations: float
