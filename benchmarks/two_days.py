@@ -178,7 +178,7 @@ def true_share(gap: Gap, t: FloatArray, contribution: FloatArray) -> float:
         left = one.measured - one.before
         there += float(np.sum((left * weight) ** 2))
         rest += float(np.sum(((left - part.reduce(torque)) * weight) ** 2))
-    return 1.0 - rest / there
+    return 1.0 - rest / there if there > 0.0 else float('nan')
 
 
 def answer_of(document: dict[str, Any], seconds: float) -> Answer:

@@ -106,7 +106,7 @@ class Recordings:
         self, own: Sequence[FloatArray], precision: FloatArray, values: float, faint: float
     ) -> Variance | None:
         """
-        Return the analysis of variance of a candidate; None if one of the days hardly shows it.
+        Return the analysis of variance of a candidate; None if a day hardly shows any of it.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class Recordings:
         shares = np.diagonal(square, axis1=1, axis2=2) / np.maximum(whole, 1e-300)
         shows = shares.max(axis=1) > faint
         days = [shows & ~self.today, shows & self.today]
-        if not all(day.any() for day in days):
+        if values <= 0.0 or not all(day.any() for day in days):
             return None
 
         def explained(groups: Iterable[npt.NDArray[np.bool_]]) -> float:
