@@ -45,8 +45,8 @@ class Thresholds:
         0.8 in half of the joints of 14 arms.
     unlikely : float
         Probability of as large a change where nothing has changed, over all candidates that are
-        looked at, up to which one has: of 1100 candidates of 38 arms to which nothing happened two
-        have a third of that, and none that would matter.
+        looked at, up to which one has: of 1113 candidates of 38 arms to which nothing happened
+        none has that, and none of those that would matter has ten times that.
     usual : float
         Degrees of freedom that what other candidates differ by from recording to recording counts
         for: variances of candidates of one arm scatter as if they had 4, the median of 38 arms.
@@ -119,6 +119,11 @@ class Thresholds:
     one_period_on_average: float = 3.5
     few_causes: int = 4
     many_causes: int = 16
+
+    @property
+    def other_motion(self) -> float:
+        """Factor by which the squares of a misfit may be larger in a motion that was not used."""
+        return self.predicted * self.same_fit
 
 
 @dataclass(frozen=True)

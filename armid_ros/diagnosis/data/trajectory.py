@@ -18,7 +18,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import rigid_rows
 from armid_ros.effects import Effect
 from armid_ros.identification.assess.data_faults import Stretch
-from armid_ros.identification.rows.checks import check_stamps, REST_RANGE
+from armid_ros.identification.rows.checks import check_stamps, moving
 from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.signals import (
     Conditioning,
@@ -316,8 +316,8 @@ def at_rest(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...
     """Return the joints that are at rest throughout; none without data."""
     if not data:
         return ()
-    moves = np.max([np.ptp(part.motion.q, axis=0) for part in data], axis=0) >= REST_RANGE
-    return tuple(joint for joint, moved in zip(joints, moves.tolist(), strict=True) if not moved)
+    moves = moving(part.motion for part in data).tolist()
+    return tuple(joint for joint, moved in zip(joints, moves, strict=True) if not moved)
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

@@ -105,10 +105,14 @@ def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
     """
     if here.before is None:
         return None
-    thresholds, both = here.settings.thresholds, _recordings(here)
+    thresholds, today = here.settings.thresholds, _today(here)
+    both = _recordings(here, today)
     found = {
         trial.candidate.key: both.variance(
-            _own(trial, here), trial.candidate.precision, trial.freedom, thresholds.tie
+            _own(trial, here, both, today),
+            trial.candidate.precision,
+            trial.freedom,
+            thresholds.tie,
         )
         for trial in trials
     }
@@ -124,12 +128,12 @@ def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
     )
 
 
-def _recordings(here: Round) -> Recordings:
+def _recordings(here: Round, parts: Sequence[npt.NDArray[np.bool_]]) -> Recordings:
     """Return the recordings of the baseline, those in question, and those nothing is fitted to."""
     assert here.before is not None
     later, rank = here.before.later, len(here.nuisance.free)
     before = list(here.before.prior.recordings(here.before.change))
-    days = [(here.free[rows], here.problem.y[rows]) for rows in _today(here)]
+    days = [(here.free[rows], here.problem.y[rows]) for rows in parts]
     today = [(free.reshape(-1, rank), y.ravel()) for free, y in days]
     if later is not None:
         today += zip(later.free, later.residual, strict=True)
@@ -138,15 +142,17 @@ def _recordings(here: Round) -> Recordings:
     return Recordings.of(free, residual, [False] * len(before) + [True] * len(today), known)
 
 
-def _own(trial: Trial, here: Round) -> list[FloatArray]:
+def _own(
+    trial: Trial, here: Round, both: Recordings, parts: Sequence[npt.NDArray[np.bool_]]
+) -> list[FloatArray]:
     """Return the columns of a candidate in these recordings, each (S, p)."""
     assert here.before is not None
     baseline, arm, candidate = here.before.baseline, here.work.arm, trial.candidate
     before = baseline.columns(arm, candidate.effect, candidate.kept)
-    sizes = [len(rest) for _, rest in here.before.prior.recordings(here.before.change)]
+    sizes = [len(rest) for rest, late in zip(both.rest, both.today, strict=True) if not late]
     own = here.own(candidate)
     result = np.split(before, np.cumsum(sizes)[:-1])
-    result += [own[rows].reshape(-1, candidate.size) for rows in _today(here)]
+    result += [own[rows].reshape(-1, candidate.size) for rows in parts]
     if here.before.later is not None:
         result += here.before.later.own(arm, candidate)
     return result

@@ -217,8 +217,8 @@ class Explainer:
         """Say that the model leaves much more of a baseline than when it was identified."""
         if self.known is None:
             return ''
-        thresholds, joints = self.settings.thresholds, self.arm.robot.joints
-        usual = thresholds.predicted * thresholds.same_fit * np.maximum(baseline.varies, 1.0)
+        joints = self.arm.robot.joints
+        usual = self.settings.thresholds.other_motion * np.maximum(baseline.varies, 1.0)
         times = baseline.misfit / np.maximum(self.known, 1e-300)
         worst = int(np.argmax(times / np.sqrt(usual)))
         if times[worst] ** 2 <= usual[worst]:

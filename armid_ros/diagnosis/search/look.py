@@ -227,17 +227,12 @@ def _misfit_share(here: Round) -> float:
     return here.settings.thresholds.misfit_share if here.tested is None else 0.0
 
 
-def _beyond(here: Round) -> float:
-    """Return the power over that of the misfit that a misfit of no motion has."""
-    return here.settings.thresholds.predicted * here.settings.thresholds.same_fit
-
-
 def _least_sizes(trial: Trial, here: Round) -> FloatArray:
     """Return the sizes of values, (p,), from which on they are material, and have changed."""
     least = material_sizes(trial, here, _misfit_share(here))
     if here.tested is None:
         return least
-    beyond = material_sizes(trial, here, _beyond(here))
+    beyond = material_sizes(trial, here, here.settings.thresholds.other_motion)
     return np.maximum(least, np.minimum(here.tested.deviations * trial.std, beyond))
 
 
@@ -310,7 +305,7 @@ def _examined(
             continue
         takes = trial.joint_gains(*here.rows_of(trial.candidate))
         size = _size(change, takes, here)
-        if here.tested is not None and material(size, here, _beyond(here)):
+        if here.tested is not None and material(size, here, here.settings.thresholds.other_motion):
             both = here.tested.changed | {trial.candidate.key}
             here = replace(here, tested=replace(here.tested, changed=both))
         if changed(trial, here):

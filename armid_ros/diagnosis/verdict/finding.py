@@ -96,6 +96,11 @@ class Finding:
     added_to: tuple[float, ...] = ()
 
     @property
+    def had(self) -> tuple[float, ...]:
+        """What each value is added to; zero where none is known."""
+        return self.added_to or (0.0,) * len(self.values)
+
+    @property
     def ambiguous_with(self) -> tuple[str, ...]:
         """Names that the data do not exclude in its place."""
         return tuple(rival.name for rival in self.rivals)

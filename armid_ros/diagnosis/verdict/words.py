@@ -255,8 +255,7 @@ def _values(finding: Finding) -> Iterator[str]:
 
     """
     before = ''
-    added_to = finding.added_to or (0.0,) * len(finding.values)
-    every = list(zip(finding.parameters, finding.values, finding.std, added_to, strict=True))
+    every = list(zip(finding.parameters, finding.values, finding.std, finding.had, strict=True))
     not_zero = [row for row in every if excludes_zero(row[1], row[2])]
     for p, value, std, had in not_zero or every:
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '

@@ -18,12 +18,13 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.joint_errors import beyond_noise, moving
+from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -214,7 +215,7 @@ class _Worst(NamedTuple):
     def of(cls, errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
         """Choose it among errors of joints as shares of their torque, shape (n,) [%]."""
         joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
-        moves = moving(fits)
+        moves = moving(fit.motion for fit in fits)
         largest = worst = int(np.argmax(np.where(moves, errors, -1.0)))
         error = float(beyond.max())
         if by_error(error) != by_error(errors[largest]):  # most of the largest error is noise
@@ -264,8 +265,8 @@ def _elsewhere(
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[_Reason]:
     """Say which joints nothing is known of, or are not checked, because they do not move."""
-    fitted = moving(result.training)
-    held_out = [fit for part in validation.values() for fit in part]
+    fitted = moving(fit.motion for fit in result.training)
+    held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted
     joints = np.array(result.arm.robot.joints)
     reasons = []

@@ -14,11 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.identification.identify import Fit
-from armid_ros.identification.rows.checks import REST_RANGE
+from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
 
@@ -51,13 +50,7 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
     size = np.sqrt(np.sum(torque**2, axis=0) / rows)
     noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
     left = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * noise), 0.0))
-    return np.where(moving(fits), left, 0.0)
-
-
-def moving(fits: Sequence[Fit]) -> npt.NDArray[np.bool_]:
-    """Tell which joints move in any of the motions, shape (n,)."""
-    ranges = np.max([np.ptp(fit.motion.q, axis=0) for fit in fits], axis=0)
-    return np.asarray(ranges >= REST_RANGE)
+    return np.where(moving(fit.motion for fit in fits), left, 0.0)
 
 
 def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:

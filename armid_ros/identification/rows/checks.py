@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -17,6 +17,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 
 #: A joint that stays within this range is at rest [rad or m].
 REST_RANGE = 1e-3
@@ -95,6 +96,12 @@ def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
         uneven = uneven_stamps(recording, used.cutoff_hz, used.kept_hz)
         if uneven:
             raise IdentificationError(uneven)
+
+
+def moving(motions: Iterable[Motion]) -> npt.NDArray[np.bool_]:
+    """Tell which joints move in any of some motions, shape (n,)."""
+    ranges = np.max([np.ptp(motion.q, axis=0) for motion in motions], axis=0)
+    return np.asarray(ranges >= REST_RANGE)
 
 
 def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:

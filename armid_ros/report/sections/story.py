@@ -189,6 +189,5 @@ def _taken(one: JointResidual) -> str:
 
 
 def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
-    had = finding.added_to or (0.0,) * len(finding.values)
-    rows = list(zip(finding.parameters, finding.values, finding.std, had, strict=True))
+    rows = list(zip(finding.parameters, finding.values, finding.std, finding.had, strict=True))
     return rows[:_VALUES]
