@@ -5,8 +5,9 @@
 from dataclasses import fields
 
 from armid_ros.diagnosis.data import trajectory
-from armid_ros.diagnosis.search import acceptance, look, trial
+from armid_ros.diagnosis.search import look, trial
 from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.verdict import document
 from armid_ros.identification.rows import stamps
 import numpy as np
 import pytest
@@ -57,9 +58,9 @@ def test_one_number_is_changed_and_no_other(name, factor):
 def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again():
     usual = trial.ROUNDING
     with changed(['search/trial.py ROUNDING', 'price', 'search/look.py _COMPARED'], 0.7):
-        assert trial.ROUNDING == acceptance.ROUNDING == pytest.approx(0.7 * usual)
+        assert trial.ROUNDING == document.ROUNDING == pytest.approx(0.7 * usual)
         assert look._COMPARED == round(0.7 * 8)
-    assert trial.ROUNDING == acceptance.ROUNDING == usual
+    assert trial.ROUNDING == document.ROUNDING == usual
     assert look._COMPARED == 8
 
 
