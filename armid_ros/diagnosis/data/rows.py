@@ -67,6 +67,11 @@ class Problem:
         return replace(self, x=np.concatenate([self.x, more], axis=2))
 
 
+def each_times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Multiply each of some matrices (K, m, n) with its vector (K, n)."""
+    return np.asarray((matrices @ vectors[:, :, np.newaxis])[:, :, 0])
+
+
 def make_problem(
     data: Sequence[Trajectory],
     sigma: Sequence[FloatArray],

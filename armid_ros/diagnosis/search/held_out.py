@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import (
+    each_times,
     make_problem,
     Problem,
     Products,
@@ -101,15 +102,10 @@ class _Fits:
             theta,
             border,
             solved,
-            known.aim - _times(known.free, others),
-            known.target - _times(known.border.transpose(0, 2, 1), others),
+            known.aim - each_times(known.free, others),
+            known.target - each_times(known.border.transpose(0, 2, 1), others),
             2.0 * known.border - known.free @ solved[part],
         )
-
-
-def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Multiply each of some matrices (K, m, n) with its vector (K, n)."""
-    return np.asarray((matrices @ vectors[:, :, np.newaxis])[:, :, 0])
 
 
 def held_out(
@@ -188,7 +184,7 @@ def _tried(
     visible = float(np.sqrt(max(np.trace(rest[-1]), 0.0) / size)) if size > _NOTHING else 0.0
     if visible**2 < UNINFORMATIVE:
         return None
-    aim = fits.train @ known.target[:, span] - _times(border.transpose(0, 2, 1), fits.theta)
+    aim = fits.train @ known.target[:, span] - each_times(border.transpose(0, 2, 1), fits.theta)
     inverse, values = _held(rest, aim, whole, candidate)
     resolved = np.diag(inverse[-1] @ rest[-1]) > IDENTIFIABLE
     std = np.sqrt(np.diag(inverse[-1]).clip(0.0))
@@ -196,11 +192,11 @@ def _tried(
     if np.any(narrower.precision != candidate.precision):
         candidate = narrower
         inverse, values = _held(rest, aim, whole, candidate)
-    change = -_times(solved, values)
+    change = -each_times(solved, values)
     v, moved = values[part], change[part]
     cross = np.sum(fits.target[:, span] * v, axis=1) + np.sum(fits.left * moved, axis=1)
-    square = np.sum(_times(own, v) * v, axis=1)
-    square += np.sum(_times(fits.made[:, :, span], v) * moved, axis=1)
+    square = np.sum(each_times(own, v) * v, axis=1)
+    square += np.sum(each_times(fits.made[:, :, span], v) * moved, axis=1)
     held, alone = change[:-1], fits.theta[:-1]
     share = 1.0 / (len(held) * np.maximum(np.bincount(part), 1))
     cross += (share * np.sum(held * (counted.vector - alone @ counted.matrix), axis=1))[part]
@@ -227,7 +223,7 @@ def _held(
 ) -> tuple[FloatArray, FloatArray]:
     """Return inverses (K, p, p) and values (K, p) under the prior of a candidate."""
     inverse = independent_inverse(rest + np.diag(candidate.precision), np.diag(whole))
-    return inverse, _times(inverse, aim)
+    return inverse, each_times(inverse, aim)
 
 
 def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: float) -> Fitted:

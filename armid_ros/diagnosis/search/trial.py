@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
+from armid_ros.diagnosis.data.rows import each_times
 from armid_ros.effects import Effect
 from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.motion import FloatArray
@@ -223,12 +224,8 @@ class Trial:
 
         """
         fold = self.fold[block]
-        alone, rest = np.empty_like(y), np.empty_like(y)
-        for part in range(len(self.fold_values)):
-            rows = fold == part
-            alone[rows] = y[rows] - free[rows] @ self.fold_alone[part]
-            predicted = own[rows] @ self.fold_values[part] + free[rows] @ self.fold_free[part]
-            rest[rows] = y[rows] - predicted
+        alone = y - each_times(free, self.fold_alone[fold])
+        rest = y - each_times(own, self.fold_values[fold]) - each_times(free, self.fold_free[fold])
         return alone, rest
 
     def joint_gains(

@@ -99,14 +99,13 @@ def described_error(motion: Motion, fixed: FloatArray, columns: FloatArray) -> P
     scale, weight = _scale(motion.tau), _weight(motion)
     rest = (motion.tau - fixed) / scale * weight
     shared = columns * (weight / scale)[:, :, np.newaxis]
-    joints = range(motion.n_joints)
-    own = [_own_columns(motion, joint) * weight[:, joint, np.newaxis] for joint in joints]
+    own = np.stack([_own_columns(motion, joint) for joint in range(motion.n_joints)])
+    own *= weight.T[:, :, np.newaxis]
     left = np.empty_like(rest)
     for fitted in _folds(len(motion)):
         values = _shared_values(own, rest, shared, fitted)
         error = rest - shared @ values
-        for joint, mine in enumerate(own):
-            left[~fitted, joint] = _left(mine, error[:, joint], fitted)
+        left[~fitted] = _left(own[:, :, np.newaxis], error.T[:, :, np.newaxis], fitted)[:, :, 0].T
     everything = np.ones(len(motion), dtype=bool)
     return _error(left, scale, _shared_values(own, rest, shared, everything))
 
@@ -148,7 +147,7 @@ def left_of_blocks(columns: FloatArray, rest: FloatArray) -> FloatArray:
     """
     left = np.empty_like(rest)
     for fitted in _folds(len(rest)):
-        left[~fitted] = _left(columns, rest, fitted)
+        left[~fitted] = _left(columns[np.newaxis], rest[np.newaxis], fitted)[0]
     return left
 
 
@@ -159,29 +158,39 @@ def _left(columns: FloatArray, rest: FloatArray, fitted: npt.NDArray[np.bool_]) 
     A row whose prediction is less sure than a measurement of it (leverage above one, Hoaglin and
     Welsch 1978) stays as described: a joint that is jogged alone may rest in all that was fitted.
 
+    Parameters
+    ----------
+    columns : ndarray, shape (P, N, m, k)
+        Of P problems.
+    rest : ndarray, shape (P, N, m)
+        What is fitted.
+    fitted : ndarray of bool, shape (N,)
+        Rows that are.
+
     """
-    size = columns.shape[-1]
-    own, others = columns[fitted].reshape(-1, size), columns[~fitted]
-    normal = own.T @ own + LIMITS.floor**2 * np.eye(size)
-    values = np.linalg.solve(normal, own.T @ rest[fitted].ravel())
-    spread = np.linalg.solve(normal, others.reshape(-1, size).T).T.reshape(others.shape)
+    count, _, _, size = columns.shape
+    own, others = (columns[:, rows].reshape(count, -1, size) for rows in (fitted, ~fitted))
+    turned = own.transpose(0, 2, 1)
+    normal = turned @ own + LIMITS.floor**2 * np.eye(size)
+    values = np.linalg.solve(normal, turned @ rest[:, fitted].reshape(count, -1, 1))
+    spread = np.linalg.solve(normal, others.transpose(0, 2, 1)).transpose(0, 2, 1)
     told = np.sum(others * spread, axis=-1) <= 1.0
-    return np.asarray(rest[~fitted] - np.where(told, others @ values, 0.0))
+    predicted = np.where(told, (others @ values)[:, :, 0], 0.0)
+    wanted = rest[:, ~fitted]
+    return np.asarray(wanted - predicted.reshape(wanted.shape))
 
 
 def _shared_values(
-    own: list[FloatArray], rest: FloatArray, shared: FloatArray, fitted: npt.NDArray[np.bool_]
+    own: FloatArray, rest: FloatArray, shared: FloatArray, fitted: npt.NDArray[np.bool_]
 ) -> FloatArray:
     """Fit what joints share, with what each has of its own taken out (Frisch and Waugh 1933)."""
     if shared.shape[2] == 0:
         return np.empty(0)
-    parts = []
-    for joint, mine in enumerate(own):
-        both = np.column_stack([shared[fitted, joint], rest[fitted, joint]])
-        basis = np.linalg.svd(mine[fitted], full_matrices=False)
-        kept = basis[0][:, basis[1] > 1e-9 * basis[1][0]]
-        parts.append(both - kept @ (kept.T @ both))
-    stacked = np.concatenate(parts)
+    both = np.concatenate([shared[fitted], rest[fitted, :, np.newaxis]], axis=2)
+    both = both.transpose(1, 0, 2)
+    basis, size, _ = np.linalg.svd(own[:, fitted], full_matrices=False)
+    basis = basis * (size > 1e-9 * size[:, :1])[:, np.newaxis]
+    stacked = (both - basis @ (basis.transpose(0, 2, 1) @ both)).reshape(-1, both.shape[2])
     return np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray
 import numpy as np
+import scipy.linalg
 
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
@@ -96,9 +97,30 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
 
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
-    values, vectors = np.linalg.eigh(products * np.outer(scale, scale))
+    scaled = products * np.outer(scale, scale)
+    whole = _inverse_factor(scaled, tolerance)
+    if whole is not None:
+        return np.asarray(scale[:, np.newaxis] * whole)
+    values, vectors = np.linalg.eigh(scaled)
     good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
+
+
+def _inverse_factor(products: FloatArray, tolerance: float) -> FloatArray | None:
+    """
+    Return B of the inverse B B' where every direction is told; None where one may not be.
+
+    The smallest eigenvalue is at least one over the trace of the inverse, and the largest is at
+    most the trace of the products.
+
+    """
+    lower, failed = scipy.linalg.lapack.dpotrf(products, lower=True)
+    if failed or not len(products):
+        return None
+    inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
+    if np.sum(inverse**2) * np.trace(products) * tolerance > 1.0:
+        return None
+    return np.asarray(inverse.T)
 
 
 def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray:

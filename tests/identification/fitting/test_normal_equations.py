@@ -34,6 +34,16 @@ def test_a_direction_that_is_not_told_stays_where_it_is():
     assert basis.shape == (4, 2)
 
 
+@pytest.mark.parametrize(('apart', 'told'), [(1e-3, 2), (1e-6, 1)])
+def test_a_direction_is_told_by_columns_that_differ_in_more_than_rounding(apart, told):
+    first, second = np.linalg.qr(np.random.default_rng(2).normal(size=(50, 2)))[0].T
+    columns = np.column_stack([first, first + apart * second])
+    basis = informative_basis(columns.T @ columns, 1e-10)
+    assert basis.shape == (2, told)
+    fitted = columns @ (basis @ (basis.T @ (columns.T @ (first + second))))
+    np.testing.assert_allclose(fitted, first + (told - 1) * second, atol=1e-5)
+
+
 def test_products_of_independent_columns_are_inverted():
     columns = np.random.default_rng(3).normal(size=(50, 3)) * [1.0, 1e3, 1e-3]
     products = columns.T @ columns
