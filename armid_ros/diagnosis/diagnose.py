@@ -295,15 +295,22 @@ def _where(
     """
     Locate the gap in the data that it is measured on.
 
-    If something is named and no loss is over its limit there, any excess in fitted data counts.
+    Where something is named it is what the names take: a model may leave more of other joints, on
+    either day. Data that hardly show the names are no measure of that.
 
     """
-    places = _located(explanation, explanation.reference.arm, shown, settings)
-    if places or not explanation.steps:
-        return places
-    least = np.ones(explanation.given.robot.n_joints)
-    residual = explanation.reference.residual
-    return locate(explanation.given, explanation.evidence, residual, least)
+    if not explanation.steps:
+        return _located(explanation, explanation.reference.arm, shown, settings)
+    for data in (shown, explanation.evidence):
+        before, after = (
+            data.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
+        )
+        taken = data.chi2_per_row(before) - data.chi2_per_row(after)
+        least = settings.thresholds.tie * max(float(taken.sum()), 0.0)
+        places = locate(explanation.given, data, before, np.where(taken > least, taken, 0.0))
+        if places:
+            return places
+    return ()
 
 
 def _located(
@@ -311,7 +318,9 @@ def _located(
 ) -> tuple[Where, ...]:
     """Locate what an arm leaves of some data beyond the limits of the patched model."""
     patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
-    return locate(explanation.given, shown, left, shown.limits(patched, settings))
+    losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
+    beyond = np.where(losses > limits, losses - 1.0, 0.0)
+    return locate(explanation.given, shown, left, beyond)
 
 
 def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence) -> Evidence:

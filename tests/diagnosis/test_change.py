@@ -41,9 +41,27 @@ def test_a_change_beside_it_is(bench):
 
     before = bench.recordings(hose, seed=1)
     after, new = (bench.recordings(with_drag, seed=seed) for seed in (2, 3))
-    (first, *others) = asked(bench, before, after, new).findings
+    found = asked(bench, before, after, new)
+    (first, *others) = found.findings
     assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
     assert first.values[0] == pytest.approx(1.2, abs=4.0 * first.std[0])
+
+
+def test_the_gap_is_where_the_cause_is_and_not_where_a_motion_shows_more_of_the_misfit(bench):
+    """The hose is stretched more in the recordings that were not used."""
+
+    def day(stretched, drag, seed):
+        def torque(motion, tau):
+            return hose(motion, tau) * [stretched, 1.0] + np.array([0.0, drag]) * np.sign(
+                motion.dq
+            )
+
+        return bench.recordings(torque, seed=seed)
+
+    found = asked(bench, day(1.0, 0.0, 1), day(1.0, 1.2, 2), day(2.0, 1.2, 3))
+    assert [one.name for one in found.findings] == ['coulomb_friction']
+    assert [place.joint for place in found.where] == ['elbow']
+    assert 'shoulder' in [place.joint for place in found.left]
 
 
 @pytest.mark.parametrize('changed', [False, True])

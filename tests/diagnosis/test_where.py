@@ -29,7 +29,8 @@ def test_a_spring_is_in_proportion_to_position_in_the_units_of_its_joint(urdf, j
     for part, left in zip(data, residual, strict=True):
         left[:, joint] = 30.0 * part.at_rows.q[:, joint]
     noise = tuple(np.full(2, 0.1) for _ in data)
-    (found,) = locate(bench.arm, Evidence.over_noise(data, noise), residual, np.ones(2))
+    evidence = Evidence.over_noise(data, noise)
+    (found,) = locate(bench.arm, evidence, residual, evidence.chi2_per_row(residual))
     assert found.joint == bench.robot.joints[joint]
     assert found.unit == units[2]
     assert found.share_of_gap == pytest.approx(1.0)
@@ -46,6 +47,7 @@ def test_an_offset_is_a_constant_and_in_proportion_to_nothing():
     data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
     residual = [np.full_like(part.torque, [0.0, 1.2]) for part in data]
     noise = tuple(np.full(2, 0.1) for _ in data)
-    (found,) = locate(bench.arm, Evidence.over_noise(data, noise), residual, np.ones(2))
+    evidence = Evidence.over_noise(data, noise)
+    (found,) = locate(bench.arm, evidence, residual, evidence.chi2_per_row(residual))
     assert found.joint == bench.robot.joints[1]
     assert found.signature == 'in a constant (100 % of its power)'

@@ -54,7 +54,7 @@ class Where:
     joint : str
         The joint.
     share_of_gap : float
-        Its share of the excess of all joints, 0 to 1.
+        Its share of the gap of all joints, 0 to 1.
     signature : str
         In words, the quantity with which the residual varies.
     axes : tuple of Axis
@@ -90,10 +90,10 @@ class Excess:
 
 
 def locate(
-    arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], limits: FloatArray
+    arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], gap: FloatArray
 ) -> tuple[Where, ...]:
     """
-    Describe the residual of every joint that has a gap, the worst first.
+    Describe the residual of every joint that has a part of the gap, the largest first.
 
     Parameters
     ----------
@@ -103,20 +103,18 @@ def locate(
         Motion, and the unit of the gap.
     residual : sequence of ndarray, shape (M, n)
         Residual of each trajectory [N m or N].
-    limits : ndarray, shape (n,)
-        Loss of each joint up to which it has no gap.
+    gap : ndarray, shape (n,)
+        Loss of each joint that is to be explained; zero where there is none.
 
     """
-    losses = evidence.chi2_per_row(residual)
-    beyond = np.where(losses > limits, losses - 1.0, 0.0)
     data = evidence.data
-    total = max(float(beyond.sum()), 1e-300)
+    total = max(float(gap.sum()), 1e-300)
     rows = [_quantities(arm, part) for part in data]
     informative = np.concatenate([part.informative for part in data])
     stacked = np.concatenate(residual)
     result = []
-    for joint in np.argsort(-beyond):
-        if beyond[joint] <= 0.0:
+    for joint in np.argsort(-gap):
+        if gap[joint] <= 0.0:
             break
         use = informative[:, joint]
         axes = []
@@ -132,7 +130,7 @@ def locate(
             axes.append(_axis(name, units.get(name, torque), values[use], stacked[use, joint]))
         axes.sort(key=lambda axis: -axis.share)
         name = arm.robot.joints[joint]
-        share = float(beyond[joint] / total)
+        share = float(gap[joint] / total)
         result.append(Where(name, share, _in_words(axes), tuple(axes), torque))
     return tuple(result)
 
