@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.round import Later
 from armid_ros.diagnosis.search.trial import Candidate
-from armid_ros.diagnosis.search.variance import Recordings, UsualSpread, Variance
+from armid_ros.diagnosis.search.variance import Changed, Recordings, UsualSpread, Variance
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.fitting.normal_equations import NormalEquations
@@ -164,6 +164,17 @@ def test_one_recording_a_day_says_nothing_of_what_is_usual_but_is_tested_by_it()
     assert (found.within, found.freedom) == ((0.0, 0.0), (0, 0))
     assert UsualSpread.of([found], 4.0) is None
     assert WHOLE.chance(found) == pytest.approx(stats.f.sf(found.between / 12.0, 1, 4))
+
+
+def test_what_has_changed_is_asked_of_all_together_and_which_it_is_of_each():
+    tilt, slack = ('base_tilt', (), (0,)), ('interface_slack', ('elbow',), (0,))
+    spring = ('joint_spring', ('wrist',), (0,))
+    singly = frozenset({tilt, slack})
+    nothing = Changed(frozenset(), singly, 3.0)
+    assert not nothing.changed
+    for found in (Changed(frozenset({slack}), singly, 3.0), nothing.and_surely(slack)):
+        assert found.changed == {tilt, slack}
+    assert nothing.and_surely(spring).changed == {tilt, slack, spring}
 
 
 def with_offsets(bench, seed, offsets):

@@ -10,7 +10,7 @@ from dataclasses import replace
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import Round, worth
 from armid_ros.diagnosis.search.trial import Trial
-from armid_ros.diagnosis.search.variance import Recordings, Tested, UsualSpread
+from armid_ros.diagnosis.search.variance import Changed, Recordings, UsualSpread
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -95,7 +95,7 @@ def changed(trial: Trial, here: Round) -> bool:
     return here.tested is None or trial.candidate.key in here.tested.changed
 
 
-def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
+def tested(trials: Sequence[Trial], here: Round) -> Changed | None:
     """
     Test whether candidates have changed between the days; None where nothing tells.
 
@@ -120,10 +120,12 @@ def tested(trials: Sequence[Trial], here: Round) -> Tested | None:
     usual = UsualSpread.of(seen.values(), thresholds.usual)
     if usual is None:
         return None
+    chances = {key: usual.chance(one) for key, one in seen.items()}
     level = thresholds.unlikely / len(seen)
     most = usual.largest(level, max(sum(one.freedom) for one in seen.values()))
-    return Tested(
-        frozenset(key for key, one in seen.items() if usual.chance(one) <= level),
+    return Changed(
+        frozenset(key for key, chance in chances.items() if chance <= level),
+        frozenset(key for key, chance in chances.items() if chance <= thresholds.unlikely),
         float(np.sqrt(usual.variance * most / both.before)),
     )
 

@@ -165,6 +165,11 @@ class Chosen:
     untested: str = ''
 
     @property
+    def tested(self) -> bool:
+        """Whether names were tested for a change in all recordings, also those not used."""
+        return self.rest is not None and not self.untested
+
+    @property
     def measured(self) -> bool:
         """Whether the floor is noise or an estimated misfit, and no misfit that is known."""
         return self.floor_in_words in (NOISE, ESTIMATED)

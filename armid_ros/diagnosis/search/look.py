@@ -306,10 +306,8 @@ def _examined(
         takes = trial.joint_gains(*here.rows_of(trial.candidate))
         size = _size(change, takes, here)
         if here.tested is not None and material(size, here, here.settings.thresholds.other_motion):
-            both = here.tested.changed | {trial.candidate.key}
-            here = replace(here, tested=replace(here.tested, changed=both))
-        if changed(trial, here):
-            there.append(change)
+            here = replace(here, tested=here.tested.and_surely(trial.candidate.key))
+        there.append(change)
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
         if matters and material(size, here, _misfit_share(here)):
             large.append((trial, change))
@@ -319,8 +317,8 @@ def _examined(
     pairs = zip(compared, best, strict=True)
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
-    there.sort(key=lambda t: -worth(t, here))
-    return result, there, closing, here
+    there = [change for change in there if changed(change, here)]
+    return result, sorted(there, key=lambda t: -worth(t, here)), closing, here
 
 
 def _open_squares(here: Round) -> FloatArray:

@@ -15,7 +15,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import Problem, Products, project, Projection
 from armid_ros.diagnosis.data.trajectory import Trajectory, Workspace
 from armid_ros.diagnosis.search.trial import Candidate, Key, lead, ROUNDING, Trial
-from armid_ros.diagnosis.search.variance import Tested
+from armid_ros.diagnosis.search.variance import Changed
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.normal_equations import NormalEquations
@@ -194,7 +194,7 @@ class Round:
         Recordings from when nothing was wrong.
     known : Products or None
         Products of the nuisance columns, common to all trials of the round.
-    tested : Tested or None
+    tested : Changed or None
         Test of the changes of candidates; None where nothing tells.
 
     """
@@ -210,7 +210,7 @@ class Round:
     known: Products | None = None
     power: float = 1.0
     since: bool = False
-    tested: Tested | None = None
+    tested: Changed | None = None
 
     @property
     def currency(self) -> float:

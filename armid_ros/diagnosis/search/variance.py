@@ -18,7 +18,7 @@ Recordings are what is independent: all values of a candidate follow the same mi
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.search.trial import Key
 from armid_ros.identification.fitting.normal_equations import (
@@ -208,19 +208,34 @@ def _log_chi_square(freedom: float) -> float:
 
 
 @dataclass(frozen=True)
-class Tested:
+class Changed:
     """
     What a test of the changes of candidates says.
 
+    Whether anything has changed is one question, and which of the candidates is another: where one
+    surely has, those that are as unlikely by themselves may be it.
+
     Attributes
     ----------
-    changed : frozenset of Key
-        Candidates that have changed.
+    surely : frozenset of Key
+        Candidates that have changed, whatever number of them was tested.
+    singly : frozenset of Key
+        Candidates that would have changed if no other had been tested.
     deviations : float
         Deviations for white noise by which a value has to differ from its baseline to have
         changed.
 
     """
 
-    changed: frozenset[Key]
+    surely: frozenset[Key]
+    singly: frozenset[Key]
     deviations: float
+
+    @property
+    def changed(self) -> frozenset[Key]:
+        """Candidates that have changed."""
+        return self.surely | self.singly if self.surely else frozenset()
+
+    def and_surely(self, key: Key) -> Changed:
+        """Return the same, a candidate having changed for another reason."""
+        return replace(self, surely=self.surely | {key})

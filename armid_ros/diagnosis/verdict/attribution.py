@@ -208,7 +208,8 @@ class Names:
         """
         thresholds = settings.thresholds
         least = 0.0 if chosen.measured else thresholds.headline
-        rest, shares = _large(chosen.rest or chosen.explanation, unseen, settings, least)
+        found, deny = chosen.rest or chosen.explanation, not chosen.tested
+        rest, shares = _large(found, unseen, settings, least, deny)
         names = cls(rest, rest, shares)
         if chosen.rest is not None and rest.steps:
             names = _as_stated(names, unseen, arm, settings)
@@ -248,20 +249,26 @@ def _as_stated(
 
 
 def _large(
-    explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings, least: float
+    explanation: Explanation,
+    unseen: Evidence | None,
+    settings: DiagnosisSettings,
+    least: float,
+    deny: bool,
 ) -> tuple[Explanation, Attribution]:
     """
     Move names that held-out data deny, and small ones, out of the headline; return the shares.
 
     Shares are of the held-out data, or of folds of the fitted data if the former hardly show what
-    was named.
+    was named. A test of changes has asked the held-out data already, and knows that a misfit
+    differs between motions: the misfit of one motion alone denies nothing (`deny`).
 
     """
     shares = shares_of(explanation, unseen, settings)
-    gone = shares.denied[0] if shares.denied else smallest(explanation, shares, settings, least)
+    denied = shares.denied if deny else ()
+    gone = denied[0] if denied else smallest(explanation, shares, settings, least)
     if gone is None:
         return explanation, shares
-    return _large(explanation.without(gone), unseen, settings, least)
+    return _large(explanation.without(gone), unseen, settings, least, deny)
 
 
 def smallest(
