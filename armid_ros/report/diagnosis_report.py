@@ -194,7 +194,7 @@ def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Sect
     if diagnosis.minor:
         sections.append(SmallPrint(diagnosis.minor, settings.everything, bool(diagnosis.findings)))
     if diagnosis.gap is not None:
-        sizes = detectable(diagnosis.explanation, diagnosis.arm.robot)
+        sizes = detectable(diagnosis.explanation)
         sections += [CandidateTable(diagnosis, settings), CouldBeSeen(sizes)]
     return sections
 

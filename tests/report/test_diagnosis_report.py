@@ -182,6 +182,7 @@ def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
     ranking = found.explanation.survey.ranking
     rows = CandidateTable(found, DiagnosisSettings()).rows
     assert rows[0].named
+    assert all(float(row.share.rstrip(' %')) <= 100.0 for row in rows)
     negative = [
         row
         for row, trial in zip(rows, ranking, strict=False)
