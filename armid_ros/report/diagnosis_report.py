@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
-from armid_ros.diagnosis.next_run.steps import next_steps
+from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
@@ -90,9 +90,9 @@ class Extras:
     notes: tuple[str, ...] = ()
     residual: Residual | None = None
 
-    def steps(self, diagnosis: Diagnosis) -> list[str]:
-        """Return what to do next, for the page and the terminal."""
-        return next_steps(diagnosis, self.next_run, self.no_run)
+    def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
+        """Return what to do next, for the page and the terminal, and where the model is."""
+        return next_steps(diagnosis, self.next_run, self.no_run, model)
 
 
 def diagnosis_report(

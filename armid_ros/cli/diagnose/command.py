@@ -372,6 +372,6 @@ def _show_extras(out: Path, result: Diagnosis, extras: Extras) -> None:
         files.append(TABLE_FILE)
     if extras.next_run is not None:
         files.append(EXPERIMENT_FILE)
-    for step in extras.steps(result):
+    for step in extras.steps(result, str(out / 'model.yaml')):
         say(f'next: {step}')
     say(f'{out}: {", ".join(files)}')

@@ -17,14 +17,17 @@ from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
 
-_USE = 'Use model.yaml in simulation and control; keep these bags to compare with.'
+#: The patched model, as one finds it who reads a page.
+MODEL = 'model.yaml in the folder of this diagnosis'
 _ANEW = (
     'Identify the arm anew before the model is used in simulation or control: it is poor on the '
     'baseline itself.'
 )
 
 
-def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '') -> list[str]:
+def next_steps(
+    diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '', model: str = MODEL
+) -> list[str]:
     """
     Return what to do, in sentences, in the order in which a person would do it.
 
@@ -36,6 +39,8 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
         The run that was planned.
     no_run : str
         Why none was, if one was wanted.
+    model : str
+        Where the patched model is.
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
@@ -54,11 +59,18 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
     if diagnosis.at_rest:
         steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
     elif verdict in ('named', 'consistent'):
-        steps.append(_ANEW if diagnosis.doubt else _USE)
+        steps.append(_ANEW if diagnosis.doubt else _use(diagnosis, model))
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
     return steps
+
+
+def _use(diagnosis: Diagnosis, model: str) -> str:
+    """Say which model is to be used: the one that was given, unless it is patched."""
+    patched = bool(diagnosis.findings) and not diagnosis.harmful
+    which = f'the patched model, {model},' if patched else 'the model that was given'
+    return f'Use {which} in simulation and control; keep these bags to compare with.'
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
