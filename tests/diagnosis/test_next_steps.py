@@ -55,6 +55,12 @@ def test_a_model_that_is_not_patched_is_the_one_that_was_given():
     assert next_steps(found)[-1].startswith('Use the model that was given in simulation')
 
 
+def test_a_model_that_simulates_worse_is_not_to_be_used_yet():
+    steps = next_steps(diagnosis('payload', ('wrist',)), worse=('elbow',))
+    assert steps[-1].startswith('Do not simulate with model.yaml')
+    assert 'in elbow' in steps[-1] and not any(step.startswith('Use') for step in steps)
+
+
 def test_the_centre_of_a_load_is_said_where_it_is_determined():
     units = ('kg', 'kg m', 'kg m', 'kg m')
     names = [ParameterName(n, 'wrist', u) for n, u in zip('mxyz', units, strict=True)]

@@ -10,6 +10,8 @@ asked for only where no planned motion tells the two names.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.diagnosis.verdict.naming import shown_best, two_names
@@ -26,7 +28,11 @@ _ANEW = (
 
 
 def next_steps(
-    diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '', model: str = MODEL
+    diagnosis: Diagnosis,
+    run: NextRun | None = None,
+    no_run: str = '',
+    model: str = MODEL,
+    worse: Sequence[str] = (),
 ) -> list[str]:
     """
     Return what to do, in sentences, in the order in which a person would do it.
@@ -41,6 +47,8 @@ def next_steps(
         Why none was, if one was wanted.
     model : str
         Where the patched model is.
+    worse : sequence of str
+        Joints that a simulation with the patched model is farther off in.
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
@@ -58,6 +66,12 @@ def next_steps(
     steps += [text for finding in findings for text in _records(finding, run)]
     if diagnosis.at_rest:
         steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
+    elif worse:
+        steps.append(
+            f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
+            f'than the model before in {", ".join(worse)}. Record more motions of '
+            f'{", ".join(worse)}, and diagnose all recordings together.'
+        )
     elif verdict in ('named', 'consistent'):
         steps.append(_ANEW if diagnosis.doubt else _use(diagnosis, model))
     if diagnosis.not_visible:
