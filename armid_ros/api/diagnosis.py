@@ -30,7 +30,8 @@ from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
 from armid_ros.files import write_file
 from armid_ros.identification import SignalSettings
-from armid_ros.identification.parameters_file import identified_from, read_misfit
+from armid_ros.identification.identified_from import identified_from, require_as_identified
+from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.notation import with_interval
 from armid_ros.residual import (
@@ -287,8 +288,11 @@ def _since(
         found = recordings_of(identified_from(arm), model.robot)
     else:
         return []
-    again = any(_same(one, other) for one in found for other in asked)
-    return [] if again else found
+    if any(_same(one, other) for one in found for other in asked):
+        return []
+    if not isinstance(arm, IdentificationResult):
+        require_as_identified(arm)
+    return found
 
 
 def _same(one: Recording, other: Recording) -> bool:

@@ -42,6 +42,7 @@ from armid_ros.identification import (
 )
 from armid_ros.identification import identify as run
 from armid_ros.identification.estimators.names import Estimator
+from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.recording import Recording, require_once
 
@@ -177,7 +178,7 @@ class IdentificationResult(Shown):
         out = Path(folder)
         out.mkdir(parents=True, exist_ok=True)
         save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, self._misfit)
-        write_document(out / 'identification.json', self.document())
+        write_document(out / 'identification.json', with_contents(self.document()))
         self.report(out / 'report.html')
         if self.core.physical is not None:
             self.urdf(out / 'identified.urdf')

@@ -10,7 +10,7 @@ from functools import cache, partial
 from importlib import import_module
 import math
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 from armid_ros.cli.node import lacking
 from armid_ros.errors import ArmidError, visible
@@ -18,26 +18,63 @@ from armid_ros.version import __version__
 import click
 from click.shell_completion import CompletionItem
 
-#: Command and module, in the order of the work; a module is imported when its command is called.
+
+class Listed(NamedTuple):
+    """
+    Where a command is, and what the list of commands says of it.
+
+    Attributes
+    ----------
+    module : str
+        Below `armid_ros.cli`; imported when the command is called.
+    summary : str
+        First sentence of its help: listing the commands imports none of them.
+
+    """
+
+    module: str
+    summary: str
+
+
+#: The commands in the order of the work.
 COMMANDS = {
-    'demo': 'demo.command',
-    'convert': 'convert',
-    'inspect': 'inspect',
-    'excite': 'excite.command',
-    'simulate': 'record',
-    'identify': 'identify',
-    'diagnose': 'diagnose.command',
-    'elastic': 'elastic.command',
-    'exo': 'exo',
-    'lunar': 'lunar',
-    'compare': 'compare',
-    'fleet': 'fleet',
-    'recover': 'record',
-    'view': 'view',
-    'layout': 'layout',
-    'robots': 'catalogues',
-    'effects': 'catalogues',
-    'completion': 'completion',
+    'demo': Listed(
+        'demo.command',
+        'Excite, move, identify online and offline; then find what was hidden in the arm.',
+    ),
+    'convert': Listed('convert', 'Make a bag of a table or of a bag of ROS 1.'),
+    'inspect': Listed('inspect', 'Look at a recording: a bag, or a table.'),
+    'excite': Listed(
+        'excite.command',
+        'Design a trajectory that shows the parameters, inside all limits and free of collisions.',
+    ),
+    'simulate': Listed('record', 'Let a simulated arm follow a trajectory and record it.'),
+    'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
+    'diagnose': Listed('diagnose.command', 'Find which effect a model lacks, and add it.'),
+    'elastic': Listed('elastic.command', 'Identify elastic joints.'),
+    'exo': Listed('exo', 'Find what ties an exoskeleton to its wearer.'),
+    'lunar': Listed(
+        'lunar',
+        'Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures.',
+    ),
+    'compare': Listed('compare', 'Say what changed between two identifications of one robot.'),
+    'fleet': Listed('fleet', 'Identify, watch and diagnose many arms with many bags.'),
+    'recover': Listed(
+        'record',
+        'Make a recording whole whose writer was killed; the file itself is left as it is.',
+    ),
+    'view': Listed(
+        'view',
+        'Look at a recording in rerun: the moving arm, torques, and what a model does not '
+        'explain.',
+    ),
+    'layout': Listed(
+        'layout',
+        "Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name.",
+    ),
+    'robots': Listed('catalogues', 'List the robots that are shipped.'),
+    'effects': Listed('catalogues', 'List the effects that can be simulated and estimated.'),
+    'completion': Listed('completion', 'Print what makes a shell complete commands and options.'),
 }
 
 
@@ -57,6 +94,11 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         return _imported(cmd_name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List the commands with what they do, without importing them."""
+        with formatter.section('Commands'):
+            formatter.write_dl([(name, entry.summary) for name, entry in COMMANDS.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command without importing all of them, or an option."""
@@ -97,7 +139,8 @@ def _tell_notes(context: click.Context) -> None:
 @cache
 def _imported(name: str) -> click.Command:
     """Import a command; no option of it takes a number that is not finite."""
-    command: click.Command = getattr(import_module(f'armid_ros.cli.{COMMANDS[name]}'), name)
+    module = import_module(f'armid_ros.cli.{COMMANDS[name].module}')
+    command: click.Command = getattr(module, name)
     _refuse_infinite(command)
     return command
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -27,9 +27,15 @@ if TYPE_CHECKING:
 #: Refused bags that are shown; all are in the table `refused`.
 _SHOWN = 20
 
-_out = click.option(
-    '--out', required=True, metavar='URL', help='Folder of the results: a path, or s3://...'
-)
+
+def _out(command: Callable[..., None]) -> Callable[..., None]:
+    """Add --out, a place of results, and --force, to write over files of others."""
+    where = click.option(
+        '--out', required=True, metavar='URL', help='Folder of the results: a path, or s3://...'
+    )
+    return where(options.force(command))
+
+
 _scheduler = click.option(
     '--scheduler',
     metavar='ADDRESS',
@@ -392,6 +398,7 @@ def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
     from armid_ros.fleet.watch import watch as look
 
     store = Store(out)
+    _hold(store)
     with progress('reading results') as tick:
         found = look(store)
         urls = asked_bags(found, arm, bags)

@@ -41,6 +41,7 @@ from armid_ros.identification.estimators.side_by_side import (
     ComparisonSettings,
     MethodScore,
 )
+from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.output import SCHEMA
 from armid_ros.recording import Recording, require_once
 from armid_ros.report import identification_report
@@ -239,6 +240,7 @@ def identify(
         provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
     write_file(out / 'report.html', page)
+    document = with_contents(document)
     write_document(out / 'identification.json', document)
     if as_json:
         click.echo(json_text(document))

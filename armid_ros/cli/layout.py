@@ -9,7 +9,7 @@ from pathlib import Path
 from armid_ros.cli import options
 from armid_ros.cli.terminal import say
 from armid_ros.files import write_file
-from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
+from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout, SCHEMA
 from armid_ros.report.rviz import rviz_config
 import click
 
@@ -21,8 +21,8 @@ import click
 @options.joints
 def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
     """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
+    options.hold(out, SCHEMA)
     robot = options.open_robot(robot_source, 'earth', joints)
-    out.mkdir(parents=True, exist_ok=True)
     files = {
         'plotjuggler.xml': plotjuggler_layout(robot.name, robot.joints, namespace),
         'foxglove.json': foxglove_layout(robot.joints, namespace, robot.base),

@@ -161,7 +161,12 @@ class PayloadChange(Payload):
     quantities = tuple(replace(one, lower=-np.inf) for one in Payload.quantities)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether what was taken or put down may be called a load."""
+        """
+        Return whether what was taken or put down may be called a load.
+
+        It may weigh more than the links: a description often lacks what the arm held before.
+
+        """
         return super().plausible(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:

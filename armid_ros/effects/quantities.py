@@ -22,6 +22,9 @@ _PRISMATIC_UNITS = {
     '1/rev': '1/(2 pi m)',
 }
 
+#: No arm has more than so many times what arms of 1 to 10 kg have, but where it weighs more.
+_BEYOND_TYPICAL = 10.0
+_TYPICAL_MASS = 10.0
 #: Standard deviations by which a value surely differs from another.
 SURELY = 3.0
 
@@ -48,12 +51,6 @@ class Quantity:
     >>> ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)).unit
     'N m/rad^3'
 
-    Examples
-    --------
-    >>> import armid_ros as ar
-    >>> ar.Quantity('hose_stiffness', 'N m/rad^3', lower=0.0, typical=(0.1, 10.0)).unit
-    'N m/rad^3'
-
     """
 
     name: str
@@ -61,6 +58,23 @@ class Quantity:
     lower: float = -np.inf
     upper: float = np.inf
     typical: tuple[float, float] | None = None
+
+    def largest(self, joint: str, robot: Robot) -> float:
+        """
+        Return the largest size that it can have on a joint of a robot, or on all of it (`''`).
+
+        It is within the bounds, no torque is more than the drive gives where that is described,
+        and nothing is far beyond what is typical; inf where none of these says anything.
+
+        """
+        size = max(self.upper, -self.lower)
+        if joint and self.unit == 'N m':
+            drive = float(robot.torque_limit[robot.joints.index(joint)])
+            size = min(size, drive if drive > 0.0 else np.inf)
+        if self.typical is None:
+            return size
+        heavier = max(float(robot.rigid_parameters[::10].sum()) / _TYPICAL_MASS, 1.0)
+        return min(size, _BEYOND_TYPICAL * heavier * self.typical[1])
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 """
 Which files are results of this package, and so may be replaced by others.
 
-A document names its schema and a page its generator near the beginning. Other files have no room
-for a name: they are results if a document or a page lies beside them.
+A document names its schema and a page its generator near the beginning; a layout has its schema in
+a comment or a variable. Other files have no room for a name: they are results if a document or a
+page lies beside them.
 
 """
 
@@ -49,6 +50,20 @@ _WRITES = {
     'armid/springs/1': ('elastic.json', 'report.html'),
     'armid/exo/1': ('exo.json', 'report.html', 'recording'),
     'armid/lunar/1': ('lunar.json', 'report.html'),
+    'armid/layout/1': ('plotjuggler.xml', 'foxglove.json', 'arm.rviz'),
+    'armid/fleet/1': (
+        'fleet.json',
+        'index.html',
+        'alarms.jsonl',
+        'arms',
+        'bags',
+        'pages',
+        'parameters',
+        'refused',
+        'reports',
+        'robots',
+        'watch',
+    ),
 }
 #: What a page has in its head.
 GENERATOR = '<meta name="generator" content="armid_ros">'
@@ -59,6 +74,8 @@ _MARKS = {
     '.html': re.compile(re.escape(GENERATOR.encode())),
     '.json': _SCHEMA,
     '.yaml': _SCHEMA,
+    '.rviz': _SCHEMA,
+    'plotjuggler.xml': _SCHEMA,
 }
 
 
@@ -91,7 +108,7 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
                 f'{folder}: holds {name}, which this command does not write; name another folder, '
                 'or use --force, which leaves it there'
             )
-    known = [name for name in names if Path(name).suffix in _MARKS]
+    known = [name for name in names if _mark_of(name)]
     for name in known or names:
         if not is_own(folder / name):
             raise OutputError(
@@ -100,9 +117,39 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
             )
 
 
+def refuse_replacing(folder: Path, names: Collection[str]) -> None:
+    """
+    Refuse to replace files that this package did not write; others are left where they are.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, which need not be there.
+    names : collection of str
+        What is to be written.
+
+    Raises
+    ------
+    OutputError
+        Naming the folder and the file.
+
+    """
+    there = [name for name in names if (folder / name).exists()]
+    known = [name for name in there if _mark_of(name)]
+    for name in known or there:
+        if not is_own(folder / name):
+            raise OutputError(
+                f'{folder}: holds {name}, which armid did not write; name another folder'
+            )
+
+
+def _mark_of(name: str) -> re.Pattern[bytes] | None:
+    return _MARKS.get(name) or _MARKS.get(Path(name).suffix)
+
+
 def is_own(path: Path) -> bool:
     """Tell whether a document or a page is a result of this package."""
-    mark = _MARKS.get(path.suffix)
+    mark = _mark_of(path.name)
     if mark is None:
         return False
     try:

@@ -270,40 +270,6 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     return replace(misfit, information=read_parameters(beside).information(arm.parameters))
 
 
-def identified_from(path: str | Path) -> tuple[Path, ...]:
-    """
-    Return the recordings that a model was identified from, held-out ones included, that are there.
-
-    Parameters
-    ----------
-    path : str or Path
-        model.yaml; the identification.json beside it names them. Paths that are relative start
-        here, in that folder, or in the one that it is in.
-
-    Raises
-    ------
-    ModelError
-        If identification.json cannot be read.
-
-    """
-    beside = Path(path).with_name('identification.json')
-    if not is_file(beside):
-        return ()
-    text = read_text(beside, ModelError)
-    with reading(beside, ModelError):
-        document = load_json(text)
-        names = [
-            *document['training']['bags'],
-            *(row['bag'] for row in document.get('validation', [])),
-        ]
-        places = [
-            [start / str(name) for start in (Path(), beside.parent, beside.parent.parent)]
-            for name in names
-        ]
-    found = (next((place for place in some if place.exists()), None) for some in places)
-    return tuple(place for place in found if place is not None)
-
-
 def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
     """
     Look up the robot that a file without its kinematics names, where it is still there.

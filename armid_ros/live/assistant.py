@@ -20,7 +20,7 @@ import subprocess
 import sys
 import threading
 import traceback
-from typing import Any, IO, Protocol
+from typing import Any, ClassVar, IO, Protocol
 
 from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
@@ -38,7 +38,17 @@ _LENGTH = struct.Struct('<Q')
 
 @dataclass(frozen=True)
 class Save:
-    """Write the last diagnosis to a folder: diagnosis.json, model.yaml, report.html."""
+    """
+    Write the last diagnosis to a folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Gets `FILES`.
+
+    """
+
+    FILES: ClassVar[tuple[str, ...]] = ('diagnosis.json', 'model.yaml', 'report.html')
 
     folder: Path
 
@@ -133,9 +143,7 @@ class InProcess:
         request, diagnosis = self._last
         if isinstance(job, Save):
             result = DiagnosisResult(diagnosis, request.arm, (request.window,), ())
-            return Done(
-                f'wrote diagnosis.json, model.yaml, report.html to {result.save(job.folder)}'
-            )
+            return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
         run = next_run(diagnosis, np.random.default_rng(job.seed))
         if run is None:
             return Done('no name is in doubt: there is nothing to separate', success=False)

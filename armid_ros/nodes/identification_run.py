@@ -13,7 +13,10 @@ import time
 from typing import Any
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.verdict.document import SCHEMA as DIAGNOSIS
 from armid_ros.errors import ArmidError, OutputError, RecordingError, TrajectoryError
+from armid_ros.files.own import refuse_foreign
+from armid_ros.identification.output import SCHEMA as IDENTIFICATION
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.running.process import run
@@ -35,6 +38,8 @@ _SAID = {
     'diagnose': ('diagnosis.json', ('verdict', 'summary')),
 }
 
+#: Folders of results in `save_to`, and their schemas.
+_FOLDERS = {'identification': IDENTIFICATION, 'diagnosis': DIAGNOSIS}
 #: A program: its command and arguments.
 Program = tuple[str, ...]
 #: What a step waits for, in words, and whether it has come.
@@ -171,6 +176,9 @@ class IdentificationRunNode(ArmidNode):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f'save_to: {folder}: cannot be made: {error.strerror}') from error
+        for name, schema in _FOLDERS.items():
+            if (folder / name).is_dir():
+                refuse_foreign(folder / name, schema)
 
     def _stop_all(self) -> None:
         """Stop what this node has begun: the arm first."""

@@ -12,6 +12,7 @@ from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.errors import ArmidError, IdentificationError, OutputError
+from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis
 from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
@@ -141,8 +142,9 @@ class LiveDiagnosisNode(ArmidNode):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f'save_to: {folder}: cannot be made: {error.strerror}') from error
+        refuse_replacing(folder, Save.FILES)
         self._begin(Save(folder))
-        return f'writing diagnosis.json, model.yaml and report.html to {folder}'
+        return f'writing {", ".join(Save.FILES)} to {folder}'
 
     def next_run(self) -> str:
         """Have the motion planned that separates the names; it goes out on ~/experiment."""

@@ -15,6 +15,7 @@ from typing import Any
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.identifier import (
     OnlineIdentifier,
@@ -25,7 +26,7 @@ from armid_ros.identification.online.learning_progress import LearningProgress, 
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.messages.estimates import estimate_message, save_identification
+from armid_ros.nodes.messages.estimates import estimate_message, FILES, save_identification
 from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
 from armid_ros.nodes.messages.learning_status import change_status, parameter_status
 from armid_ros.nodes.parameters.identifier import (
@@ -119,6 +120,8 @@ class OnlineIdentifierNode(ArmidNode):
         self._description: str | None = None
         self._published = -1
         self._disturbed: Counter[str] = Counter()
+        if self.value('save_to'):  # said now, and not when all has been learned
+            refuse_replacing(Path(self.value('save_to')).expanduser(), FILES)
         if identifier is None and self.value('robot'):
             identifier = make_identifier(self.value)
         if identifier is not None:

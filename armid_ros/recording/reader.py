@@ -29,6 +29,7 @@ from armid_ros.recording.series import (
     gather,
     JointSamples,
     merged,
+    not_finite,
     ordered,
 )
 from armid_ros.recording.settings import DEFAULT, ReadSettings
@@ -37,6 +38,7 @@ import numpy as np
 
 # More samples than this part being not finite is no glitch but a fault of the recording.
 MAX_NOT_FINITE = 0.2
+_Samples = tuple[FloatArray, FloatArray | None, FloatArray | None, IntArray]
 # This many messages tell which joints a topic names.
 _PEEK_MESSAGES = 1000
 
@@ -129,7 +131,8 @@ def assemble(
         _check_receive_clock(where, gathered, note)
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
     q, dq, tau, absent = _measured_quantities(where, series)
-    q, dq, tau, stamps = _finite(where, joints, series.stamps, (q, dq, tau), counts)
+    kept, culprits = _finite(where, joints, series.stamps, (q, dq, tau), counts)
+    q, dq, tau, stamps = kept
     if len(stamps) < 2:
         raise RecordingError(
             f'{where}: {len(stamps)} samples are left of {decoder.messages} messages '
@@ -140,6 +143,7 @@ def assemble(
         messages=decoder.messages,
         samples=len(stamps),
         malformed=decoder.malformed,
+        not_finite=culprits,
         gaps=_gaps(t),
         absent=absent,
         clock_note=note,
@@ -311,20 +315,12 @@ def _finite(
     stamps: IntArray,
     values: tuple[FloatArray, FloatArray | None, FloatArray | None],
     counts: Counter[str],
-) -> tuple[FloatArray, FloatArray | None, FloatArray | None, IntArray]:
-    """Drop samples with a value that is not finite; refuse when they are many."""
-    bad = np.zeros(len(stamps), np.bool_)
-    culprits = []
-    for name, array in zip(('position', 'velocity', 'effort'), values, strict=True):
-        if array is None:
-            continue
-        wrong = ~np.isfinite(array)
-        if wrong.any():
-            bad |= wrong.any(axis=1)
-            named = [joints[j] for j in np.flatnonzero(wrong.any(axis=0)).tolist()]
-            culprits.append(f'{name} of {", ".join(named)}')
+) -> tuple[_Samples, tuple[str, ...]]:
+    """Drop samples with a value that is not finite, and say whose; refuse when they are many."""
+    names = ('position', 'velocity', 'effort')
+    bad, culprits = not_finite(joints, zip(names, values, strict=True), len(stamps))
     if not culprits:
-        return (*values, stamps)
+        return (*values, stamps), ()
     dropped = int(bad.sum())
     if dropped > MAX_NOT_FINITE * len(stamps):
         raise RecordingError(
@@ -333,7 +329,7 @@ def _finite(
     counts['nan'] += dropped
     q, dq, tau = (None if array is None else array[~bad] for array in values)
     assert q is not None
-    return q, dq, tau, stamps[~bad]
+    return (q, dq, tau, stamps[~bad]), culprits
 
 
 def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:

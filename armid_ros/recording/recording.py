@@ -78,6 +78,8 @@ class ReadReport:
         Messages dropped since the clock jumped back: the longest run between jumps is kept.
     nan : int
         Samples dropped since a position, velocity or torque is not finite.
+    not_finite : tuple of str
+        Which these are and in how many samples, in words: 'effort of wrist in 10'.
     malformed : int
         Messages dropped since they cannot be decoded, or have arrays of the wrong length.
     unstamped : int
@@ -104,6 +106,7 @@ class ReadReport:
     nan: int = 0
     malformed: int = 0
     unstamped: int = 0
+    not_finite: tuple[str, ...] = ()
     gaps: tuple[TimeGap, ...] = ()
     absent: tuple[str, ...] = ()
     clock_note: str = ''
@@ -121,6 +124,7 @@ class ReadReport:
 
     def describe(self) -> str:
         """Return the report as one or a few sentences."""
+        whose = f' ({", ".join(self.not_finite)})' if self.not_finite else ''
         sentences = [f'{self.samples} samples from {self.messages} messages']
         counted = (
             (self.merged, 'put together from messages with a part of the joints each'),
@@ -129,7 +133,7 @@ class ReadReport:
             (self.duplicates, 'with a repeated stamp dropped'),
             (self.out_of_order, 'out of order sorted in'),
             (self.restarted, 'dropped as the clock jumped back'),
-            (self.nan, 'dropped for values that are not finite'),
+            (self.nan, f'dropped for values that are not finite{whose}'),
             (self.malformed, 'malformed dropped'),
             (self.unstamped, 'without a stamp dropped'),
         )

@@ -14,7 +14,7 @@ stamps exactly and are interpolated linearly between stamps, but not over their 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence, Sized
+from collections.abc import Iterable, Sequence, Sized
 from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
@@ -144,6 +144,43 @@ def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> JointSam
         counts['restarted'] += len(series) - (run.stop - run.start)
         series = series.select(run)
     return _sorted(series, counts)
+
+
+def not_finite(
+    joints: Sequence[str], values: Iterable[tuple[str, FloatArray | None]], count: int
+) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
+    """
+    Find values that are not finite.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        n names.
+    values : iterable of (str, ndarray, shape (N, n), or None)
+        Quantities with their names; None for one that was not measured.
+    count : int
+        Number of samples N.
+
+    Returns
+    -------
+    bad : ndarray, shape (N,)
+        True where some value is not finite.
+    said : tuple of str
+        How many there are of each quantity and joint: 'effort of elbow in 10'.
+
+    """
+    bad = np.zeros(count, np.bool_)
+    said = []
+    for name, array in values:
+        if array is None:
+            continue
+        wrong = ~np.isfinite(array)
+        if wrong.any():
+            bad |= wrong.any(axis=1)
+            for joint, number in zip(joints, wrong.sum(axis=0).tolist(), strict=True):
+                if number:
+                    said.append(f'{name} of {joint} in {number}')
+    return bad, tuple(said)
 
 
 def merged(

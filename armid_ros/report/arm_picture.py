@@ -22,8 +22,8 @@ import numpy as np
 import pinocchio as pin
 
 _HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
-#: Names are so far above their joints, a line is so high, a name about so long [px].
-_ABOVE, _LINE, _LABEL = 14.0, 14.0, 90.0
+#: Names are so far above their joints, a line is so high, a letter about so wide [px].
+_ABOVE, _LINE, _LETTER = 14.0, 14.0, 8.5
 _VIEWS = tuple(Camera(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
 #: Poses that are tried, and how far the last body is drawn beyond its centre of mass.
 _POSES, _BEYOND = 12, 2.0
@@ -226,8 +226,21 @@ def _apart(dots: Sequence[Dot]) -> list[Dot]:
     result: list[Dot] = []
     for dot in dots:
         y = dot.label_y
-        near = [o for o in result if o.marked and abs(o.label_x - dot.label_x) < _LABEL]
-        while dot.marked and any(abs(o.label_y - y) < _LINE for o in near):
-            y -= _LINE
+        near = [other for other in result if other.marked and _one_above_other(other, dot)]
+        while dot.marked and (over := [o.label_y for o in near if abs(o.label_y - y) < _LINE]):
+            y = min(over) - _LINE
         result.append(replace(dot, label_y=round(y, 1)))
     return result
+
+
+def _one_above_other(one: Dot, other: Dot) -> bool:
+    """Return whether two names would be printed over one another on one line."""
+    (left, right), (start, end) = _reach(one), _reach(other)
+    return left < end and start < right
+
+
+def _reach(dot: Dot) -> tuple[float, float]:
+    """Return from where to where a name is written [px]."""
+    length = _LETTER * len(dot.name)
+    start = dot.label_x - {'start': 0.0, 'middle': length / 2.0, 'end': length}[dot.anchor]
+    return start, start + length

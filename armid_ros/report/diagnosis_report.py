@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
-from armid_ros.diagnosis.next_run.steps import next_steps
+from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
@@ -37,10 +37,16 @@ from armid_ros.residual import Residual
 _TONES = {'consistent': 'good', 'named': 'good', 'ambiguous': 'fair', 'partial': 'fair'}
 
 
-def tone_of(diagnosis: Diagnosis) -> str:
-    """Return the colour of a verdict; none is good if the model is doubted, or a joint rests."""
+def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
+    """
+    Return the colour of a verdict.
+
+    None is good if the model is doubted, a joint rests, or a simulation got worse in some joints.
+
+    """
     tone = _TONES.get(diagnosis.verdict, 'bad')
-    return 'fair' if tone == 'good' and (diagnosis.at_rest or diagnosis.doubt) else tone
+    doubtful = bool(diagnosis.at_rest or diagnosis.doubt or worse)
+    return 'fair' if tone == 'good' and doubtful else tone
 
 
 @dataclass(frozen=True)
@@ -90,9 +96,14 @@ class Extras:
     notes: tuple[str, ...] = ()
     residual: Residual | None = None
 
-    def steps(self, diagnosis: Diagnosis) -> list[str]:
-        """Return what to do next, for the page and the terminal."""
-        return next_steps(diagnosis, self.next_run, self.no_run)
+    def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
+        """Return what to do next, for the page and the terminal, and where the model is."""
+        return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse)
+
+    @property
+    def worse(self) -> tuple[str, ...]:
+        """Joints that a simulation with the patched model is farther off in than before."""
+        return tuple(dict.fromkeys(joint for pair in self.forward for joint in pair.worse))
 
 
 def diagnosis_report(
@@ -135,7 +146,7 @@ def diagnosis_report(
     read = {'training': data.recordings, 'held-out': data.held_out, 'baseline': data.baseline}
     names = short_names([one.source for every in read.values() for one in every])
     sections: list[Section] = [
-        _verdict(diagnosis, names),
+        _verdict(diagnosis, names, extras.worse),
         *_story(diagnosis, names, extras.residual),
         *([] if extras.residual is None else [ResidualMap(extras.residual)]),
         NextSteps([*extras.steps(diagnosis), *_of_maps(extras.residual)]),
@@ -162,9 +173,16 @@ def diagnosis_report(
     return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
 
 
-def _verdict(diagnosis: Diagnosis, names: Mapping[str, str]) -> VerdictSection:
-    tone = tone_of(diagnosis)
+def _verdict(
+    diagnosis: Diagnosis, names: Mapping[str, str], worse: Sequence[str]
+) -> VerdictSection:
+    tone = tone_of(diagnosis, worse)
     notes = [with_names(note, names) for note in diagnosis.notes]
+    if worse:
+        notes.append(
+            f'Driven by the recorded torques, the patched model is farther off than the model '
+            f'before in {", ".join(worse)}: see forward validation.'
+        )
     summary = with_names(diagnosis.summary, names).replace('+-', '±')
     return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
 
@@ -194,7 +212,7 @@ def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Sect
     if diagnosis.minor:
         sections.append(SmallPrint(diagnosis.minor, settings.everything, bool(diagnosis.findings)))
     if diagnosis.gap is not None:
-        sizes = detectable(diagnosis.explanation, diagnosis.arm.robot)
+        sizes = detectable(diagnosis.explanation)
         sections += [CandidateTable(diagnosis, settings), CouldBeSeen(sizes)]
     return sections
 

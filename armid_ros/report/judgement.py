@@ -262,6 +262,15 @@ def _verification_findings(verification: Verification | None) -> list[Caution]:
     if verification is None:
         return []
     findings = [Caution(text[0].upper() + text[1:] + '.') for text in verification.left_out]
+    worse = ', '.join(sorted({name for pair in verification.forward for name in pair.worse}))
+    if worse:
+        findings.append(
+            Caution(
+                'Driven by the recorded torques, the identified arm is farther off than the '
+                f'description in {worse}.',
+                f'Look at the residual of {worse} before the model is used to simulate.',
+            )
+        )
     if verification.noise is not None and not verification.noise.harmless:
         size = float(np.max(np.abs(verification.noise.relative_bias)))
         findings.append(

@@ -9,6 +9,8 @@ import json
 from typing import Any
 from xml.etree import ElementTree
 
+#: Of the files, in a comment or a variable: which of them may be written over.
+SCHEMA = 'armid/layout/1'
 #: Colours of PlotJuggler, in its order.
 _COLOURS = (
     '#1f77b4', '#d62728', '#1ac938', '#ff7f0e', '#f14cc1', '#9467bd', '#17becf', '#bcbd22',
@@ -62,7 +64,8 @@ def plotjuggler_layout(robot: str, joints: Sequence[str], namespace: str = '') -
     _inside(root, 'use_relative_time_offset', enabled='1')
     ElementTree.indent(root, ' ')
     return (
-        "<?xml version='1.0' encoding='UTF-8'?>\n" + ElementTree.tostring(root, 'unicode') + '\n'
+        f"<?xml version='1.0' encoding='UTF-8'?>\n<!-- schema: {SCHEMA} -->\n"
+        f'{ElementTree.tostring(root, "unicode")}\n'
     )
 
 
@@ -85,6 +88,7 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'bas
     predicted = _paths(f'{at}{_PREDICTED}.effort', joints, ' predicted')
     condition = _path(f'{at}{_IDENTIFIER}/estimate.condition_number', 'condition number')
     layout = {
+        'globalVariables': {'schema': SCHEMA},
         'configById': {
             'Plot!motion': _plot('Position [rad]', _paths(f'{at}joint_states.position', joints)),
             'Plot!torque': _plot('Torque, measured and predicted [N m]', measured + predicted),
@@ -101,7 +105,6 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'bas
                 'sortByLevel': True,
             },
         },
-        'globalVariables': {},
         'userNodes': {},
         'playbackConfig': {'speed': 1},
         'layout': {

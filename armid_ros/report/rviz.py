@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from armid_ros.report.layouts import topic_prefix
+from armid_ros.report.layouts import SCHEMA, topic_prefix
 import yaml
 
 #: Topics that keep their last message for those who come late, and those that do not.
@@ -64,7 +64,7 @@ def rviz_config(base: str, namespace: str = '') -> str:
         },
         'Window Geometry': {'Height': 900, 'Width': 1300},
     }
-    return yaml.safe_dump(document, sort_keys=False)
+    return f'# schema: {SCHEMA}\n{yaml.safe_dump(document, sort_keys=False)}'
 
 
 def _displays(namespace: str) -> list[dict[str, Any]]:

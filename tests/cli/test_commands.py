@@ -5,14 +5,17 @@
 import json
 from pathlib import Path
 import re
+import subprocess
+import sys
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.commands import COMMANDS
+from armid_ros.cli.commands import COMMANDS, main
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.excitation import load_excitation
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.robots import load_robot
+import click
 import numpy as np
 import pytest
 
@@ -26,6 +29,23 @@ QUICK = ('--starts', 1, '--iterations', 5)
 @pytest.mark.parametrize('command', COMMANDS)
 def test_every_command_explains_itself_with_an_example(command):
     assert 'Example: armid ' in armid(command, '--help').output
+
+
+def test_commands_are_listed_with_the_first_sentence_of_their_help():
+    context = click.Context(main)
+    said = {name: main.get_command(context, name).get_short_help_str(1000) for name in COMMANDS}
+    assert {name: entry.summary for name, entry in COMMANDS.items()} == said
+
+
+@pytest.mark.parametrize('option', ['--help', '--version'])
+def test_help_and_version_import_nothing_that_computes(option):
+    program = (
+        'import sys; from armid_ros.cli import main; '
+        f"main(['{option}'], standalone_mode=False); "
+        "sys.exit('numpy' in sys.modules)"
+    )
+    result = subprocess.run([sys.executable, '-c', program], capture_output=True, check=False)
+    assert result.returncode == 0, result.stderr.decode()
 
 
 def test_robots_and_effects_are_listed_for_people_and_programs():

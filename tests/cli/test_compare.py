@@ -4,7 +4,6 @@ import json
 
 from armid_ros.arm import ArmModel, load_model, save_model
 from armid_ros.cli import main
-from armid_ros.cli.commands import COMMANDS
 from armid_ros.effects import make_effect
 from armid_ros.estimate import Estimate
 from armid_ros.files import result_folder
@@ -13,16 +12,10 @@ from armid_ros.model.base_parameters import symbol
 from armid_ros.robots import load_robot
 from click.testing import CliRunner
 import numpy as np
-import pytest
 
 FRICTION = ('viscous_coefficient', 'elbow', 'N m s/rad')
 JOINTS = ('shoulder', 'elbow')
 INERTIA = ('Izz1 + Iyy2', 'shoulder', 'kg m^2')
-
-
-@pytest.fixture(autouse=True)
-def command(monkeypatch):
-    monkeypatch.setitem(COMMANDS, 'compare', 'compare')
 
 
 def identified(folder, friction, robot='arm', errors=(4.0, 4.0), **others):

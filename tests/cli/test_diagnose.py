@@ -3,6 +3,8 @@
 """What armid diagnose writes: the verdict, and a motion to run where names are in doubt."""
 
 import json
+from pathlib import Path
+import shutil
 
 from armid_ros.arm import load_misfit, load_model, Misfit, save_model
 from armid_ros.cli.diagnose.command import Percent
@@ -205,6 +207,21 @@ def test_what_a_model_was_identified_from_is_the_baseline(doubtful, tmp_path):
         said, unit = floor(*more, of=of)
         assert 'baseline:' not in said
         assert unit == 'the misfit that the model had when it was identified'
+
+
+def test_a_baseline_that_was_written_over_is_refused(doubtful, tmp_path):
+    (now, before), urdf = doubtful, tmp_path / 'arm.urdf'
+    urdf.write_text(URDF, encoding='utf-8')
+    days = [Path(shutil.copytree(bag, tmp_path / Path(bag).name)) for bag in before]
+    known = tmp_path / 'result' / 'model.yaml'
+    armid('identify', *days, '--robot', urdf, '--out', known.parent)
+    asked = ('--robot', urdf, '--model', known, '--out', tmp_path / 'out')
+    shutil.rmtree(days[0])
+    shutil.copytree(now[0], days[0])
+    refused = armid('diagnose', *now, *asked, code=2).stderr
+    assert f'{days[0]}: is not the recording any more that' in refused
+    assert '--no-baseline' in refused
+    armid('diagnose', *now, *asked, '--no-baseline')
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,8 @@ def test_a_share_is_that_of_the_squares_and_lies_in_its_interval():
     low, high = shares.interval([0, 1], rng)
     assert low < shares.share([0, 1]) < high
     assert shares.share([0, 1]) == pytest.approx(0.7, abs=0.02)
+    more = Attribution((0, 1), whole, taken + whole)
+    assert more.share([0]) == 1.0 and more.interval([0], rng) == (1.0, 1.0)
 
 
 def test_data_with_a_cause_show_it_and_data_without_deny_it(bench, sprung):

@@ -94,3 +94,10 @@ def test_every_effect_of_the_catalogue_is_listed(sizes):
     assert all(
         row['min_detectable'] is None or row['min_detectable'] > 0 for row in sizes.values()
     )
+
+
+def test_a_size_has_the_unit_of_the_effect_whose_it_is(sizes):
+    """Gravity is searched as a vector; a tilt of the base is an angle."""
+    tilt = sizes['base_tilt', ()]
+    assert tilt['parameter'] in ('tilt_x', 'tilt_y') and tilt['unit'] == 'rad'
+    assert 0.0 < tilt['min_detectable'] < 0.1

@@ -74,13 +74,16 @@ def test_torque_has_the_unit_of_its_joint(document):
         ('backlash', 0.006, True),
         ('backlash', 6.8e12, False),
         ('torque_offset', 1.9e17, False),
+        ('stribeck_friction', 1.0, True),
+        ('stribeck_friction', 5.7e3, False),
         ('torque_lag', 0.1, True),
         ('torque_lag', 53.0, False),
     ],
 )
 def test_a_size_that_no_arm_has_is_not_detectable(name, size, possible):
-    effect = CATALOGUE[name].on(Bench().robot, ('elbow',))
-    candidate = SimpleNamespace(kept=(0,), effect=effect)
+    robot = Bench().robot
+    effect = CATALOGUE[name].on(robot, ('elbow',))
+    candidate = SimpleNamespace(kept=(0,), effect=effect, robot=robot)
     trial = SimpleNamespace(candidate=candidate, std=[size / 5.0], resolution=[1.0])
     found = smallest_size(trial, np.zeros(1))[1]
     assert found == pytest.approx(size) if possible else found == np.inf

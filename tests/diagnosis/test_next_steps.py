@@ -22,6 +22,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
         left=(),
         not_visible=(),
         doubt='',
+        harmful=False,
         at_rest=(),
         arm=SimpleNamespace(effects=effects),
         explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
@@ -40,9 +41,24 @@ def test_every_effect_says_what_to_look_at(name):
 
 
 def test_a_payload_sends_a_person_to_the_hand_first():
-    first, *others = next_steps(diagnosis('payload', ('wrist',)))
+    first, *others = next_steps(diagnosis('payload', ('wrist',)), model='out/model.yaml')
     assert first.startswith('Look at wrist first: the hand, the gripper, the tool')
-    assert others == ['Use model.yaml in simulation and control; keep these bags to compare with.']
+    assert others == [
+        'Use the patched model, out/model.yaml, in simulation and control; keep these bags to '
+        'compare with.'
+    ]
+
+
+def test_a_model_that_is_not_patched_is_the_one_that_was_given():
+    found = diagnosis('payload', ('wrist',))
+    found.harmful = True
+    assert next_steps(found)[-1].startswith('Use the model that was given in simulation')
+
+
+def test_a_model_that_simulates_worse_is_not_to_be_used_yet():
+    steps = next_steps(diagnosis('payload', ('wrist',)), worse=('elbow',))
+    assert steps[-1].startswith('Do not simulate with model.yaml')
+    assert 'in elbow' in steps[-1] and not any(step.startswith('Use') for step in steps)
 
 
 def test_the_centre_of_a_load_is_said_where_it_is_determined():

@@ -9,6 +9,7 @@ import os
 
 from armid_ros.errors import OutputError
 from armid_ros.files import json_text, result_folder, write_file
+from armid_ros.files.own import refuse_replacing
 import pytest
 
 SCHEMA = 'armid/identification/1'
@@ -144,6 +145,37 @@ def test_what_the_command_did_not_write_is_kept_unless_forced(tmp_path, files, r
     with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
         pass
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == files
+
+
+def test_a_page_of_somebody_else_is_no_page_of_a_fleet(tmp_path):
+    (tmp_path / 'fleet.json').write_text(json.dumps({'schema': 'armid/fleet/1'}))
+    (tmp_path / 'pages').mkdir()
+    with result_folder(tmp_path, 'armid/fleet/1'):
+        pass
+    (tmp_path / 'index.html').write_text('precious')
+    with pytest.raises(OutputError, match='holds index\\.html, which armid did not write'):
+        with result_folder(tmp_path, 'armid/fleet/1'):
+            pass
+
+
+@pytest.mark.parametrize(
+    ('files', 'refused'),
+    [
+        ({}, ''),
+        ({'notes.txt': 'mine'}, ''),
+        ({**OWN, 'robot.urdf': '<robot/>', 'notes.txt': 'mine'}, ''),
+        ({'model.yaml': 'mine: true'}, 'model.yaml'),
+        ({'robot.urdf': '<robot/>'}, 'robot.urdf'),
+    ],
+)
+def test_what_a_service_saves_replaces_only_what_it_wrote(tmp_path, files, refused):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    if not refused:
+        refuse_replacing(tmp_path, ('estimate.yaml', 'model.yaml', 'robot.urdf'))
+        return
+    with pytest.raises(OutputError, match=f'holds {refused}, which armid did not write'):
+        refuse_replacing(tmp_path, ('estimate.yaml', 'model.yaml', 'robot.urdf'))
 
 
 def test_other_files_that_a_command_says_it_writes_are_no_strangers(tmp_path):

@@ -209,6 +209,8 @@ def test_samples_that_are_not_finite_are_dropped(
     recording = read_recording(bag, joints=JOINTS)
     assert_same(recording, swinging, np.setdiff1d(np.arange(500), [0, 20, 21, 499]))
     assert recording.report.nan == 4
+    name = {'q': 'position', 'dq': 'velocity', 'tau': 'effort'}[quantity]
+    assert f'not finite ({name} of {JOINTS[1]} in 4)' in recording.report.describe()
 
 
 def test_many_samples_that_are_not_finite_are_refused(swinging, stamps, write_bag, messages_of):

@@ -56,3 +56,27 @@ def test_names_above_each_other_stay_inside_the_drawing():
     drawn = draw_arm(robot, robot.joints)
     assert min(dot.label_y for dot in drawn.dots) < 0.0
     assert min(dot.label_y for dot in drawn.dots) + drawn.above >= 14.0
+
+
+def test_names_are_not_printed_over_one_another():
+    """A name that begins at its joint reaches the one that is centred at the next."""
+    places = {'shoulder_lift': '0 0 0.2', 'elbow_flex': '0.35 0 0', 'wrist_pitch': '0.55 0 0'}
+    parent, links = 'base', '<link name="base"/>'
+    for name, place in places.items():
+        links += (
+            f'<link name="{name}_link"><inertial><mass value="1"/>'
+            '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+            f'<joint name="{name}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="{name}_link"/><origin xyz="{place}"/><axis xyz="0 1 0"/>'
+            '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+        )
+        parent = f'{name}_link'
+    robot = robot_from_urdf(f'<robot name="three">{links}</robot>')
+    boxes = []
+    for dot in draw_arm(robot, robot.joints).dots:
+        length = 7.0 * len(dot.name)
+        left = dot.label_x - {'start': 0.0, 'middle': 0.5, 'end': 1.0}[dot.anchor] * length
+        boxes.append((left, left + length, dot.label_y))
+    for k, (left, right, y) in enumerate(boxes):
+        for start, end, other in boxes[k + 1 :]:
+            assert right <= start or end <= left or abs(y - other) >= 14.0

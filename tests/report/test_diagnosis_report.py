@@ -6,7 +6,15 @@ from dataclasses import replace
 import re
 
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
-from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification.assess.verification import simulate_held_out
+from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.report.diagnosis_report import (
+    DiagnosedRecordings,
+    diagnosis_report,
+    Extras,
+    tone_of,
+)
 from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sections.diagnosed import Shares
@@ -161,6 +169,20 @@ def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
     assert '>Patch</h2>' not in quiet
 
 
+def test_a_model_that_simulates_worse_is_not_green(found, recordings):
+    used = conditioning(recordings, SignalSettings())
+    spring = CATALOGUE['joint_spring'].on(found.arm.robot, ('elbow',))
+    wrong = found.arm.with_effect(spring, np.array([30.0, 0.0]))
+    pairs, _ = simulate_held_out(found.arm, wrong, used, recordings[:1])
+    extras = Extras(forward=pairs)
+    page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='arm', extras=extras)
+    assert 'elbow' in extras.worse
+    assert (tone_of(found), tone_of(found, extras.worse)) == ('good', 'fair')
+    assert 'farther off than the model before in ' in page
+    assert 'It is worse than before in ' in page
+    assert 'Do not simulate with model.yaml' in page
+
+
 def test_bad_data_have_no_green_tick():
     bench = Bench()
     turned = [replace(r, tau=-r.tau) for r in bench.recordings()]
@@ -182,6 +204,7 @@ def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
     ranking = found.explanation.survey.ranking
     rows = CandidateTable(found, DiagnosisSettings()).rows
     assert rows[0].named
+    assert all(float(row.share.rstrip(' %')) <= 100.0 for row in rows)
     negative = [
         row
         for row, trial in zip(rows, ranking, strict=False)

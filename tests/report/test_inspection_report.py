@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of an inspection shows every curve, escapes names, and fits a phone."""
 
+import re
+
 from armid_ros.inspection import inspect
 from armid_ros.recording import Recording
 from armid_ros.report.inspection_report import inspection_report
@@ -25,6 +27,14 @@ def test_names_are_escaped_and_paths_are_short(html):
     assert '<i>run' not in html
     assert 'b.urdf' in html
     assert 'a/b.urdf' not in html
+
+
+def test_every_column_of_the_joints_has_its_unit_in_one_piece(html):
+    heads = html[html.index('id="joints"') :]
+    heads = re.findall('<th[^>]*>([^<]*)</th>', heads[: heads.index('</thead>')])
+    without = [head for head in heads if '[' not in head]
+    assert without == ['Joint', 'Moving', 'Dq ratio']
+    assert all('N m' not in head for head in heads)
 
 
 def test_what_was_remarked_stands_first(html):

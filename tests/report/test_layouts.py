@@ -7,6 +7,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree
 
+from armid_ros.files.own import is_own
 from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout
 from armid_ros.report.rviz import rviz_config
 from armid_ros.robots import load_robot
@@ -77,3 +78,15 @@ def test_the_arm_and_what_is_drawn_on_it_are_shown_in_the_frame_of_its_base():
     assert arm['Description Topic']['Value'] == '/left/robot_description'
     assert arm['Description Topic']['Durability Policy'] == 'Transient Local'
     assert markers['Topic']['Value'] == '/left/residual_markers/markers'
+
+
+def test_layouts_say_that_they_may_be_written_over(tmp_path):
+    for name, text in {
+        'plotjuggler.xml': plotjuggler_layout('arm', ('a',)),
+        'foxglove.json': foxglove_layout(('a',)),
+        'arm.rviz': rviz_config('foot'),
+    }.items():
+        (tmp_path / name).write_text(text)
+        assert is_own(tmp_path / name)
+        (tmp_path / name).write_text('<root/>')
+        assert not is_own(tmp_path / name)

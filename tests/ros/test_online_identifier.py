@@ -8,6 +8,7 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
 from armid_ros.effects import parse_effect
+from armid_ros.errors import OutputError
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import Motion
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
@@ -288,13 +289,21 @@ def test_reset_and_save(bench, arm, samples, tmp_path):
 
 
 def test_saving_nothing_is_refused_and_overwrites_nothing(bench, tmp_path):
-    (tmp_path / 'model.yaml').write_text('of yesterday')
+    yesterday = 'schema: armid/model/1\nof: yesterday\n'
+    (tmp_path / 'model.yaml').write_text(yesterday)
     node = identifying(bench, save_to=str(tmp_path))
     answer = bench.call('online_identifier/save')
     assert not answer.success and 'nothing has been learned' in answer.message
     node.close()
     assert [p.name for p in tmp_path.iterdir()] == ['model.yaml']
-    assert (tmp_path / 'model.yaml').read_text() == 'of yesterday'
+    assert (tmp_path / 'model.yaml').read_text() == yesterday
+
+
+def test_a_model_of_somebody_else_is_not_replaced_and_that_is_said_at_once(bench, tmp_path):
+    (tmp_path / 'model.yaml').write_text('mine: true')
+    with pytest.raises(OutputError, match='which armid did not write'):
+        identifying(bench, save_to=str(tmp_path))
+    assert (tmp_path / 'model.yaml').read_text() == 'mine: true'
 
 
 @pytest.mark.parametrize('asked', [True, False])

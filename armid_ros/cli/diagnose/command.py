@@ -22,7 +22,8 @@ from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.identification.parameters_file import identified_from, read_misfit
+from armid_ros.identification.identified_from import identified_from, require_as_identified
+from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
@@ -95,6 +96,7 @@ class DiagnosisData:
         found, asked = identified_from(model), [*self.bags, *self.validate]
         if {path.resolve() for path in found} & {path.resolve() for path in asked}:
             return self
+        require_as_identified(model)
         return replace(self, baseline=found)
 
     def read(
@@ -372,6 +374,6 @@ def _show_extras(out: Path, result: Diagnosis, extras: Extras) -> None:
         files.append(TABLE_FILE)
     if extras.next_run is not None:
         files.append(EXPERIMENT_FILE)
-    for step in extras.steps(result):
+    for step in extras.steps(result, str(out / 'model.yaml')):
         say(f'next: {step}')
     say(f'{out}: {", ".join(files)}')

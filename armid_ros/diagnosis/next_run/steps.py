@@ -10,6 +10,8 @@ asked for only where no planned motion tells the two names.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.diagnosis.verdict.naming import shown_best, two_names
@@ -17,14 +19,21 @@ from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
 
-_USE = 'Use model.yaml in simulation and control; keep these bags to compare with.'
+#: The patched model, as one finds it who reads a page.
+MODEL = 'model.yaml in the folder of this diagnosis'
 _ANEW = (
     'Identify the arm anew before the model is used in simulation or control: it is poor on the '
     'baseline itself.'
 )
 
 
-def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '') -> list[str]:
+def next_steps(
+    diagnosis: Diagnosis,
+    run: NextRun | None = None,
+    no_run: str = '',
+    model: str = MODEL,
+    worse: Sequence[str] = (),
+) -> list[str]:
     """
     Return what to do, in sentences, in the order in which a person would do it.
 
@@ -36,6 +45,10 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
         The run that was planned.
     no_run : str
         Why none was, if one was wanted.
+    model : str
+        Where the patched model is.
+    worse : sequence of str
+        Joints that a simulation with the patched model is farther off in.
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
@@ -53,12 +66,25 @@ def next_steps(diagnosis: Diagnosis, run: NextRun | None = None, no_run: str = '
     steps += [text for finding in findings for text in _records(finding, run)]
     if diagnosis.at_rest:
         steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
+    elif worse:
+        steps.append(
+            f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
+            f'than the model before in {", ".join(worse)}. Record more motions of '
+            f'{", ".join(worse)}, and diagnose all recordings together.'
+        )
     elif verdict in ('named', 'consistent'):
-        steps.append(_ANEW if diagnosis.doubt else _USE)
+        steps.append(_ANEW if diagnosis.doubt else _use(diagnosis, model))
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
     return steps
+
+
+def _use(diagnosis: Diagnosis, model: str) -> str:
+    """Say which model is to be used: the one that was given, unless it is patched."""
+    patched = bool(diagnosis.findings) and not diagnosis.harmful
+    which = f'the patched model, {model},' if patched else 'the model that was given'
+    return f'Use {which} in simulation and control; keep these bags to compare with.'
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:

@@ -64,8 +64,9 @@ class Attribution:
     denied: tuple[int, ...] = ()
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share of the gap that some of the names explain together."""
-        return float(self.taken[list(names)].sum() / max(float(self.whole.sum()), 1e-300))
+        """Return the share of the gap that some of the names explain together, at most all."""
+        share = self.taken[list(names)].sum() / max(float(self.whole.sum()), 1e-300)
+        return min(float(share), 1.0)
 
     def interval(self, names: Sequence[int], rng: np.random.Generator) -> tuple[float, float]:
         """Return the 95 % interval of that share."""
@@ -73,7 +74,7 @@ class Attribution:
         taken = self.taken[list(names)].sum(axis=0)[drawn].sum(axis=1)
         shares = taken / np.maximum(self.whole[drawn].sum(axis=1), 1e-300)
         low, high = np.quantile(shares, [0.025, 0.975])
-        return float(low), float(high)
+        return min(float(low), 1.0), min(float(high), 1.0)
 
 
 def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:

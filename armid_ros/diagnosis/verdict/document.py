@@ -9,10 +9,12 @@ It also holds the smallest detectable size of each effect: what it is worth that
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 import math
 from typing import Any
 
+from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.trial import IDENTIFIABLE, ROUNDING, Survey, Trial
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
@@ -149,21 +151,31 @@ def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
 def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the best candidates of the first look, in the order of their ranking."""
     explanation = diagnosis.explanation
-    survey = None if explanation is None else explanation.survey
-    if survey is None:
+    if explanation is None or explanation.survey is None:
         return []
-    return [_candidate(trial, survey) for trial in survey.ranking[:_MOST_CANDIDATES]]
+    survey, arm = explanation.survey, explanation.given
+    return [_candidate(trial, survey, arm) for trial in survey.ranking[:_MOST_CANDIDATES]]
 
 
-def _candidate(trial: Trial, survey: Survey) -> dict[str, Any]:
+def share_alone(trial: Trial, survey: Survey) -> float:
+    """
+    Return the share of the gap that a candidate takes if it is alone, at most all of it.
+
+    Where the values of a model are fitted beside it, it may take more than the model alone leaves.
+
+    """
+    return min(trial.gain / max(survey.total, 1e-300), 1.0)
+
+
+def _candidate(trial: Trial, survey: Survey, arm: ArmModel) -> dict[str, Any]:
     return {
         'name': trial.candidate.effect.said_as,
         'joints': list(trial.candidate.effect.joints),
-        'share': min(trial.gain / max(survey.total, 1e-300), 1.0),
+        'share': share_alone(trial, survey),
         'held_out_gain': trial.gain,
         'replicated_in': trial.replicated,
         'visible_fraction': trial.visible,
-        'min_detectable': _finite(smallest_size(trial, _material(trial, survey))[1]),
+        'min_detectable': _finite(_said_size(trial, survey, arm)[1]),
         'adjusted_p': min(1.0, trial.p * survey.tried),
     }
 
@@ -179,7 +191,7 @@ def _detectable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             'unit': '' if row.parameter is None else row.parameter.unit,
             'visible_fraction': row.visible,
         }
-        for row in detectable(diagnosis.explanation, diagnosis.arm.robot)
+        for row in detectable(diagnosis.explanation)
     ]
 
 
@@ -222,12 +234,40 @@ def smallest_size(trial: Trial, material: FloatArray) -> tuple[int, float]:
     larger than the parameter can be.
 
     """
+    return next(_sizes(trial, material), (trial.candidate.kept[0], float('inf')))
+
+
+def _sizes(trial: Trial, material: FloatArray) -> Iterator[tuple[int, float]]:
+    """Yield every identifiable parameter of a candidate with its smallest detectable size."""
+    effect, robot = trial.candidate.effect, trial.candidate.robot
     rows = zip(trial.candidate.kept, trial.std, trial.resolution, material, strict=True)
     for index, std, resolution, least in rows:
         size = max(_SHOWS * float(std), float(least))
-        if resolution > IDENTIFIABLE and _possible(trial.candidate.effect, index, size):
-            return index, size
-    return trial.candidate.kept[0], float('inf')
+        if resolution > IDENTIFIABLE and _possible(effect, index, size, robot):
+            yield index, size
+
+
+def _said_size(trial: Trial, survey: Survey, arm: ArmModel) -> tuple[ParameterName, float]:
+    """
+    Return a parameter of the effect that a candidate is said as, and its smallest detectable size.
+
+    It is inf where no size that the effect can have is detectable.
+
+    """
+    effect, material = trial.candidate.effect, _material(trial, survey)
+    names = effect.parameters(arm.robot)
+    if effect.said_as == effect.name:
+        index, size = smallest_size(trial, material)
+        return names[index], size
+    for index, size in _sizes(trial, material):
+        values = np.where(np.arange(len(names)) == index, size, 0.0)
+        for said, theirs in effect.named_as(values, arm):
+            most = int(np.argmax(np.abs(theirs)))
+            there = float(abs(theirs[most]))
+            called_so = said.name == effect.said_as and there > 0.0
+            if called_so and _possible(said, most, there, arm.robot):
+                return said.parameters(arm.robot)[most], there
+    return names[trial.candidate.kept[0]], float('inf')
 
 
 def _material(trial: Trial, survey: Survey) -> FloatArray:
@@ -236,30 +276,29 @@ def _material(trial: Trial, survey: Survey) -> FloatArray:
     return survey.material.get(trial.candidate.key, always)
 
 
-def _possible(effect: Effect, index: int, size: float) -> bool:
+def _possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     """
     Return whether a parameter can be as large as a size.
 
-    It cannot be beyond its bounds. Where the largest value that arms have would show less than
-    rounding errors do, the motion does not show the effect at all.
+    It cannot be larger than its quantity is. Where the largest value that arms have would show
+    less than rounding errors do, the motion does not show the effect at all.
 
     """
-    lower, upper = effect.bounds()
-    typical = effect.quantities[index % len(effect.quantities)].typical
-    largest = typical[1] if typical else 1.0
-    return bool(size <= max(upper[index], -lower[index]) and ROUNDING * size < largest)
+    owner, which = divmod(index, len(effect.quantities))
+    quantity = effect.quantities[which]
+    largest = quantity.typical[1] if quantity.typical else 1.0
+    return size <= quantity.largest(effect.owners[owner], robot) and ROUNDING * size < largest
 
 
-def detectable(explanation: Explanation | None, robot: Robot) -> tuple[Detectable, ...]:
+def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
     """Return the detectable sizes of all effects on all joints, in the order of the catalogue."""
     survey = None if explanation is None else explanation.survey
-    if survey is None:
+    if explanation is None or survey is None:
         return ()
     rows = []
     for trial in (*survey.ranking, *survey.nuisance):
         effect = trial.candidate.effect
-        index, size = smallest_size(trial, _material(trial, survey))
-        parameter = effect.parameters(robot)[index]
+        parameter, size = _said_size(trial, survey, explanation.given)
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
     rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]
     order = {name: position for position, name in enumerate(CATALOGUE)}

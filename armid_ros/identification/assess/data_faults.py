@@ -25,10 +25,10 @@ from armid_ros.identification.assess.hypotheses import (
     InUnit,
     OtherUnit,
     Reversed,
-    unit_of,
 )
 from armid_ros.identification.assess.joint_units import units_beside_model, units_beyond_drives
 from armid_ros.identification.assess.mistakes import effort_factor, find_mistake, slow_motions
+from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import (

@@ -18,6 +18,7 @@ from itertools import combinations
 from typing import ClassVar, Literal
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
+from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.rows.checks import TORQUE_UNITS
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
@@ -33,9 +34,6 @@ TURNS = (-135, -90, -45, 45, 90, 135, 180)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
-#: A factor of torques is that of a unit if it is within this factor of it: masses of a description
-#: are off by less.
-NEAR = 1.5
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
 
@@ -363,17 +361,6 @@ class Faulty(Hypothesis):
         """Say how many, and where the first is."""
         many = '' if self.count == 1 else f' (the first of {self.count})'
         return f'{self.what}{many}: leave out what is faulty, or record again'
-
-
-def unit_of(factor: float) -> str:
-    """Return the unit, or two, in which torques are that are so many times too large, or ''."""
-    if factor <= 0.0:
-        return ''
-    known = {**TORQUE_UNITS, 'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0))}
-    off = {unit: abs(np.log(factor / count)) for unit, count in known.items()}
-    return ' or '.join(
-        unit for unit in sorted(off, key=off.__getitem__) if off[unit] < np.log(NEAR)
-    )
 
 
 def hypotheses(robot: Robot) -> Iterator[Hypothesis]:

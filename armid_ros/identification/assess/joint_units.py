@@ -13,7 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.hypotheses import InUnit, NEAR
+from armid_ros.identification.assess.hypotheses import InUnit
+from armid_ros.identification.assess.torque_units import NEAR
 from armid_ros.identification.rows.checks import TORQUE_UNITS
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion

@@ -30,6 +30,9 @@ LONGEST = 30.0
 #: Samples that tell the bias of encoder noise well enough, all simulations together.
 _ENOUGH = 300_000
 _MOST_REPEATS = 6
+#: A joint is worse where its error grows by this share, and by this share of the largest error of
+#: joints of its kind; reversals of friction vary by less from one model to the next.
+_WORSE = 0.05
 
 
 @dataclass(frozen=True)
@@ -50,10 +53,36 @@ class ForwardValidation:
     def sentence(self) -> str:
         """Say how far the simulations are off."""
         before = '' if self.before is None else f'{self.before.worst} before, '
+        comment = self.comment()
         return (
             f'simulated in closed loop along {np.ptp(self.after.motion.t):.0f} s of '
             f'{self.after.source}: position error at most {before}{self.after.worst} after'
+            f'{"; " if comment else ""}{comment}'
         )
+
+    @property
+    def worse(self) -> tuple[str, ...]:
+        """Joints that are farther off after than before, by more than simulations vary."""
+        if self.before is None:
+            return ()
+        before, after = self.before.position_error, self.after.position_error
+        units = np.array(self.after.units)
+        largest = np.array([after[units == unit].max() for unit in units])
+        grown = after - before > _WORSE * np.maximum(before, largest)
+        return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
+
+    def comment(self) -> str:
+        """Say where it got worse, or that the largest error did not get better; '' otherwise."""
+        if self.before is None:
+            return ''
+        if self.worse:
+            return f'it is worse than before in {", ".join(self.worse)}'
+        before, after = self.before.position_error, self.after.position_error
+        first = int(np.argmax(after))
+        changed = bool(np.any(after < (1.0 - _WORSE) * before))
+        if changed and after[first] > (1.0 - _WORSE) * before[first]:
+            return f'it is no better than before in {self.after.joints[first]}'
+        return ''
 
     def document(self) -> dict[str, Any]:
         """Return the errors for programs to read."""

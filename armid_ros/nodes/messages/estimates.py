@@ -11,10 +11,13 @@ from armid_ros.arm.model_file import parameter_table, save_model
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate
 from armid_ros.files import write_file
+from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.identifier import OnlineIdentifier
 import yaml
 
 SCHEMA = 'armid/estimate/1'
+#: What is written: the estimate, a model that has it, and the robot of that.
+FILES = ('estimate.yaml', 'model.yaml', 'robot.urdf')
 
 
 def estimate_message(
@@ -48,8 +51,11 @@ def save_identification(folder: Path, identifier: OnlineIdentifier) -> tuple[Pat
     ------
     ModelError
         If the folder cannot be written to.
+    OutputError
+        If it has files of these names that are no results.
 
     """
+    refuse_replacing(folder, FILES)
     robot, estimate = identifier.arm.robot, identifier.estimate()
     document = {
         'schema': SCHEMA,
@@ -61,7 +67,7 @@ def save_identification(folder: Path, identifier: OnlineIdentifier) -> tuple[Pat
             estimate.parameters, estimate.values, [float(s) for s in estimate.std]
         ),
     }
-    paths = tuple(folder / name for name in ('estimate.yaml', 'model.yaml', 'robot.urdf'))
+    paths = tuple(folder / name for name in FILES)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_file(paths[2], robot.urdf)

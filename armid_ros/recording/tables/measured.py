@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
-from armid_ros.recording.series import GAP_PERIODS, longest_run
+from armid_ros.recording.series import GAP_PERIODS, longest_run, not_finite
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import gear_matrix, per_joint, TIME_UNITS
@@ -36,7 +36,7 @@ def measured(plan: TablePlan) -> Recording:
     table = plan.table
     t, start = _times(plan)
     values = {source.quantity: source.values() for source in plan.sources}
-    kept, nan = _finite(plan, t, values)
+    kept, culprits = _finite(plan, t, values)
     rows = np.flatnonzero(kept)
     run = longest_run(np.round(t[rows] * 1e9).astype(np.int64)) or slice(None)
     restarted = len(rows) - len(rows[run])
@@ -61,7 +61,8 @@ def measured(plan: TablePlan) -> Recording:
         duplicates=duplicates,
         out_of_order=late,
         restarted=restarted,
-        nan=nan,
+        nan=int((~kept).sum()),
+        not_finite=culprits,
         gaps=_gaps(time),
         absent=plan.absent,
         damage='; '.join(note for note in table.notes if 'cut off' in note),
@@ -97,26 +98,25 @@ def _finite(
     plan: TablePlan,
     t: FloatArray,
     values: Mapping[QuantityName, FloatArray],
-) -> tuple[npt.NDArray[np.bool_], int]:
-    """Return the rows in which everything is a number; refuse when they are few."""
-    good = np.isfinite(t)
-    for array in values.values():
-        good &= np.isfinite(array).all(axis=1)
+) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
+    """Return where everything is a number, and whose values are not; refuse when many are not."""
+    bad, culprits = not_finite(plan.joints, values.items(), len(t))
+    good = np.isfinite(t) & ~bad
     lost = int((~good).sum())
     if lost > _MAX_NOT_FINITE * len(t):
         for source in plan.sources:
             for column in source.chosen.columns:
-                bad = np.flatnonzero(~np.isfinite(column.values))
-                if len(bad) > _MAX_NOT_FINITE * len(t):
+                empty = np.flatnonzero(~np.isfinite(column.values))
+                if len(empty) > _MAX_NOT_FINITE * len(t):
                     raise RecordingError(
-                        f'{plan.table.source}: column {column.name} has no number in {len(bad)} '
-                        f'of {len(t)} rows, first in {plan.table.where(int(bad[0]))}; leave '
+                        f'{plan.table.source}: column {column.name} has no number in {len(empty)} '
+                        f'of {len(t)} rows, first in {plan.table.where(int(empty[0]))}; leave '
                         f'{source.quantity} out with --{source.quantity} none, or mend the file'
                     )
         raise RecordingError(
             f'{plan.table.source}: {lost} of {len(t)} rows have a value that is no number'
         )
-    return good, lost
+    return good, culprits
 
 
 def _joint_side(

@@ -5,9 +5,9 @@
 (() => {
   const root = document.documentElement;
   const roles = ['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint',
-    'ink', 'soft', 'line', 'grid'];
+    'ink', 'soft', 'line', 'grid', 'paper'];
   const widths = {measured: 3, faint: 1.3, trend: 2};
-  const font = '11px system-ui, sans-serif';
+  const font = '12px system-ui, sans-serif';
   const charts = new Map();  // figure -> {plot, spec}
   let colour = {};
 
@@ -64,7 +64,9 @@
         high = Math.max(Math.abs(low), Math.abs(high));
         low = -high;
       }
-      const pad = 0.07 * (high - low) || 0.1 * Math.abs(high) || 1;
+      // What differs by rounding alone is flat: six digits of a tick would all be alike.
+      const span = high - low > 1e-5 * Math.max(Math.abs(low), Math.abs(high)) ? high - low : 0;
+      const pad = 0.07 * span || 0.1 * Math.abs(high) || 1;
       const flat = (edge) => edge === 0 && !spec.symmetric;
       return [flat(low) ? 0 : low - pad, flat(high) ? 0 : high + pad];
     };
@@ -96,8 +98,8 @@
       ...(whole ? {incrs: [1, 2, 5, 10, 20, 50, 100]} : {}),
       label: label || null, side, font, labelFont: font, labelSize: 18, labelGap: 0, gap: 4,
       stroke: () => colour.soft,
-      size: vertical ? (u, values) => 16 + 6.4 * Math.max(6, ...(values || []).map((v) => v.length)) : 26,
-      space: vertical ? 18 : 55,
+      size: vertical ? (u, values) => 16 + 7 * Math.max(5, ...(values || []).map((v) => v.length)) : 26,
+      space: vertical ? 22 : 60,
       values: (u, splits) => splits.map((value) => (value == null ? '' : String(Number(value.toPrecision(6))))),
       grid: {stroke: () => colour.grid, width: 1},
       ticks: {stroke: () => colour.line, width: 1, size: 4},
@@ -109,6 +111,17 @@
     ctx.strokeStyle = ctx.fillStyle = colour.soft;
     ctx.lineWidth = uPlot.pxRatio;
     ctx.font = `${10 * uPlot.pxRatio}px system-ui, sans-serif`;
+  }
+
+  // Text that can be read on top of a curve.
+  function write(ctx, text, x, y) {
+    ctx.save();
+    ctx.strokeStyle = colour.paper;
+    ctx.lineWidth = 3 * uPlot.pxRatio;
+    ctx.lineJoin = 'round';
+    ctx.strokeText(text, x, y);
+    ctx.restore();
+    ctx.fillText(text, x, y);
   }
 
   function drawMarks(spec) {
@@ -138,6 +151,7 @@
       const {ctx, bbox} = u;
       withSoftPen(ctx);
       ctx.textAlign = 'right';
+      ctx.textBaseline = 'bottom';
       for (const level of spec.levels) {
         const y = u.valToPos(level.y, 'y', true);
         ctx.setLineDash([4 * uPlot.pxRatio, 3 * uPlot.pxRatio]);
@@ -145,7 +159,8 @@
         ctx.moveTo(bbox.left, y);
         ctx.lineTo(bbox.left + bbox.width, y);
         ctx.stroke();
-        ctx.fillText(level.label, bbox.left + bbox.width - 2, y - 3 * uPlot.pxRatio);
+        ctx.setLineDash([]);
+        write(ctx, level.label, bbox.left + bbox.width - 2, y - 2 * uPlot.pxRatio);
       }
       ctx.restore();
     };

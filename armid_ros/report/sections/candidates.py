@@ -11,8 +11,9 @@ from typing import ClassVar
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.round import cost
-from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.diagnosis.search.trial import Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict.document import share_alone
 from armid_ros.report.notation import percent, probability, with_interval
 from armid_ros.report.page import Section
 import numpy as np
@@ -64,22 +65,22 @@ class CandidateTable(Section):
         survey = None if explanation is None else explanation.survey
         if survey is None:
             return []
-        return [self._row(trial, survey.total, survey.tried) for trial in survey.ranking[:_MOST]]
+        return [self._row(trial, survey) for trial in survey.ranking[:_MOST]]
 
-    def _row(self, trial: Trial, total: float, tried: int) -> CandidateRow:
+    def _row(self, trial: Trial, survey: Survey) -> CandidateRow:
         effect = trial.candidate.effect
         names = {finding.name for finding in self.diagnosis.findings}
         price = self.settings.thresholds.price * cost(trial, self.settings)
         return CandidateRow(
             effect.name.replace('_', ' '),
             ', '.join(effect.joints) or 'whole arm',
-            percent(trial.gain / total) if total > 0.0 else '',
+            percent(share_alone(trial, survey)) if survey.total > 0.0 else '',
             percent(price),
             f'{trial.z:.1f}',
-            probability(min(1.0, trial.p * tried)),
+            probability(min(1.0, trial.p * survey.tried)),
             self._value(trial),
             percent(trial.visible),
-            effect.name in names,
+            effect.said_as in names,
         )
 
     def _value(self, trial: Trial) -> str:

@@ -17,6 +17,8 @@ import numpy as np
 #: Samples of one curve on the page.
 _MOST = 2000
 _LINK = 'time'
+#: No encoder of an arm resolves less [rad or m].
+_FINEST = 1e-7
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,12 @@ class JointTable(Section):
 
     @property
     def heads(self) -> tuple[str, ...]:
-        """Heads of the columns, with units."""
-        return joint_heads(self.found)
+        """Heads of the columns, with units; none is broken within its unit."""
+        heads, units = list(joint_heads(self.found)), set(self.found.units)
+        if len(units) == 1:
+            for column, like in ((2, 1), (5, 1), (8, 7)):
+                heads[column] += heads[like][heads[like].index(' [') :]
+        return tuple(head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads)
 
     @property
     def rows(self) -> list[tuple[str, ...]]:
@@ -158,6 +164,13 @@ def joint_rows(found: Inspection) -> list[tuple[str, ...]]:
     ]
 
 
+def _step(size: float) -> str:
+    """Write the smallest change of a position; of what no encoder resolves, that it is less."""
+    if size and size < _FINEST:
+        return f'< {_FINEST:.0e}'.replace('e-0', 'e-')
+    return f'{size:.2g}' if size else '-'
+
+
 def _row(joint: JointFacts, unit: str) -> tuple[str, ...]:
     efforts = (joint.effort_rms, joint.effort_largest)
     return (
@@ -166,7 +179,7 @@ def _row(joint: JointFacts, unit: str) -> tuple[str, ...]:
         f'{joint.upper:.3g}{unit}',
         digits(joint.speed),
         f'{100 * joint.moving:.0f} %',
-        f'{joint.step:.2g}' if joint.step else '-',
+        _step(joint.step),
         '-' if joint.velocity_ratio is None else f'{joint.velocity_ratio:.3g}',
         *('-' if effort is None else digits(effort) for effort in efforts),
     )

@@ -12,9 +12,9 @@ from armid_ros.identification.assess.hypotheses import (
     hypotheses,
     known_gravity,
     OtherUnit,
-    unit_of,
 )
 from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
@@ -257,7 +257,13 @@ def test_a_unit_of_all_torques_is_no_gravity_and_no_current(robot, factor, unit,
     assert not found.hypotheses[0].disputable
 
 
-@pytest.mark.parametrize('factor', [0.5, 0.7, 1.1, 1.5, 5.0, 20.0])
+@pytest.mark.parametrize(('factor', 'unit'), [(0.102, 'kgf m'), (9.9, 'kgf cm'), (8.9, 'lbf in')])
+def test_a_unit_of_force_times_length_is_a_unit(factor, unit):
+    assert unit_of(factor).split(' or ')[0] == unit
+    assert unit_of(1.25 * factor)
+
+
+@pytest.mark.parametrize('factor', [1.62 / 9.81, 0.5, 0.7, 1.1, 1.5, 5.0, 20.0])
 def test_a_gain_is_no_unit(factor):
     assert unit_of(factor) == unit_of(-1000.0) == ''
 

@@ -1,7 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from types import SimpleNamespace
+
 from armid_ros.arm import ArmModel
 from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
+from armid_ros.identification.assess.verification import ForwardValidation
 import numpy as np
 import pytest
 
@@ -64,3 +67,25 @@ def test_what_is_not_done_is_said(result, recordings):
     assert found.forward[0].before is None
     assert 'the description is not simulated' in found.left_out[0]
     assert found.forward[0].document()['before'] is None
+
+
+@pytest.mark.parametrize(
+    ('before', 'after', 'comment'),
+    [
+        ([2e-3, 20e-3], [1e-3, 30e-3], 'it is worse than before in elbow'),
+        ([2e-3, 20e-3], [1e-3, 20.1e-3], 'it is no better than before in elbow'),
+        ([2e-3, 20e-3], [1e-3, 10e-3], ''),
+        ([2e-3, 20e-3], [2e-3, 20e-3], ''),
+        ([1e-6, 20e-3], [2e-6, 10e-3], ''),
+    ],
+)
+def test_a_simulation_that_is_worse_or_no_better_is_said_to_be(before, after, comment):
+    before, after = (
+        SimpleNamespace(
+            position_error=np.array(errors), units=('rad', 'rad'), joints=('shoulder', 'elbow')
+        )
+        for errors in (before, after)
+    )
+    pair = ForwardValidation(before, after)
+    assert pair.comment() == comment
+    assert pair.worse == (('elbow',) if 'worse' in comment else ())

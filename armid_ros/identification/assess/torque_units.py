@@ -1,0 +1,30 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which unit torques are in, by the factor that they are too large."""
+
+from __future__ import annotations
+
+from armid_ros.identification.rows.checks import TORQUE_UNITS
+import numpy as np
+
+#: A factor of torques is that of a unit if it is within this factor of it: masses of a description
+#: are off by less.
+NEAR = 1.5
+#: Units of a force on a lever [1/(N m)], which all joints have at once: of one joint alone a load
+#: makes the torque ten times as large.
+_FORCE_UNITS = {'kgf m': 1.0 / 9.80665, 'kgf cm': 100.0 / 9.80665, 'lbf in': 1.0 / 0.1129848}
+#: The same for those, for a sixth is the gravity of the Moon and no unit.
+_NEAR_FORCE = 1.3
+_OF_JOINTS = {**TORQUE_UNITS, 'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0))}
+
+
+def unit_of(factor: float) -> str:
+    """Return the unit, or two, in which torques are that are so many times too large, or ''."""
+    if factor <= 0.0:
+        return ''
+    off = {
+        unit: abs(float(np.log(factor / per))) / float(np.log(near))
+        for units, near in ((_OF_JOINTS, NEAR), (_FORCE_UNITS, _NEAR_FORCE))
+        for unit, per in units.items()
+    }
+    return ' or '.join(unit for unit in sorted(off, key=off.__getitem__) if off[unit] < 1.0)

@@ -1,0 +1,146 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which recordings a model was identified from: identification.json beside it says it.
+
+They are the baseline of a diagnosis. Each has its size and a digest there, for a recording of
+another day may be at the same path by then.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import ModelError
+from armid_ros.files import is_file, load_json, read_text, reading
+
+#: Beginning and end of each file that the digest is of [bytes]: a bag begins with its time stamps
+#: and ends with its index, so that no two are alike there, and all of a large one takes long.
+_END = 1 << 20
+#: Written anew by tools that do not touch the data.
+_NOT_DATA = 'metadata.yaml'
+
+
+@dataclass(frozen=True)
+class FileContent:
+    """
+    What a recording holds, as far as it is needed to tell it from another one.
+
+    Attributes
+    ----------
+    size : int
+        Of its files together [bytes].
+    digest : str
+        SHA-256 of their sizes and of their beginnings and ends, in hexadecimal digits.
+
+    """
+
+    size: int
+    digest: str
+
+    @classmethod
+    def of(cls, path: Path) -> FileContent:
+        """
+        Read the content of a file, or of the files of a folder such as a bag.
+
+        Raises
+        ------
+        OSError
+            If one cannot be read.
+
+        """
+        inside = sorted(path.rglob('*')) if path.is_dir() else [path]
+        digest, total = hashlib.sha256(), 0
+        for file in inside:
+            if not file.is_file() or file.name == _NOT_DATA:
+                continue
+            size = file.stat().st_size
+            total += size
+            digest.update(f'{size};'.encode())
+            with file.open('rb') as stream:
+                digest.update(stream.read(_END))
+                stream.seek(max(_END, size - _END))
+                digest.update(stream.read(_END))
+        return cls(total, digest.hexdigest())
+
+
+def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return identification.json with the contents of its recordings, of those that are there."""
+    there = [(name, Path(name)) for name in _names(document)]
+    rows = [{'bag': name, **asdict(FileContent.of(path))} for name, path in there if path.exists()]
+    return {**document, 'recordings': rows}
+
+
+def identified_from(path: str | Path) -> tuple[Path, ...]:
+    """
+    Return the recordings that a model was identified from, held-out ones included, that are there.
+
+    Parameters
+    ----------
+    path : str or Path
+        model.yaml; the identification.json beside it names them. Paths that are relative start
+        here, in that folder, or in the one that it is in.
+
+    Raises
+    ------
+    ModelError
+        If identification.json cannot be read.
+
+    """
+    return tuple(_found(Path(path)))
+
+
+def require_as_identified(path: str | Path) -> None:
+    """
+    Refuse recordings that have been written over since a model was identified from them.
+
+    Parameters
+    ----------
+    path : str or Path
+        model.yaml. An identification.json of before sizes and digests were kept is believed.
+
+    Raises
+    ------
+    ModelError
+        Naming the recording, and what to do.
+
+    """
+    for place, known in _found(Path(path)).items():
+        if known is not None and FileContent.of(place) != known:
+            raise ModelError(
+                f'{place}: is not the recording any more that {path} was identified from, its '
+                'content is another; name the baseline (--baseline), ask without one '
+                '(--no-baseline), or identify the arm again'
+            )
+
+
+def _found(model: Path) -> dict[Path, FileContent | None]:
+    """Return the recordings of a model that are there, and what they held, where that is known."""
+    beside = model.with_name('identification.json')
+    if not is_file(beside):
+        return {}
+    text = read_text(beside, ModelError)
+    with reading(beside, ModelError):
+        document = load_json(text)
+        known = {
+            str(row['bag']): FileContent(int(row['size']), str(row['digest']))
+            for row in document.get('recordings', [])
+        }
+        starts = (Path(), beside.parent, beside.parent.parent)
+        places = [(name, [start / name for start in starts]) for name in _names(document)]
+    return {
+        place: known.get(name)
+        for name, some in places
+        if (place := next((one for one in some if one.exists()), None)) is not None
+    }
+
+
+def _names(document: Mapping[str, Any]) -> list[str]:
+    """Return the recordings that a document names, those that were held out last."""
+    validation = (row['bag'] for row in document.get('validation', []))
+    return [str(name) for name in (*document['training']['bags'], *validation) if name]
