@@ -39,7 +39,7 @@ from armid_ros.diagnosis.verdict.gap import (
 )
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, locate, Where
-from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, Verdict
+from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, suspicion, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.motion import FloatArray
@@ -218,10 +218,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     data = evidence.data
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
     left, resting = _excesses(asked, chosen, names, unseen)
-    total = float(attribute(explanation, None).whole.sum())
-    tried = 1 if explanation.survey is None else explanation.survey.tried
-    small = sorted(explanation.minor, key=lambda trial: -trial.gain)
-    minor = small_print(small, max(total, 1e-300), tried, arm)
+    minor, suspected = _not_named(explanation, arm)
     matters = settings.material * evidence.torque_rms
     refitted = frees_body(explanation.base, explanation.given)
     word = decide(
@@ -241,7 +238,9 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *_unpatched(found, worse), *_doubts(asked, chosen, word)]),
+        summary=' '.join(
+            [word.summary, *_unpatched(found, worse), *_doubts(asked, chosen, word, suspected)]
+        ),
         findings=found,
         minor=minor,
         where=_where(explanation, shown, settings) or places_held(arm, resting),
@@ -259,7 +258,20 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
         doubt=chosen.doubt,
+        suspected=suspected,
     )
+
+
+def _not_named(
+    explanation: Explanation, arm: ArmModel
+) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+    """Return the small print, and where nothing is named the cause that is suspected."""
+    total = max(float(attribute(explanation, None).whole.sum()), 1e-300)
+    survey, small = explanation.survey, sorted(explanation.minor, key=lambda trial: -trial.gain)
+    tried = 1 if survey is None else survey.tried
+    may_be = () if survey is None or survey.suspected is None else (survey.suspected,)
+    suspected = () if explanation.steps else small_print(may_be, total, tried, arm)
+    return small_print(small, total, tried, arm), suspected
 
 
 def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
@@ -270,12 +282,21 @@ def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
     return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
 
 
-def _doubts(asked: _Asked, chosen: Chosen, verdict: Verdict) -> list[str]:
-    """Say what would tell a change from a misfit, why a model may be wrong, what did not move."""
+def _doubts(
+    asked: _Asked, chosen: Chosen, verdict: Verdict, suspected: Sequence[Finding]
+) -> list[str]:
+    """
+    Say what is in doubt.
+
+    It is a cause that more recordings may tell, what would tell a change from a misfit, why the
+    model may be wrong, and what did not move.
+
+    """
     remedy = chosen.untested if verdict.word == 'unknown' else ''
     still = ', '.join(at_rest(asked.prepared.data, asked.arm.robot.joints))
     not_checked = f'Not checked: {still} did not move.' if still else ''
-    return [text for text in (remedy, chosen.doubt, not_checked) if text]
+    doubts = (*map(suspicion, suspected), remedy, chosen.doubt, not_checked)
+    return [text for text in doubts if text]
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:

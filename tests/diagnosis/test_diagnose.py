@@ -188,6 +188,7 @@ def test_the_document_has_what_the_schema_says(bench):
         'summary',
         'effects',
         'minor',
+        'suspected',
         'baseline',
         'where',
         'gap',

@@ -24,6 +24,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
         doubt='',
         harmful=False,
         at_rest=(),
+        suspected=(),
         arm=SimpleNamespace(effects=effects),
         explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
     )

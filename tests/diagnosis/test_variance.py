@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.search.round import Later
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.search.variance import Changed, Recordings, UsualSpread, Variance
+from armid_ros.diagnosis.verdict.words import suspicion
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification import identify
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.signals import Conditioning
+from armid_ros.report.diagnosis_report import tone_of
 import numpy as np
 import pytest
 from scipy import stats
@@ -224,6 +227,19 @@ def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench, co
     assert [(one.name, one.joints) for one in found.findings] == [
         ('coulomb_friction', ('elbow',))
     ] * (count > 2), found.summary
+
+
+def test_a_change_that_few_recordings_hardly_tell_is_suspected_and_not_named(bench):
+    rng = np.random.default_rng(0)
+    old, new = worn(bench, (1, 2, 3), 0.0), worn(bench, (11, 12, 13), 0.4)
+    arm = identify(bench.arm, old, rng=rng).arm
+    found = diagnose(arm, new, baseline=old, rng=rng)
+    assert (found.verdict, found.findings) == ('consistent', ()), found.summary
+    (suspected,) = found.suspected
+    assert (suspected.name, suspected.joints) == ('coulomb_friction', ('elbow',))
+    assert suspicion(suspected) in found.summary
+    assert any('three more motions' in step for step in next_steps(found))
+    assert tone_of(found) == 'fair'
 
 
 def test_stretches_of_one_recording_are_one_recording_of_the_test(bench):

@@ -64,6 +64,7 @@ def next_steps(
     elif no_run:
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
+    steps += [_more(one) for one in diagnosis.suspected]
     if diagnosis.at_rest:
         steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
     elif worse:
@@ -78,6 +79,15 @@ def next_steps(
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
     return steps
+
+
+def _more(finding: Finding) -> str:
+    """Say how to learn whether a cause is there that recordings hardly tell."""
+    where = f' in {", ".join(finding.joints)}' if finding.joints else ''
+    return (
+        'Record three more motions, and diagnose all recordings together: that tells whether '
+        f'{finding.name.replace("_", " ")}{where} has changed.'
+    )
 
 
 def _use(diagnosis: Diagnosis, model: str) -> str:

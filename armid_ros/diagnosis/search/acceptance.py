@@ -95,6 +95,11 @@ def changed(trial: Trial, here: Round) -> bool:
     return here.tested is None or trial.candidate.key in here.tested.changed
 
 
+def may_have_changed(trial: Trial, here: Round) -> bool:
+    """Return whether more recordings may tell that a candidate has changed, where these do not."""
+    return here.tested is not None and trial.candidate.key in here.tested.suspected
+
+
 def tested(trials: Sequence[Trial], here: Round) -> Changed | None:
     """
     Test whether candidates have changed between the days; None where nothing tells.

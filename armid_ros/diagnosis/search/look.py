@@ -22,6 +22,7 @@ from armid_ros.diagnosis.search.acceptance import (
     inside,
     material,
     material_sizes,
+    may_have_changed,
     tested,
     without_echo,
 )
@@ -144,8 +145,9 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     here = replace(here, tested=tested(refined[:_LOOKED_AT], here))
     survey = _survey(candidates, ranking, here)
     ranking, there, closing, here = _examined(refined, here)
-    survey = replace(survey, there=tuple(there[:_SMALL_PRINT]))
     passing = tuple(_passing(ranking, closing, here))
+    suspected = next((trial for trial in passing if may_have_changed(trial, here)), None)
+    survey = replace(survey, there=tuple(there[:_SMALL_PRINT]), suspected=suspected)
     return Look(survey, passing, closing, tuple(ranking), here)
 
 

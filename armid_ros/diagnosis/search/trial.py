@@ -325,6 +325,8 @@ class Survey:
         Candidates that are significant, best first.
     nuisance : tuple of Trial
         Friction and offsets without given values, which are fitted jointly with all candidates.
+    suspected : Trial or None
+        The best candidate that might be named if more recordings told that it has changed.
 
     """
 
@@ -336,6 +338,7 @@ class Survey:
     unseen: tuple[tuple[str, tuple[str, ...]], ...]
     there: tuple[Trial, ...] = ()
     nuisance: tuple[Trial, ...] = ()
+    suspected: Trial | None = None
 
     def and_nuisance(self, trials: Sequence[Trial], least_visible: float) -> Survey:
         """Return the survey with trials of nuisance parameters."""

@@ -236,6 +236,11 @@ class Changed:
         """Candidates that have changed."""
         return self.surely | self.singly if self.surely else frozenset()
 
+    @property
+    def suspected(self) -> frozenset[Key]:
+        """Candidates that may have changed where none surely has."""
+        return frozenset() if self.surely else self.singly
+
     def and_surely(self, key: Key) -> Changed:
         """Return the same, a candidate having changed for another reason."""
         return replace(self, surely=self.surely | {key})

@@ -219,6 +219,9 @@ class Diagnosis:
         Whether the model is not patched, as the names would make it worse in some joint.
     doubt : str
         Why the model itself may be wrong, a sentence; empty if it need not be.
+    suspected : tuple of Finding
+        A cause that more recordings may tell from what those of one day differ by, where nothing
+        is named; empty if there is none.
 
     """
 
@@ -239,6 +242,7 @@ class Diagnosis:
     baseline: str
     harmful: bool = False
     doubt: str = ''
+    suspected: tuple[Finding, ...] = ()
 
     @property
     def at_rest(self) -> tuple[str, ...]:

@@ -173,6 +173,14 @@ def sentence(finding: Finding) -> str:
     return f'{_subject(finding)} explains {share_in_words(finding)}.'
 
 
+def suspicion(finding: Finding) -> str:
+    """Say what a cause would explain that the recordings do not tell from their own spread."""
+    return (
+        f'{_subject(finding)} would explain {share_in_words(finding)}: these recordings hardly '
+        'tell it from what those of one day differ by.'
+    )
+
+
 def share_in_words(finding: Finding, interval: bool = False) -> str:
     """
     Return the share of the gap that a cause takes, and the joint that needs it though it is small.
