@@ -150,7 +150,7 @@ def ask(
     )
     seconds = time.process_time() - begin
     answer = answer_of(diagnosis_document(found), seconds)
-    if contribution is None or found.gap is None:
+    if contribution is None or found.gap is None or not found.gap.predicted:
         return answer
     (held_out,) = validate
     return replace(answer, true_share=true_share(found.gap, held_out.t, contribution))

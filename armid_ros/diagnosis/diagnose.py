@@ -38,7 +38,7 @@ from armid_ros.diagnosis.verdict.gap import (
     places_held,
 )
 from armid_ros.diagnosis.verdict.naming import findings, small_print
-from armid_ros.diagnosis.verdict.where import Excess, locate, Where
+from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, suspicion, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data
@@ -61,6 +61,11 @@ _NO_MODEL = (
     'the model leaves {:.3g} times the torque of the baseline itself, more than no model would: '
     'it is that of another arm, or has other units; identify the arm from the baseline, and give '
     'that model'
+)
+#: Note where shares and gap are of the data that names were found in, though others were given.
+_HARDLY_SHOWN = (
+    'the recordings to validate hardly show what is named: gap and shares are of the recordings '
+    'that it was found in; validate with a motion that shows it'
 )
 #: Error where a partner was set and its ties would be left out.
 _ALONE = (
@@ -213,6 +218,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     measured = chosen.measured
     names = Names.of(replace(chosen, explanation=explanation), unseen, arm, settings)
     explanation, notes = names.stated, [*notes, *names.notes]
+    if unseen is not None and not names.shares.predicted:
+        notes.append(_HARDLY_SHOWN)
     found = findings(explanation, names.shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
     data = evidence.data
@@ -233,8 +240,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     )
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
-    gap = measure_gap(explanation, unseen)
-    shown = evidence if unseen is None else unseen
+    shown = unseen if names.shares.predicted else None
+    gap = measure_gap(explanation, shown)
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
@@ -243,9 +250,9 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         ),
         findings=found,
         minor=minor,
-        where=_where(explanation, shown, settings) or places_held(arm, resting),
-        left=_located(
-            explanation, explanation.fitted.arm, _shows(left, evidence, shown), settings
+        where=where_it_is(explanation, shown or evidence, settings) or places_held(arm, resting),
+        left=where_left(
+            explanation, explanation.fitted.arm, _shows(left, evidence, unseen), settings
         ),
         gap=gap,
         explanation=explanation.forgetting(),
@@ -310,44 +317,10 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
 
 
-def _where(
-    explanation: Explanation, shown: Evidence, settings: DiagnosisSettings
-) -> tuple[Where, ...]:
-    """
-    Locate the gap in the data that it is measured on.
-
-    Where something is named it is what the names take: a model may leave more of other joints, on
-    either day. Data that hardly show the names are no measure of that.
-
-    """
-    if not explanation.steps:
-        return _located(explanation, explanation.reference.arm, shown, settings)
-    for data in (shown, explanation.evidence):
-        before, after = (
-            data.residuals(one.arm) for one in (explanation.reference, explanation.fitted)
-        )
-        taken = data.chi2_per_row(before) - data.chi2_per_row(after)
-        least = settings.thresholds.tie * max(float(taken.sum()), 0.0)
-        places = locate(explanation.given, data, before, np.where(taken > least, taken, 0.0))
-        if places:
-            return places
-    return ()
-
-
-def _located(
-    explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
-) -> tuple[Where, ...]:
-    """Locate what an arm leaves of some data beyond the limits of the patched model."""
-    patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
-    losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
-    beyond = np.where(losses > limits, losses - 1.0, 0.0)
-    return locate(explanation.given, shown, left, beyond)
-
-
-def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence) -> Evidence:
+def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence | None) -> Evidence:
     """Return the data in which the worst of what is left shows, of which the sentence speaks."""
     worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
-    return evidence if worst == 0 else unseen
+    return evidence if unseen is None or worst == 0 else unseen
 
 
 def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:

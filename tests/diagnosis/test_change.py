@@ -64,6 +64,19 @@ def test_the_gap_is_where_the_cause_is_and_not_where_a_motion_shows_more_of_the_
     assert 'shoulder' in [place.joint for place in found.left]
 
 
+def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not_and_measures_nothing(bench):
+    def stirring(motion, tau):
+        return hose(motion, tau) + np.array([0.0, 0.5]) * motion.dq * np.abs(motion.dq)
+
+    after = bench.recordings(stirring, seed=2)[1:]
+    slow = bench.recordings(stirring, seed=3)[:1]
+    found = asked(bench, bench.recordings(hose, seed=1), after, slow)
+    assert [one.name for one in found.findings] == ['quadratic_friction'], found.summary
+    assert found.gap.data == 'the data it was found in'
+    assert any('hardly show what is named' in note for note in found.notes)
+    assert [place.joint for place in found.where] == ['elbow']
+
+
 @pytest.mark.parametrize('changed', [False, True])
 def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     """Something happened after the model was identified, and before the baseline."""
@@ -195,6 +208,7 @@ class Named:
     """Stands for an explanation: shares of its names, and whether their values may be zero."""
 
     steps: tuple[tuple[float, bool], ...]
+    predicted: bool = False
 
     def without(self, k):
         return Named(self.steps[:k] + self.steps[k + 1 :])
@@ -235,6 +249,16 @@ def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
     kept = attribution._as_stated(headline, None, None, DiagnosisSettings())
     assert [share for share, _ in kept.rest.steps] == stay
     assert kept.stated.steps == kept.rest.steps
+
+
+@pytest.mark.parametrize(('own', 'small'), [(0.4, None), (0.04, 0)])
+def test_small_print_takes_little_of_all_data(monkeypatch, own, small):
+    """A slow motion shows little of a drag that takes half of the gap of the others."""
+    monkeypatch.setattr(attribution, 'attribute', lambda named, unseen: Named(((own, False),)))
+    monkeypatch.setattr(attribution, 'may_be_nothing', lambda named, k: False)
+    monkeypatch.setattr(attribution, '_opens', lambda *arguments: False)
+    seen = Named(((0.05, False),), predicted=True)
+    assert attribution.smallest(seen, seen, DiagnosisSettings(), 0.1) == small
 
 
 @pytest.mark.parametrize(

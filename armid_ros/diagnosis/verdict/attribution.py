@@ -55,6 +55,8 @@ class Attribution:
         Gain of each name, in the order of the explanation.
     denied : tuple of int
         Names that the held-out data deny, last of the order first; see `denies`.
+    predicted : bool
+        Whether it is of held-out data, and not of folds of the data that names were fitted to.
 
     """
 
@@ -62,6 +64,7 @@ class Attribution:
     whole: FloatArray
     taken: FloatArray
     denied: tuple[int, ...] = ()
+    predicted: bool = False
 
     def share(self, names: Sequence[int]) -> float:
         """Return the share of the gap that some of the names explain together, at most all."""
@@ -156,7 +159,7 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
         if denies((gain + made)[:, own].sum(axis=1) / 2.0, made[:, own].sum(axis=1)):
             denied.append(k)
     whole = squares[0].sum(axis=1)
-    return Attribution(tuple(order), whole, taken, tuple(reversed(denied)))
+    return Attribution(tuple(order), whole, taken, tuple(reversed(denied)), predicted=True)
 
 
 def _acts(explanation: Explanation, name: int, evidence: Evidence) -> npt.NDArray[np.bool_]:
@@ -279,14 +282,16 @@ def smallest(
     Return the name of the smallest share that is small print; None if all are headline.
 
     A name is small print if all of its values may be zero and it does not explain most of the gap,
-    or if its share is below `least` and no gap opens without it.
+    or if its share is below `least`, in the data that it was found in as well, and no gap opens
+    without it.
 
     """
+    found = attribute(explanation, None) if shares.predicted else shares
     for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
         most = shares.share([k]) > settings.thresholds.open_share
         if not most and may_be_nothing(explanation, k):
             return k
-        small = shares.share([k]) < least
+        small = max(shares.share([k]), found.share([k])) < least
         if small and not _opens(explanation.without(k), explanation, settings):
             return k
     return None
@@ -310,7 +315,7 @@ def shares_of(
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
     shown = seen.share(names) > settings.thresholds.headline * left_out.share(names)
-    return seen if shown else replace(left_out, denied=seen.denied)
+    return seen if shown or not names else replace(left_out, denied=seen.denied)
 
 
 def may_be_nothing(explanation: Explanation, name: int) -> bool:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
@@ -87,6 +89,35 @@ class Excess:
 
     ratio: FloatArray
     where: str
+
+
+def where_it_is(
+    explanation: Explanation, shown: Evidence, settings: DiagnosisSettings
+) -> tuple[Where, ...]:
+    """
+    Locate the gap in the data that it is measured on.
+
+    Where something is named it is what the names take: a model may leave more of other joints, on
+    either day.
+
+    """
+    reference, fitted = explanation.reference.arm, explanation.fitted.arm
+    if not explanation.steps:
+        return where_left(explanation, reference, shown, settings)
+    before, after = shown.residuals(reference), shown.residuals(fitted)
+    taken = shown.chi2_per_row(before) - shown.chi2_per_row(after)
+    least = settings.thresholds.tie * max(float(taken.sum()), 0.0)
+    return locate(explanation.given, shown, before, np.where(taken > least, taken, 0.0))
+
+
+def where_left(
+    explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
+) -> tuple[Where, ...]:
+    """Locate what an arm leaves of some data beyond the limits of the patched model."""
+    patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
+    losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
+    beyond = np.where(losses > limits, losses - 1.0, 0.0)
+    return locate(explanation.given, shown, left, beyond)
 
 
 def locate(
