@@ -41,7 +41,7 @@ from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, suspicion, Verdict
 from armid_ros.errors import ModelError
-from armid_ros.identification.assess.data_faults import check_data
+from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -174,7 +174,12 @@ def diagnose(
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
     beside = written, seen, information, then
     explainer = Explainer(arm, prepared, known, rng, tell, settings, *beside)
-    return _said(explainer.chosen(), notes, asked)
+    result = _said(explainer.chosen(), notes, asked)
+    if result.verdict not in ('unknown', 'partial') and not result.doubt:
+        return result
+    tell(0.95, 'each recording by itself')
+    alone = mistaken_recordings(arm, [*recordings, *validate, *baseline], used)
+    return _bad(given, data, alone, notes) if alone else result
 
 
 def _left(

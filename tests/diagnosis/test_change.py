@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Between two days only what differs is named: not what was there, nor what the body can do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
 from armid_ros.diagnosis.search.choice import WRITTEN_MISFIT
@@ -75,6 +75,25 @@ def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not_and_measures_n
     assert found.gap.data == 'the data it was found in'
     assert any('hardly show what is named' in note for note in found.notes)
     assert [place.joint for place in found.where] == ['elbow']
+
+
+@pytest.mark.parametrize('of_today', [True, False])
+def test_one_recording_with_a_mistake_is_named_among_sound_ones(bench, of_today):
+    """It would be a gap without a name, or a misfit in which any change hides."""
+
+    def with_drag(motion, tau):
+        return hose(motion, tau) + np.array([0.0, 1.2]) * np.sign(motion.dq)
+
+    rng = np.random.default_rng(0)
+    before, after = bench.recordings(hose, seed=1), bench.recordings(with_drag, seed=2)
+    arm = identify(bench.arm, before, rng=rng).arm
+    days = {True: after, False: before}
+    mistaken = days[of_today][1]
+    tau = mistaken.tau * [1.0, -1.0]
+    days[of_today][1] = replace(mistaken, tau=tau, source='negated')
+    found = diagnose(arm, days[True], baseline=days[False], rng=rng)
+    assert found.verdict == 'bad_data', found.summary
+    assert 'negated: the torque of elbow seems to have the opposite sign' in found.summary
 
 
 @pytest.mark.parametrize('changed', [False, True])

@@ -171,6 +171,26 @@ def _mistaken(
     return [', or '.join(sentences)] if all(sentences) else []
 
 
+def mistaken_recordings(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
+) -> list[str]:
+    """
+    Say of which recordings names, signs or units are wrong, each by itself, with the remedy.
+
+    Where they are wrong in every one `check_data` says so.
+
+    """
+    said = []
+    for recording in recordings:
+        mistake = find_mistake(arm.body, recording, used)
+        faults = (
+            [] if mistake is None else [_fault(m, arm.robot, None) for m in mistake.hypotheses]
+        )
+        if faults and all(faults):
+            said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
+    return said
+
+
 def _velocities(recordings: Sequence[Recording]) -> list[str]:
     """Say of which recordings velocities and time do not go together."""
     said = [(one.source or 'recording', time_base_fault(one)) for one in recordings]

@@ -51,6 +51,8 @@ _KEPT = 0.4
 #: Second derivatives of torques, fourth of positions, are taken below this many bands of the
 #: motion: between two and five, elasticity is found all the same; at ten there is but noise.
 _CURVATURE_BANDS = 2.0
+#: Samples that a stretch has to have to have a spectrum.
+_LEAST_SAMPLES = 4
 #: Output samples that one matrix product makes; larger ones multiply more zeros of the band.
 _BLOCK = 16
 
@@ -147,7 +149,12 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
         crossings = [_noise_crossing(recording) for recording in recordings]
-        band = MODEL_BANDS * _motion_band([r.q for r in recordings], rate, crossings)
+        parts = [
+            (q, end)
+            for recording, end in zip(recordings, crossings, strict=True)
+            for q in _unbroken_positions(recording, rate)
+        ]
+        band = MODEL_BANDS * _motion_band(parts, rate)
         decimation = decimation or max(1, int(rate / (2.5 * band)))
         cutoff = cutoff or min(max(float(np.max(crossings)), band), 0.2 * rate)
     if cutoff >= 0.5 * rate:
@@ -220,15 +227,17 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     if recording.partner is not None:
         positions = np.hstack([positions, recording.partner.q])
     period = 1.0 / used.rate_hz
-    for part in _stretches(recording, used):
-        if len(part) > 3 and recording.t[part[-1]] - recording.t[part[0]] > _shortest(used):
+    for part in _unbroken(recording, used.rate_hz):
+        if len(part) >= _LEAST_SAMPLES and recording.t[part[-1]] - recording.t[
+            part[0]
+        ] > _shortest(used):
             t, q, tau = _even(recording.t[part], positions[part], recording.tau[part], period)
             yield _differentiated(recording, t, q, tau, used)
 
 
-def _stretches(recording: Recording, used: Conditioning) -> list[npt.NDArray[np.intp]]:
-    """Return the samples of every stretch without a gap."""
-    longest = GAP_PERIODS * max(1.0 / used.rate_hz, recording.period)
+def _unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
+    """Return the samples of every stretch without a gap: what is across one is no motion."""
+    longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
     return np.split(np.arange(len(recording.t)), breaks)
 
@@ -240,7 +249,7 @@ def _shortest(used: Conditioning) -> float:
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     """Say that no stretch is long enough for the filters, and how long one has to be."""
-    spans = [recording.t[part[[0, -1]]] for part in _stretches(recording, used)]
+    spans = [recording.t[part[[0, -1]]] for part in _unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
     return IdentificationError(
         f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
@@ -314,7 +323,7 @@ def _differentiated(
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
-    band = _CURVATURE_BANDS * _motion_band([smooth[:, :n]], used.rate_hz, [used.cutoff_hz])
+    band = _CURVATURE_BANDS * _motion_band([(smooth[:, :n], used.cutoff_hz)], used.rate_hz)
     beside = None
     if recording.partner is not None:
         beside = _points(recording.partner, smooth[inner, n:], dq[inner, n:])
@@ -341,23 +350,27 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
     return np.asarray(difference / (12.0 * step))
 
 
-def _motion_band(
-    positions: Sequence[FloatArray], rate: float, ends: Sequence[npt.ArrayLike]
-) -> float:
+def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
+    """Return the positions of every stretch without a gap, or of all where each is too short."""
+    parts = [part for part in _unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
+    return [recording.q[part] for part in parts] or [recording.q]
+
+
+def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
     """
     Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint.
 
-    What is above the end of a recording, of all its joints or each, is noise and does not count:
-    a joint that hardly moves has nothing but noise where another is still moving. All recordings
-    count together, for the same reason.
+    Stretches are positions and the frequency up to which they, or those of each joint, are no
+    noise. What is above does not count: a joint that hardly moves has nothing but noise where
+    another is still moving. All stretches count together, for the same reason.
 
     """
-    band = rate / max(len(q) for q in positions)
-    spectra = [_velocity_spectrum(q, rate) for q in positions]
-    for joint in range(positions[0].shape[1]):
+    band = rate / max(len(q) for q, _ in stretches)
+    spectra = [(*_velocity_spectrum(q, rate), end) for q, end in stretches]
+    for joint in range(stretches[0][0].shape[1]):
         kept = [
             (frequency[inside], power[inside, joint])
-            for (frequency, power), end in zip(spectra, ends, strict=True)
+            for frequency, power, end in spectra
             for inside in [frequency <= np.broadcast_to(end, power.shape[1])[joint]]
         ]
         frequency, power = (np.concatenate(part) for part in zip(*kept, strict=True))
@@ -404,8 +417,14 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
 
     """
     rate = sampling_rate(recording)
-    length = min(len(recording), int(8.0 * rate))
-    frequency, power = signal.welch(
-        recording.q, fs=rate, window='blackmanharris', nperseg=length, axis=0
-    )
+    parts = _unbroken_positions(recording, rate)
+    length = min(max(map(len, parts)), int(8.0 * rate))
+    long_enough = [q for q in parts if len(q) >= length]
+    spectra = [
+        signal.welch(q, fs=rate, window='blackmanharris', nperseg=length, axis=0)
+        for q in long_enough
+    ]
+    frequency = spectra[0][0]
+    weights = [len(q) for q in long_enough]
+    power = np.average([power for _, power in spectra], axis=0, weights=weights)
     return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)

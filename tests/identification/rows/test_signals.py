@@ -86,6 +86,15 @@ def test_a_gap_splits_a_recording(arm):
     assert parts[0].t[-1] < 4.0 < 4.5 < parts[1].t[0]
 
 
+def test_what_is_across_a_gap_is_no_motion(arm):
+    motion = multisine(arm.robot.joints, 40.0, 1000.0, seed=2)
+    whole = recorded(arm, motion, position_noise=1e-6)
+    cut = whole.select((whole.t < 20.0) | (whole.t > 22.0))
+    used = conditioning([whole], SignalSettings())
+    assert conditioning([cut], SignalSettings()).decimation > 0.5 * used.decimation
+    assert np.all(velocity_error(cut, used) < 2.0 * velocity_error(whole, used))
+
+
 def test_cutoff_is_where_positions_meet_their_noise(arm):
     motion = multisine(arm.robot.joints, 40.0, 1000.0, seed=2)
     quiet = conditioning([recorded(arm, motion, position_noise=1e-6)], SignalSettings())
