@@ -122,7 +122,8 @@ class IdentificationResult(Shown):
         """What the model leaves, with what the recordings tell of its parameters."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
-        return replace(self._misfit, information=information)
+        unusable = self.grade == 'unusable'
+        return replace(self._misfit, information=information, unusable=unusable)
 
     @cached_property
     def _misfit(self) -> Misfit:

@@ -45,6 +45,8 @@ class Misfit:
     information : ndarray, shape (P, P), or None
         What the recordings tell of the parameters of the model that it was identified from (the
         inverse of a covariance), where it is known; model.yaml does not have it.
+    unusable : bool
+        Whether the model was called unusable when it was identified; model.yaml does not have it.
 
     """
 
@@ -53,6 +55,7 @@ class Misfit:
     relative_error_percent: float
     torque_rms: Mapping[str, float] | None = None
     information: FloatArray | None = None
+    unusable: bool = False
 
     def document(self) -> dict[str, Any]:
         """Return the block that model.yaml holds."""

@@ -62,6 +62,11 @@ _NO_MODEL = (
     'it is that of another arm, or has other units; identify the arm from the baseline, and give '
     'that model'
 )
+#: Doubt where the model is no measure of anything.
+_UNUSABLE = (
+    'The model was unusable when it was identified, as identification.json beside it says: what '
+    'it leaves is no measure of what has changed.'
+)
 #: Note where shares and gap are of the data that names were found in, though others were given.
 _HARDLY_SHOWN = (
     'the recordings to validate hardly show what is named: gap and shares are of the recordings '
@@ -174,7 +179,10 @@ def diagnose(
     seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
     beside = written, seen, information, then
     explainer = Explainer(arm, prepared, known, rng, tell, settings, *beside)
-    result = _said(explainer.chosen(), notes, asked)
+    chosen = explainer.chosen()
+    if misfit is not None and misfit.unusable:
+        chosen = replace(chosen, doubt=chosen.doubt or _UNUSABLE)
+    result = _said(chosen, notes, asked)
     if result.verdict not in ('unknown', 'partial') and not result.doubt:
         return result
     tell(0.95, 'each recording by itself')
@@ -233,6 +241,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     minor, suspected = _not_named(explanation, arm)
     matters = settings.material * evidence.torque_rms
     refitted = frees_body(explanation.base, explanation.given)
+    hides = None if measured else _hides(names.rest, settings)
+    blind = _blind(evidence, arm.robot.joints, hides)
     word = decide(
         found,
         not_repeating(floors, arm, settings.thresholds, matters) if measured else (),
@@ -241,7 +251,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         NOISE if measured else chosen.floor_in_words,
         _excess(arm, _sure(evidence, chosen), settings) if refitted else None,
         minor,
-        None if measured else _hides(names.rest, settings),
+        hides,
     )
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
@@ -251,7 +261,12 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     return Diagnosis(
         verdict=word.word,
         summary=' '.join(
-            [word.summary, *_unpatched(found, worse), *_doubts(asked, chosen, word, suspected)]
+            [
+                word.summary,
+                *_unpatched(found, worse),
+                *map(suspicion, suspected),
+                *_doubts(asked, chosen, word, blind),
+            ]
         ),
         findings=found,
         minor=minor,
@@ -271,7 +286,15 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         harmful=bool(found and worse),
         doubt=chosen.doubt,
         suspected=suspected,
+        blind=blind,
     )
+
+
+def _blind(evidence: Evidence, joints: Sequence[str], hides: Hiding | None) -> tuple[str, ...]:
+    """Return joints that move and show nothing: no row counts, or their whole torque may hide."""
+    hidden = evidence.count == 0 if hides is None else (evidence.count == 0) | (hides.change > 1.0)
+    still = at_rest(evidence.data, joints)
+    return tuple(j for j, one in zip(joints, hidden, strict=True) if one and j not in still)
 
 
 def _not_named(
@@ -294,21 +317,17 @@ def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
     return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
 
 
-def _doubts(
-    asked: _Asked, chosen: Chosen, verdict: Verdict, suspected: Sequence[Finding]
-) -> list[str]:
-    """
-    Say what is in doubt.
-
-    It is a cause that more recordings may tell, what would tell a change from a misfit, why the
-    model may be wrong, and what did not move.
-
-    """
+def _doubts(asked: _Asked, chosen: Chosen, verdict: Verdict, blind: Sequence[str]) -> list[str]:
+    """Say what would tell a change from a misfit, why a model may be wrong, what is not seen."""
     remedy = chosen.untested if verdict.word == 'unknown' else ''
     still = ', '.join(at_rest(asked.prepared.data, asked.arm.robot.joints))
     not_checked = f'Not checked: {still} did not move.' if still else ''
-    doubts = (*map(suspicion, suspected), remedy, chosen.doubt, not_checked)
-    return [text for text in doubts if text]
+    short = (
+        f'Not checked: a change of all of the torque of {", ".join(blind)} would not show.'
+        if blind
+        else ''
+    )
+    return [text for text in (remedy, chosen.doubt, not_checked, short) if text]
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:

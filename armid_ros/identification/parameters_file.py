@@ -267,7 +267,9 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
     misfit, beside = load_misfit(path), Path(path).with_name('identification.json')
     if misfit is None or not is_file(beside):
         return misfit
-    return replace(misfit, information=read_parameters(beside).information(arm.parameters))
+    known = read_parameters(beside)
+    unusable = known.fit is not None and known.fit.unusable
+    return replace(misfit, information=known.information(arm.parameters), unusable=unusable)
 
 
 def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:

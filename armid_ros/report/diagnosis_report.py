@@ -41,12 +41,12 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     """
     Return the colour of a verdict.
 
-    None is good if the model is doubted, a cause suspected, a joint rests, or a simulation got
-    worse in some joints.
+    None is good if the model is doubted, a cause suspected, a joint not checked, or a simulation
+    got worse in some joints.
 
     """
     tone = _TONES.get(diagnosis.verdict, 'bad')
-    doubtful = bool(diagnosis.at_rest or diagnosis.doubt or diagnosis.suspected or worse)
+    doubtful = bool(diagnosis.not_checked or diagnosis.doubt or diagnosis.suspected or worse)
     return 'fair' if tone == 'good' and doubtful else tone
 
 

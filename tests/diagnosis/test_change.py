@@ -10,6 +10,7 @@ from armid_ros.diagnosis.search.explanation import Chosen
 from armid_ros.diagnosis.verdict import attribution
 from armid_ros.identification import identify
 from armid_ros.model import inverse_dynamics
+from armid_ros.report.diagnosis_report import tone_of
 import numpy as np
 import pytest
 
@@ -114,6 +115,33 @@ def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     assert result.verdict == 'consistent', result.summary
     assert ('times as much in elbow as when it was identified' in result.doubt) == changed
     assert (result.doubt in result.summary) and bool(result.doubt) == changed
+
+
+def test_a_model_that_was_unusable_is_doubted(bench):
+    rng = np.random.default_rng(0)
+    before = bench.recordings(hose, seed=1)
+    found = identify(bench.arm, before, rng=rng)
+    misfit = replace(known_misfit(found, before), unusable=True)
+    after = bench.recordings(hose, seed=2)
+    result = diagnose(found.arm, after, baseline=before, misfit=misfit, rng=rng)
+    assert result.verdict == 'consistent'
+    assert 'unusable when it was identified' in result.summary
+    assert tone_of(result) == 'fair'
+
+
+def test_a_joint_in_which_all_of_the_torque_may_hide_is_not_checked(bench):
+    """The model was of recordings that hardly have a torque beside the misfit."""
+
+    def shaken(motion, tau):
+        return 40.0 * np.sin(9.0 * motion.q[:, ::-1] + motion.q) * [0.0, 1.0] - tau * [0.0, 1.0]
+
+    before = bench.recordings(shaken, seed=1)
+    result = diagnose(
+        bench.arm, bench.recordings(shaken, seed=2), baseline=before, rng=np.random.default_rng(0)
+    )
+    assert 'elbow' in result.blind
+    assert 'Not checked: a change of all of the torque of elbow' in result.summary
+    assert tone_of(result) != 'good'
 
 
 def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):

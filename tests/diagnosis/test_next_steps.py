@@ -25,6 +25,7 @@ def diagnosis(name, joints, rivals=(), verdict='named', effects=(), given=()):
         harmful=False,
         at_rest=(),
         suspected=(),
+        blind=(),
         arm=SimpleNamespace(effects=effects),
         explanation=SimpleNamespace(given=SimpleNamespace(effects=given)),
     )
@@ -54,6 +55,14 @@ def test_a_model_that_is_not_patched_is_the_one_that_was_given():
     found = diagnosis('payload', ('wrist',))
     found.harmful = True
     assert next_steps(found)[-1].startswith('Use the model that was given in simulation')
+
+
+def test_a_joint_that_shows_nothing_is_to_be_recorded_and_its_model_not_used():
+    found = diagnosis('payload', ('wrist',))
+    found.blind = ('elbow',)
+    steps = next_steps(found)
+    assert steps[-1] == 'Record longer, and more motions of elbow, and diagnose again.'
+    assert not any(step.startswith('Use') for step in steps)
 
 
 def test_a_model_that_simulates_worse_is_not_to_be_used_yet():

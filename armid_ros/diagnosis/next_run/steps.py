@@ -21,10 +21,7 @@ from armid_ros.identification.fitting.identifiability import excludes_zero
 
 #: The patched model, as one finds it who reads a page.
 MODEL = 'model.yaml in the folder of this diagnosis'
-_ANEW = (
-    'Identify the arm anew before the model is used in simulation or control: it is poor on the '
-    'baseline itself.'
-)
+_ANEW = 'Identify the arm anew before the model is used in simulation or control.'
 
 
 def next_steps(
@@ -65,8 +62,9 @@ def next_steps(
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
     steps += [_more(one) for one in diagnosis.suspected]
-    if diagnosis.at_rest:
-        steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
+    unseen = _not_checked(diagnosis)
+    if unseen:
+        steps += unseen
     elif worse:
         steps.append(
             f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
@@ -78,6 +76,17 @@ def next_steps(
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
+    return steps
+
+
+def _not_checked(diagnosis: Diagnosis) -> list[str]:
+    """Say what to record of joints of which nothing can be said."""
+    steps = []
+    if diagnosis.blind:
+        joints = ', '.join(diagnosis.blind)
+        steps.append(f'Record longer, and more motions of {joints}, and diagnose again.')
+    if diagnosis.at_rest:
+        steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
     return steps
 
 

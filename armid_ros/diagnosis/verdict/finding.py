@@ -222,6 +222,8 @@ class Diagnosis:
     suspected : tuple of Finding
         A cause that more recordings may tell from what those of one day differ by, where nothing
         is named; empty if there is none.
+    blind : tuple of str
+        Joints that move and in which a change of all of the torque would not show.
 
     """
 
@@ -243,6 +245,12 @@ class Diagnosis:
     harmful: bool = False
     doubt: str = ''
     suspected: tuple[Finding, ...] = ()
+    blind: tuple[str, ...] = ()
+
+    @property
+    def not_checked(self) -> tuple[str, ...]:
+        """Joints of which nothing can be said: at rest, or blind."""
+        return (*self.at_rest, *self.blind)
 
     @property
     def at_rest(self) -> tuple[str, ...]:
