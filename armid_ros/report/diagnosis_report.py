@@ -156,12 +156,8 @@ def diagnosis_report(
     if extras.forward:
         pairs = [_renamed(pair, names) for pair in extras.forward]
         sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
-    sections.append(
-        DataQuality(
-            [_quality(r, role, names) for role, every in read.items() for r in every],
-            bad=diagnosis.verdict == 'bad_data',
-        )
-    )
+    quality = [_quality(r, role, names) for role, every in read.items() for r in every]
+    sections.append(DataQuality(quality, at_fault=_at_fault(diagnosis, data, names)))
     if diagnosis.findings:
         sections.append(PatchSection(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
@@ -172,6 +168,18 @@ def diagnosis_report(
     if data.baseline:
         subtitle += f' · {counted(len(data.baseline), "recording")} from before'
     return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
+
+
+def _at_fault(
+    diagnosis: Diagnosis, data: DiagnosedRecordings, names: Mapping[str, str]
+) -> list[str]:
+    """Return the recordings that a verdict of bad data names, or all that were asked about."""
+    if diagnosis.verdict != 'bad_data':
+        return []
+    read = [*data.recordings, *data.held_out, *data.baseline]
+    said = [one.source for one in read if one.source and one.source in diagnosis.summary]
+    sources = said or [one.source for one in data.recordings]
+    return [names.get(source, source) or 'in memory' for source in sources]
 
 
 def _verdict(

@@ -191,6 +191,10 @@ def test_bad_data_have_no_green_tick():
     page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
     assert '<li class="fine">' not in page
     assert 'What was recorded is at fault' in page
+    sound = [replace(one, source=f'before {k}') for k, one in enumerate(bench.recordings(seed=1))]
+    both = DiagnosedRecordings(turned, baseline=sound)
+    beside = diagnosis_report(found, both, robot='two_links')
+    assert beside.count('<li class="fine">') == len(sound)
 
 
 def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):

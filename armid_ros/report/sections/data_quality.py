@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -87,8 +87,8 @@ class DataQuality(Section):
         Training data first.
     robot : Robot or None
         Gives joints and units, where repeatability is shown.
-    bad : bool
-        Whether the verdict is that the data are at fault, however well they were read.
+    at_fault : collection of str
+        Sources of what the verdict is that it is at fault, however well it was read.
 
     """
 
@@ -97,7 +97,7 @@ class DataQuality(Section):
 
     recordings: Sequence[RecordingQuality]
     robot: Robot | None = None
-    bad: bool = False
+    at_fault: Collection[str] = ()
 
     @property
     def repeating(self) -> list[tuple[str, float, list[tuple[str, str, str, float]]]]:
