@@ -32,16 +32,19 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Names
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
+    blind_joints,
     harmed,
     held,
+    hiding,
     measure_gap,
     places_held,
 )
 from armid_ros.diagnosis.verdict.naming import findings, small_print
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
-from armid_ros.diagnosis.verdict.words import decide, Hiding, not_repeating, suspicion, Verdict
+from armid_ros.diagnosis.verdict.words import decide, not_repeating, suspicion, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -174,20 +177,35 @@ def diagnose(
         found = tied(arm, recordings, prepared, settings)
         if found is not None:
             return _said(found, notes, asked)
+    result = _said(_believed(_explainer(asked, misfit).chosen(), misfit), notes, asked)
+    return _each_alone(result, [*recordings, *validate, *baseline], used, asked)
+
+
+def _explainer(asked: _Asked, misfit: Misfit | None) -> Explainer:
+    arm, prepared, known = asked.arm, asked.prepared, asked.before
     written, then = (_left(misfit, arm, part) for part in (prepared, known))
+    seen = trajectories(asked.validate, prepared.used, arm, prepared.allowed) if known else ()
     information = None if misfit is None else misfit.information
-    seen = trajectories(validate, prepared.used, arm, prepared.allowed) if known else ()
-    beside = written, seen, information, then
-    explainer = Explainer(arm, prepared, known, rng, tell, settings, *beside)
-    chosen = explainer.chosen()
-    if misfit is not None and misfit.unusable:
-        chosen = replace(chosen, doubt=chosen.doubt or _UNUSABLE)
-    result = _said(chosen, notes, asked)
+    own = arm, prepared, known, asked.rng, asked.tell, asked.settings
+    return Explainer(*own, written, seen, information, then)
+
+
+def _believed(chosen: Chosen, misfit: Misfit | None) -> Chosen:
+    """Return an explanation that is doubted if the model was unusable when it was identified."""
+    if misfit is None or not misfit.unusable:
+        return chosen
+    return replace(chosen, doubt=chosen.doubt or _UNUSABLE)
+
+
+def _each_alone(
+    result: Diagnosis, recordings: Sequence[Recording], used: Conditioning, asked: _Asked
+) -> Diagnosis:
+    """Return a result, or that single recordings are at fault, where something stays open."""
     if result.verdict not in ('unknown', 'partial') and not result.doubt:
         return result
-    tell(0.95, 'each recording by itself')
-    alone = mistaken_recordings(arm, [*recordings, *validate, *baseline], used)
-    return _bad(given, data, alone, notes) if alone else result
+    asked.tell(0.95, 'each recording by itself')
+    alone = mistaken_recordings(asked.arm, recordings, used)
+    return _bad(asked.given, result.data, alone, result.notes) if alone else result
 
 
 def _left(
@@ -241,8 +259,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     minor, suspected = _not_named(explanation, arm)
     matters = settings.material * evidence.torque_rms
     refitted = frees_body(explanation.base, explanation.given)
-    hides = None if measured else _hides(names.rest, settings)
-    blind = _blind(evidence, arm.robot.joints, hides)
+    hides = None if measured else hiding(names.rest, settings)
+    blind = blind_joints(evidence, arm.robot.joints, hides)
     word = decide(
         found,
         not_repeating(floors, arm, settings.thresholds, matters) if measured else (),
@@ -253,6 +271,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         minor,
         hides,
     )
+    more = _unpatched(found, worse) or [suspicion(one) for one in suspected]
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
     shown = unseen if names.shares.predicted else None
@@ -260,14 +279,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join(
-            [
-                word.summary,
-                *_unpatched(found, worse),
-                *map(suspicion, suspected),
-                *_doubts(asked, chosen, word, blind),
-            ]
-        ),
+        summary=' '.join([word.summary, *more, *_doubts(asked, chosen, word, blind)]),
         findings=found,
         minor=minor,
         where=where_it_is(explanation, shown or evidence, settings) or places_held(arm, resting),
@@ -288,13 +300,6 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         suspected=suspected,
         blind=blind,
     )
-
-
-def _blind(evidence: Evidence, joints: Sequence[str], hides: Hiding | None) -> tuple[str, ...]:
-    """Return joints that move and show nothing: no row counts, or their whole torque may hide."""
-    hidden = evidence.count == 0 if hides is None else (evidence.count == 0) | (hides.change > 1.0)
-    still = at_rest(evidence.data, joints)
-    return tuple(j for j, one in zip(joints, hidden, strict=True) if one and j not in still)
 
 
 def _not_named(
@@ -383,17 +388,6 @@ def _excesses(
     if settings.partner is not None:
         return left, []
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
-
-
-def _hides(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
-    """Return how much may change beside a misfit before what is left is a gap."""
-    evidence = explanation.evidence
-    limits = evidence.limits(explanation.fitted.residual, settings) * settings.thresholds.predicted
-    misfit = np.sqrt(np.mean([own**2 for own in evidence.sigma], axis=0))
-    still = at_rest(evidence.data, explanation.given.robot.joints)
-    asked = (evidence.count > 0) & ~np.isin(explanation.given.robot.joints, still)
-    share = np.where(asked, misfit / np.maximum(evidence.torque_rms, 1e-300), 0.0)
-    return Hiding(share, np.sqrt(np.maximum(limits - 1.0, 0.0)) * share)
 
 
 def _excess(

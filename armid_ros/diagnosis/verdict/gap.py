@@ -20,11 +20,12 @@ from collections.abc import Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.trajectory import REST_TIME, Trajectory
+from armid_ros.diagnosis.data.trajectory import at_rest, REST_TIME, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.diagnosis.verdict.where import Excess, Where
+from armid_ros.diagnosis.verdict.words import Hiding
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -194,3 +195,23 @@ def standing(
         time += period * more.sum(axis=0)
         squares += period * np.sum(beyond, axis=0, where=more)
     return np.where(time > REST_TIME, squares / np.maximum(time, 1e-300), 0.0)
+
+
+def hiding(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
+    """Return how much may change beside a misfit before what is left is a gap."""
+    evidence = explanation.evidence
+    limits = evidence.limits(explanation.fitted.residual, settings) * settings.thresholds.predicted
+    misfit = np.sqrt(np.mean([own**2 for own in evidence.sigma], axis=0))
+    still = at_rest(evidence.data, explanation.given.robot.joints)
+    asked = (evidence.count > 0) & ~np.isin(explanation.given.robot.joints, still)
+    share = np.where(asked, misfit / np.maximum(evidence.torque_rms, 1e-300), 0.0)
+    return Hiding(share, np.sqrt(np.maximum(limits - 1.0, 0.0)) * share)
+
+
+def blind_joints(
+    evidence: Evidence, joints: Sequence[str], hides: Hiding | None
+) -> tuple[str, ...]:
+    """Return joints that move and show nothing: no row counts, or their whole torque may hide."""
+    hidden = evidence.count == 0 if hides is None else (evidence.count == 0) | (hides.change > 1.0)
+    still = at_rest(evidence.data, joints)
+    return tuple(j for j, one in zip(joints, hidden, strict=True) if one and j not in still)
