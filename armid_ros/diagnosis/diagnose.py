@@ -253,8 +253,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         notes.append(_HARDLY_SHOWN)
     found = findings(explanation, names.shares, arm, asked.rng)
     worse = _harmed(chosen, explanation, unseen, settings)
-    data = evidence.data
-    floors = tuple(noise_floor(part, explanation.fitted.arm) for part in data)
+    floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
     left, resting = _excesses(asked, chosen, names, unseen)
     minor, suspected = _not_named(explanation, arm)
     matters = settings.material * evidence.torque_rms
@@ -275,7 +274,6 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
     shown = unseen if names.shares.predicted else None
-    gap = measure_gap(explanation, shown)
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
@@ -286,10 +284,10 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         left=where_left(
             explanation, explanation.fitted.arm, _shows(left, evidence, unseen), settings
         ),
-        gap=gap,
+        gap=measure_gap(explanation, shown),
         explanation=explanation.forgetting(),
         arm=plain_arm(explanation.fitted.arm) if found and not worse else asked.given,
-        data=tuple(data),
+        data=tuple(evidence.data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
         refitted=refitted,
