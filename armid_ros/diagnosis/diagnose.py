@@ -10,7 +10,7 @@ with its rigid body and known effects fitted anew, where only its structure coun
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel, Misfit
@@ -44,6 +44,7 @@ from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, not_repeating, suspicion, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -178,7 +179,7 @@ def diagnose(
         if found is not None:
             return _said(found, notes, asked)
     result = _said(_believed(_explainer(asked, misfit).chosen(), misfit), notes, asked)
-    return _each_alone(result, [*recordings, *validate, *baseline], used, asked)
+    return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
 
 
 def _explainer(asked: _Asked, misfit: Misfit | None) -> Explainer:
@@ -198,14 +199,26 @@ def _believed(chosen: Chosen, misfit: Misfit | None) -> Chosen:
 
 
 def _each_alone(
-    result: Diagnosis, recordings: Sequence[Recording], used: Conditioning, asked: _Asked
+    result: Diagnosis, days: Iterable[Sequence[Recording]], used: Conditioning, asked: _Asked
 ) -> Diagnosis:
     """Return a result, or that single recordings are at fault, where something stays open."""
     if result.verdict not in ('unknown', 'partial') and not result.doubt:
         return result
-    asked.tell(0.95, 'each recording by itself')
-    alone = mistaken_recordings(asked.arm, recordings, used)
+    apart = [one for day in days for one in _apart(asked.arm, day, used)]
+    alone = mistaken_recordings(asked.arm, apart, used)
     return _bad(asked.given, result.data, alone, result.notes) if alone else result
+
+
+def _apart(arm: ArmModel, day: Sequence[Recording], used: Conditioning) -> Iterator[Recording]:
+    """Yield recordings of which a model is unusable in a joint, and not in all of that day."""
+    unit = np.ones(arm.robot.n_joints)
+    parts = [trajectories([one], used, arm) for one in day]
+    rows = [Evidence.over_noise(own, [unit] * len(own)) for own in parts]
+    errors = np.array([one.relative_errors(arm) for one in rows]).reshape(len(day), -1)
+    bad = 100.0 * errors > LIMITS.unusable
+    for one, own in zip(day, bad, strict=True):
+        if np.any(own & ~bad.all(axis=0)):
+            yield one
 
 
 def _left(
