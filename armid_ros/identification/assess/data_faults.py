@@ -26,8 +26,12 @@ from armid_ros.identification.assess.hypotheses import (
     OtherUnit,
     Reversed,
 )
-from armid_ros.identification.assess.joint_units import units_beside_model, units_beyond_drives
-from armid_ros.identification.assess.mistakes import effort_factor, find_mistake, slow_motions
+from armid_ros.identification.assess.joint_units import (
+    factors_apart,
+    units_beside_model,
+    units_beyond_drives,
+)
+from armid_ros.identification.assess.mistakes import effort_factor, find_mistake, slow_motions_of
 from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
@@ -156,9 +160,9 @@ def _mistaken(
         return []
     ratio = _since(arm, recordings, used, before)
     if ratio is not None and unit_of(ratio):
-        return [
-            f'torques are in {unit_of(ratio)} if those of the baseline are in N m: convert them'
-        ]
+        now, then = (slow_motions_of(some, used) for some in (recordings, before))
+        unit = f'torques are in {unit_of(ratio)} if those of the baseline are in N m: convert them'
+        return [factors_apart(arm, now, then) or unit]
     said: set[tuple[str, ...]] = set()
     for recording in recordings:
         mistake = find_mistake(arm.body, recording, used)
@@ -203,10 +207,7 @@ def _units(
     """Say of which joints torques are in another unit, as the model or else drives show."""
     if any(one.partner is not None for one in recordings):
         return []
-    now, then = (
-        [motion for one in some for motion in slow_motions(one, used)]
-        for some in (recordings, before)
-    )
+    now, then = (slow_motions_of(some, used) for some in (recordings, before))
     beside = list(units_beside_model(arm, now, then))
     return beside or list(units_beyond_drives(arm.robot, recordings, now))
 

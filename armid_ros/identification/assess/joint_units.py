@@ -90,8 +90,7 @@ def units_beside_model(
         The same from when nothing was wrong: factors are those since then.
 
     """
-    factors, then = _factors(arm, motions), _factors(arm, before)
-    factors /= np.where(then > 0.0, then, 1.0)
+    factors = _since(arm, motions, before)
     found = [
         InUnit(joint, unit).sentence(arm.robot)
         for joint, factor in enumerate(factors)
@@ -100,6 +99,30 @@ def units_beside_model(
     ]
     if 2 * len(found) <= arm.robot.n_joints:
         yield from found
+
+
+def factors_apart(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()) -> str:
+    """
+    Say what factors torques of joints are off by where no one unit makes them.
+
+    Parameters are those of `units_beside_model`. Empty where one may.
+
+    """
+    factors = _since(arm, motions, before)
+    clear = np.flatnonzero(factors > 0.0)
+    if not len(clear) or factors[clear].max() < NEAR**2 * factors[clear].min():
+        return ''
+    named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear.tolist())
+    return (
+        f'torques are no torques in N m: they are those of the model times {named} (currents?): '
+        'convert each joint by its own gain'
+    )
+
+
+def _since(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]) -> FloatArray:
+    """Return the factors of torques on the model's, over those of a baseline, (n,)."""
+    factors, then = _factors(arm, motions), _factors(arm, before)
+    return np.asarray(factors / np.where(then > 0.0, then, 1.0))
 
 
 def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:

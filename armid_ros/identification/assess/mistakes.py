@@ -139,7 +139,7 @@ def effort_factor(
     too short, or the efforts do not follow the description.
 
     """
-    slow = [motion for one in recordings for motion in slow_motions(one, used)]
+    slow = slow_motions_of(recordings, used)
     found = _described(robot, slow)(OtherUnit())
     if found is None or not found[0].shared[0] > 0.0:
         return None
@@ -243,6 +243,11 @@ def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
             parts = (within_band(slow, x) for x in (slow.q, slow.dq, slow.ddq, tau))
             result.append(Motion(slow.joints, slow.t, *parts))
     return result
+
+
+def slow_motions_of(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
+    """Return such stretches of several recordings."""
+    return [motion for one in recordings for motion in slow_motions(one, used)]
 
 
 def _thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:

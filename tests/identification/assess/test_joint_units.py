@@ -8,7 +8,11 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.data_faults import check_data, Stretch
-from armid_ros.identification.assess.joint_units import units_beside_model, units_beyond_drives
+from armid_ros.identification.assess.joint_units import (
+    factors_apart,
+    units_beside_model,
+    units_beyond_drives,
+)
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.robots import load_robot
 import numpy as np
@@ -63,6 +67,17 @@ def test_torques_in_newton_metres_and_a_few_wrong_samples_are_no_unit(arm, run):
     spoilt = run.tau.copy()
     spoilt[::50, WRIST] = 1e4
     assert beyond_drives(arm.robot, replace(run, tau=spoilt)) == []
+
+
+def test_currents_are_in_no_one_unit(arm, run):
+    joints = arm.robot.joints
+    gains = np.array([0.083, 0.025, 0.09, 0.125, 0.3, 0.5])
+    currents = replace(run, tau=run.tau / gains)
+    said = factors_apart(arm, filtered(currents), filtered(run))
+    assert f'12 in {joints[0]}, 40 in {joints[1]}' in said and 'currents?' in said
+    for factor in (1.0, 1e3):
+        tau = factor * run.tau
+        assert factors_apart(arm, filtered(replace(run, tau=tau)), filtered(run)) == ''
 
 
 def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
