@@ -90,7 +90,7 @@ class Inspection:
             return 'Fit to be identified, as far as can be said without --robot.'
         if self.trial.refused:
             return 'armid identify refuses it.'
-        if self.trial.dead:
+        if self.trial.dead or self.trial.mistake:
             return 'armid identify calls what it makes of it unusable.'
         return (
             f'armid identify takes it: relative error {self.trial.relative_error_percent:.1f} %, '
@@ -159,7 +159,9 @@ def _dead(recording: Recording, robot: Robot | None, trial: TrialFit | None) -> 
 
 
 def _of_fit(trial: TrialFit) -> Iterator[Remark]:
-    if trial.poor:
+    if trial.mistake:
+        yield Remark('bad', trial.mistake)
+    elif trial.poor:
         yield Remark(
             'doubt',
             f'rigid body and friction leave {", ".join(trial.poor)}; look for axes or zeros '

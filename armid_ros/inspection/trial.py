@@ -14,8 +14,11 @@ from armid_ros.identification import Identification, identify, Score
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.hypotheses import OtherUnit
 from armid_ros.identification.assess.joint_errors import beyond_noise
+from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -52,6 +55,8 @@ class TrialFit:
         Joints whose torque the fit hardly describes, each with its error.
     dead : tuple of str
         Channels that read the same though their joint moves.
+    mistake : str
+        Names or signs that seem to be wrong; empty where none do.
 
     """
 
@@ -66,6 +71,7 @@ class TrialFit:
     elsewhere: tuple[str, ...] = ()
     poor: tuple[str, ...] = ()
     dead: tuple[str, ...] = ()
+    mistake: str = ''
 
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
@@ -105,7 +111,16 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
             *dead_encoders(robot, recording, motions),
             *dead_channels(arm, recording, motions),
         ),
+        mistake=_mistake(robot, recording, result.used),
     )
+
+
+def _mistake(robot: Robot, recording: Recording, used: Conditioning) -> str:
+    """Say which names or signs seem to be wrong; factors of efforts are said by themselves."""
+    found = find_mistake(robot, recording, used)
+    if found is None or any(isinstance(one, OtherUnit) for one in found.hypotheses):
+        return ''
+    return found.sentence(robot)
 
 
 def _poor(result: Identification, errors: FloatArray) -> Iterator[str]:

@@ -173,6 +173,14 @@ def test_noisy_positions_are_answered_with_a_lower_cutoff(clean, robot):
 
 
 def test_a_fit_that_explains_little_is_doubted(clean, robot):
-    """The efforts of one joint are those of another."""
+    pushed = 3.0 * clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]
+    other = replace(clean, tau=clean.tau + pushed)
+    assert any('leave' in r or 'refuses' in r for r in remarks(other, robot))
+
+
+def test_joints_that_are_exchanged_are_named_as_identify_does(clean, robot):
     swapped = replace(clean, tau=clean.tau[:, [1, 0, 2, 3, 4, 5]])
-    assert any('leave' in r or 'refuses' in r for r in remarks(swapped, robot))
+    found = inspect(swapped, robot, rng=np.random.default_rng(0))
+    assert 'exchanged' in found.trial.mistake
+    assert ('bad', found.trial.mistake) in [(one.weight, one.text) for one in found.remarks]
+    assert 'takes it' not in found.verdict
