@@ -240,7 +240,7 @@ def test_the_same_motion_with_other_torques_is_another_recording(bench):
 def test_a_torque_beyond_the_limit_of_its_drive_is_said(bench):
     recordings = bench.recordings()
     used = conditioning(recordings, SignalSettings())
-    strong = [replace(one, tau=9.0 * one.tau) for one in recordings]
+    strong = [replace(one, tau=5.0 * one.tau) for one in recordings]
     notes = check_data(bench.arm, strong, used, stretches(strong, used))[1]
     assert any('shoulder reaches' in note and 'its limit is 50' in note for note in notes)
     notes = check_data(bench.arm, recordings, used, stretches(recordings, used))[1]
