@@ -202,7 +202,8 @@ def _each_alone(
     result: Diagnosis, days: Iterable[Sequence[Recording]], used: Conditioning, asked: _Asked
 ) -> Diagnosis:
     """Return a result, or that single recordings are at fault, where something stays open."""
-    if result.verdict not in ('unknown', 'partial') and not result.doubt:
+    open_or_doubted = result.verdict in ('unknown', 'partial') or bool(result.doubt)
+    if not open_or_doubted or asked.settings.partner is not None:
         return result
     apart = [one for day in days for one in _apart(asked.arm, day, used)]
     alone = mistaken_recordings(asked.arm, apart, used)
@@ -214,7 +215,7 @@ def _apart(arm: ArmModel, day: Sequence[Recording], used: Conditioning) -> Itera
     unit = np.ones(arm.robot.n_joints)
     parts = [trajectories([one], used, arm) for one in day]
     rows = [Evidence.over_noise(own, [unit] * len(own)) for own in parts]
-    errors = np.array([one.relative_errors(arm) for one in rows]).reshape(len(day), -1)
+    errors = np.array([one.relative_errors(arm) for one in rows]).reshape(len(day), len(unit))
     bad = 100.0 * errors > LIMITS.unusable
     for one, own in zip(day, bad, strict=True):
         if np.any(own & ~bad.all(axis=0)):
