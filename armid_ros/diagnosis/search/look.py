@@ -319,6 +319,8 @@ def _examined(
     pairs = zip(compared, best, strict=True)
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
+    if here.tested is not None:  # what cannot be named says nothing
+        here = replace(here, tested=here.tested.among(closing))
     there = [change for change in there if changed(change, here)]
     return result, sorted(there, key=lambda t: -worth(t, here)), closing, here
 

@@ -17,7 +17,7 @@ Recordings are what is independent: all values of a candidate follow the same mi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.search.trial import Key
@@ -240,6 +240,10 @@ class Changed:
     def suspected(self) -> frozenset[Key]:
         """Candidates that may have changed where none surely has."""
         return frozenset() if self.surely else self.singly
+
+    def among(self, keys: Collection[Key]) -> Changed:
+        """Return the same where only some candidates can say that anything has changed."""
+        return replace(self, surely=self.surely.intersection(keys))
 
     def and_surely(self, key: Key) -> Changed:
         """Return the same, a candidate having changed for another reason."""
