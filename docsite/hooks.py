@@ -24,6 +24,7 @@ BESIDE_THE_DIAGNOSIS = (
     'identification/assess/data_faults.py',
     'identification/assess/dead_encoders.py',
     'identification/assess/joint_units.py',
+    'identification/assess/torque_units.py',
     'identification/assess/velocities.py',
     'identification/rows/stamps.py',
     'excitation/templates.py',

@@ -213,9 +213,11 @@ def _each_alone(
 def _apart(arm: ArmModel, day: Sequence[Recording], used: Conditioning) -> Iterator[Recording]:
     """Yield recordings of which a model is unusable in a joint, and not in all of that day."""
     unit = np.ones(arm.robot.n_joints)
-    parts = [trajectories([one], used, arm) for one in day]
-    rows = [Evidence.over_noise(own, [unit] * len(own)) for own in parts]
-    errors = np.array([one.relative_errors(arm) for one in rows]).reshape(len(day), len(unit))
+    errors = np.empty((len(day), len(unit)))
+    for k, one in enumerate(day):
+        parts = trajectories([one], used, arm)
+        rows = Evidence.over_noise(parts, [unit] * len(parts))
+        errors[k] = rows.relative_errors(rows.residuals(arm))
     bad = 100.0 * errors > LIMITS.unusable
     for one, own in zip(day, bad, strict=True):
         if np.any(own & ~bad.all(axis=0)):

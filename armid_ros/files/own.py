@@ -11,7 +11,7 @@ page lies beside them.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 import re
@@ -108,13 +108,11 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
                 f'{folder}: holds {name}, which this command does not write; name another folder, '
                 'or use --force, which leaves it there'
             )
-    known = [name for name in names if _mark_of(name)]
-    for name in known or names:
-        if not is_own(folder / name):
-            raise OutputError(
-                f'{folder}: holds {name}, which armid did not write; name another folder, or '
-                'write over it with --force'
-            )
+    for name in _foreign(folder, names):
+        raise OutputError(
+            f'{folder}: holds {name}, which armid did not write; name another folder, or '
+            'write over it with --force'
+        )
 
 
 def refuse_replacing(folder: Path, names: Collection[str]) -> None:
@@ -134,13 +132,16 @@ def refuse_replacing(folder: Path, names: Collection[str]) -> None:
         Naming the folder and the file.
 
     """
-    there = [name for name in names if (folder / name).exists()]
-    known = [name for name in there if _mark_of(name)]
-    for name in known or there:
-        if not is_own(folder / name):
-            raise OutputError(
-                f'{folder}: holds {name}, which armid did not write; name another folder'
-            )
+    for name in _foreign(folder, [name for name in names if (folder / name).exists()]):
+        raise OutputError(
+            f'{folder}: holds {name}, which armid did not write; name another folder'
+        )
+
+
+def _foreign(folder: Path, names: Sequence[str]) -> Iterator[str]:
+    """Yield files that are no results; those without room for a mark go by the others."""
+    known = [name for name in names if _mark_of(name)]
+    return (name for name in known or names if not is_own(folder / name))
 
 
 def _mark_of(name: str) -> re.Pattern[bytes] | None:

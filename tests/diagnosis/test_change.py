@@ -255,7 +255,7 @@ class Named:
     """Stands for an explanation: shares of its names, and whether their values may be zero."""
 
     steps: tuple[tuple[float, bool], ...]
-    predicted: bool = False
+    folds: object = None
 
     def without(self, k):
         return Named(self.steps[:k] + self.steps[k + 1 :])
@@ -301,10 +301,9 @@ def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
 @pytest.mark.parametrize(('own', 'small'), [(0.4, None), (0.04, 0)])
 def test_small_print_takes_little_of_all_data(monkeypatch, own, small):
     """A slow motion shows little of a drag that takes half of the gap of the others."""
-    monkeypatch.setattr(attribution, 'attribute', lambda named, unseen: Named(((own, False),)))
     monkeypatch.setattr(attribution, 'may_be_nothing', lambda named, k: False)
     monkeypatch.setattr(attribution, '_opens', lambda *arguments: False)
-    seen = Named(((0.05, False),), predicted=True)
+    seen = Named(((0.05, False),), Named(((own, False),)))
     assert attribution.smallest(seen, seen, DiagnosisSettings(), 0.1) == small
 
 

@@ -251,10 +251,10 @@ class Baseline:
 
         """
         rows = Evidence.over_noise(self.data, [np.ones_like(self.misfit)] * len(self.data))
-        power = rows.power(self.residual)
-        torque = np.maximum(rows.torque_rms**2, 1e-300)
-        whole = (rows.count @ power) / max(float(rows.count @ torque), 1e-300)
-        return float(np.sqrt(whole)), np.sqrt(power / torque)
+        each = rows.relative_errors(self.residual)
+        torque = rows.count * np.maximum(rows.torque_rms**2, 1e-300)
+        whole = (each**2 @ torque) / max(float(torque.sum()), 1e-300)
+        return float(np.sqrt(whole)), each
 
     def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
         """

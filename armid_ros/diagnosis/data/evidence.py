@@ -89,10 +89,10 @@ class Evidence:
         """Return the loss of each joint, the mean square of its weighted residual, shape (n,)."""
         return self.power([rows / s for rows, s in zip(residual, self.sigma, strict=True)])
 
-    def relative_errors(self, arm: ArmModel) -> FloatArray:
-        """Return what an arm leaves of each joint over its torque, root mean square, (n,)."""
+    def relative_errors(self, residual: Sequence[FloatArray]) -> FloatArray:
+        """Return a residual, each (M, n), over the torque of each joint, both rms, (n,)."""
         torque = np.maximum(self.torque_rms**2, 1e-300)
-        return np.asarray(np.sqrt(self.power(self.residuals(arm)) / torque))
+        return np.asarray(np.sqrt(self.power(residual) / torque))
 
     def power(self, torque: Sequence[FloatArray]) -> FloatArray:
         """Return the mean square of torques (M, n), of informative rows of each joint, (n,)."""

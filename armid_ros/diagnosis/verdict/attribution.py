@@ -57,6 +57,8 @@ class Attribution:
         Names that the held-out data deny, last of the order first; see `denies`.
     predicted : bool
         Whether it is of held-out data, and not of folds of the data that names were fitted to.
+    folds : Attribution or None
+        The same of these folds, where both were asked for; see `shares_of`.
 
     """
 
@@ -65,6 +67,7 @@ class Attribution:
     taken: FloatArray
     denied: tuple[int, ...] = ()
     predicted: bool = False
+    folds: Attribution | None = None
 
     def share(self, names: Sequence[int]) -> float:
         """Return the share of the gap that some of the names explain together, at most all."""
@@ -286,7 +289,7 @@ def smallest(
     without it.
 
     """
-    found = attribute(explanation, None) if shares.predicted else shares
+    found = shares.folds or shares
     for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
         most = shares.share([k]) > settings.thresholds.open_share
         if not most and may_be_nothing(explanation, k):
@@ -315,7 +318,9 @@ def shares_of(
     names = range(len(explanation.steps))
     seen = attribute(explanation, unseen)
     shown = seen.share(names) > settings.thresholds.headline * left_out.share(names)
-    return seen if shown or not names else replace(left_out, denied=seen.denied)
+    if shown or not names:
+        return replace(seen, folds=left_out)
+    return replace(left_out, denied=seen.denied)
 
 
 def may_be_nothing(explanation: Explanation, name: int) -> bool:
