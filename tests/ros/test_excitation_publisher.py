@@ -296,7 +296,7 @@ def test_an_arm_that_follows_as_well_as_is_tolerated_goes_on(bench, arm, excitat
 @pytest.mark.parametrize('late', [0.0, 0.4])
 def test_an_arm_is_compared_with_where_it_should_be_at_the_stamp(bench, arm, excitation, late):
     """A simulation that cannot keep up, or a slow network, is not an arm that lags."""
-    node = running(bench, arm, excitation, tracking_tolerance=0.02)
+    node = running(bench, arm, excitation, tracking_tolerance=0.02, state_timeout=1.0)
     reference = read_trajectory(arm.heard[0])
     for time in np.arange(100.2, 104.0, 0.2):
         bench.tick(round((time + late) * SECOND))
