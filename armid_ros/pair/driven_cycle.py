@@ -174,6 +174,5 @@ class _Body:
         touch = self._ground.force(place[feet, 1], speed[feet, 1], speed[feet, 0])
         spring = self._pair.law(place[ties] - self._far[k], speed[ties] - self._far_speed[k])
         outside = np.einsum('cxj,cx->j', jacobian, np.concatenate([touch, spring]))
-        inertia = np.triu(inertia) + np.triu(inertia, 1).T
         push = tau - load[free] + outside[free]
         return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])

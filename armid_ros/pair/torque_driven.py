@@ -90,7 +90,6 @@ def drive_by_torque(
         state[0][columns], state[1][columns], state[2][columns] = q, dq, 0.0
         load = pin.rnea(model, data, *state) - _spring_torque(pair, other_motion, k, *state[:2])
         inertia = pin.crba(model, data, state[0])
-        inertia = np.triu(inertia) + np.triu(inertia, 1).T
         tau = torque(float(motion.t[k]))
         return np.asarray(np.linalg.solve(inertia[np.ix_(columns, columns)], tau - load[columns]))
 

@@ -174,10 +174,16 @@ def test_what_has_changed_is_asked_of_all_together_and_which_it_is_of_each():
     spring = ('joint_spring', ('wrist',), (0,))
     singly = frozenset({tilt, slack})
     nothing = Changed(frozenset(), singly, 3.0)
-    assert not nothing.changed
-    for found in (Changed(frozenset({slack}), singly, 3.0), nothing.and_surely(slack)):
-        assert found.changed == {tilt, slack}
-    assert nothing.and_surely(spring).changed == {tilt, slack, spring}
+    assert not nothing.changed and nothing.suspected == singly
+    assert Changed(frozenset({slack}), singly, 3.0).changed == singly
+    assert nothing.among({slack, spring}, [spring]).changed == {tilt, slack, spring}
+
+
+def test_what_cannot_be_named_does_not_say_that_anything_has_changed():
+    tilt, slack = ('base_tilt', (), (0,)), ('interface_slack', ('elbow',), (0,))
+    found = Changed(frozenset({slack}), frozenset({tilt, slack}), 3.0)
+    assert found.among({tilt, slack}, []).changed == {tilt, slack}
+    assert not found.among({tilt}, []).changed and not found.among({tilt}, [slack]).changed
 
 
 def with_offsets(bench, seed, offsets):

@@ -299,6 +299,7 @@ def _examined(
     open_squares = _open_squares(here)
     there: list[Trial] = []
     large: list[tuple[Trial, Trial]] = []
+    certain: list[Key] = []
     for trial in ranking[:_LOOKED_AT]:
         if not acceptable(trial, here):
             continue
@@ -308,7 +309,7 @@ def _examined(
         takes = trial.joint_gains(*here.rows_of(trial.candidate))
         size = _size(change, takes, here)
         if here.tested is not None and material(size, here, here.settings.thresholds.other_motion):
-            here = replace(here, tested=here.tested.and_surely(trial.candidate.key))
+            certain.append(trial.candidate.key)
         there.append(change)
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
         if matters and material(size, here, _misfit_share(here)):
@@ -320,7 +321,7 @@ def _examined(
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     if here.tested is not None:  # what cannot be named says nothing
-        here = replace(here, tested=here.tested.among(closing))
+        here = replace(here, tested=here.tested.among(closing, certain))
     there = [change for change in there if changed(change, here)]
     return result, sorted(there, key=lambda t: -worth(t, here)), closing, here
 

@@ -241,10 +241,6 @@ class Changed:
         """Candidates that may have changed where none surely has."""
         return frozenset() if self.surely else self.singly
 
-    def among(self, keys: Collection[Key]) -> Changed:
-        """Return the same where only some candidates can say that anything has changed."""
-        return replace(self, surely=self.surely.intersection(keys))
-
-    def and_surely(self, key: Key) -> Changed:
-        """Return the same, a candidate having changed for another reason."""
-        return replace(self, surely=self.surely | {key})
+    def among(self, keys: Collection[Key], certain: Collection[Key]) -> Changed:
+        """Return the same where only some candidates can say that anything has, some by size."""
+        return replace(self, surely=self.surely.union(certain).intersection(keys))

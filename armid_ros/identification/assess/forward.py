@@ -117,7 +117,6 @@ class RecordedTorque(Controller):
         omega = self.bandwidth
         pull = omega**2 * (desired[0] - q) + 2.0 * omega * (desired[1] - dq)
         mass = pin.crba(self.robot.model, self._data, q)
-        mass = np.triu(mass) + np.triu(mass, 1).T
         return np.asarray(feedforward + mass @ pull + self.inertia * pull)
 
 
