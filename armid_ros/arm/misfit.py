@@ -6,7 +6,8 @@ What a model leaves of the recordings it was tried on, kept in model.yaml.
 No real arm is as its model to the noise. A diagnosis that asks what has changed measures in units
 of what the model left before. The block ``misfit`` of model.yaml has ``unit``, ``data`` - held-out
 or training -, ``rms`` of the residual by joint, and ``relative_error_percent`` of the torque. What
-a model gets wrong of an arm grows with what the arm does: ``torque_rms`` says what it did.
+a model gets wrong of an arm grows with what the arm does: ``torque_rms`` says what it did. Rows of
+a wider band have more noise: ``filters`` says behind which it was measured.
 
 """
 
@@ -15,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from armid_ros.arm.model_check import checked_model
 from armid_ros.errors import ModelError
@@ -25,6 +26,19 @@ from armid_ros.robots import Robot
 import numpy as np
 
 _DATA = ('held-out', 'training')
+
+
+class Filters(NamedTuple):
+    """
+    What recordings were filtered with: sampling rate and cut-off [Hz], and decimation.
+
+    They are those of `armid_ros.identification.rows.signals.Conditioning`.
+
+    """
+
+    rate_hz: float
+    cutoff_hz: float
+    decimation: int
 
 
 @dataclass(frozen=True)
@@ -47,6 +61,8 @@ class Misfit:
         inverse of a covariance), where it is known; model.yaml does not have it.
     unusable : bool
         Whether the model was called unusable when it was identified; model.yaml does not have it.
+    filters : Filters or None
+        What it was measured behind; None where it is not known.
 
     """
 
@@ -56,6 +72,7 @@ class Misfit:
     torque_rms: Mapping[str, float] | None = None
     information: FloatArray | None = None
     unusable: bool = False
+    filters: Filters | None = None
 
     def document(self) -> dict[str, Any]:
         """Return the block that model.yaml holds."""
@@ -67,6 +84,8 @@ class Misfit:
         }
         if self.torque_rms is not None:
             block['torque_rms'] = {j: float(value) for j, value in self.torque_rms.items()}
+        if self.filters is not None:
+            block['filters'] = self.filters._asdict()
         return block
 
     def of(self, robot: Robot, torque_rms: FloatArray | None = None) -> FloatArray:
@@ -132,13 +151,23 @@ def misfit_of_block(block: Any) -> Misfit:
         rms, torque = _torques(block['rms']), block.get('torque_rms')
         loud = None if torque is None else _torques(torque)
         data, error = str(block['data']), block['relative_error_percent']
+        filters = None if 'filters' not in block else _filters(block['filters'])
     except (AttributeError, KeyError, TypeError) as fault:
         raise ModelError(f'misfit: {type(fault).__name__} {fault}') from fault
     if data not in _DATA:
         raise ModelError(f"misfit has data '{data}', not {' or '.join(_DATA)}")
     if loud is not None and not loud.keys() >= rms.keys():
         raise ModelError('misfit: torque_rms is not of the joints that rms is of')
-    return Misfit(data, rms, finite(error, 'relative_error_percent of the misfit'), loud)
+    relative = finite(error, 'relative_error_percent of the misfit')
+    return Misfit(data, rms, relative, loud, filters=filters)
+
+
+def _filters(block: Any) -> Filters:
+    values = {name: finite(block[name], f'misfit: {name}') for name in Filters._fields}
+    wrong = [name for name, value in values.items() if value <= 0.0]
+    if wrong:
+        raise ModelError(f'misfit: {wrong[0]} is {values[wrong[0]]:g}, not above zero')
+    return Filters(values['rate_hz'], values['cutoff_hz'], round(values['decimation']))
 
 
 def _torques(block: Any) -> dict[str, float]:

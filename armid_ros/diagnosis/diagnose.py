@@ -18,6 +18,7 @@ from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajectory
+from armid_ros.diagnosis.doubt import doubt_of
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
@@ -46,7 +47,6 @@ from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -65,11 +65,6 @@ _NO_MODEL = (
     'the model leaves {:.3g} times the torque of the baseline itself, more than no model would: '
     'it is that of another arm, or has other units; identify the arm from the baseline, and give '
     'that model'
-)
-#: Doubt where the model is no measure of anything.
-_UNUSABLE = (
-    'The model was unusable when it was identified, as identification.json beside it says: what '
-    'it leaves is no measure of what has changed.'
 )
 #: Note where shares and gap are of the data that names were found in, though others were given.
 _HARDLY_SHOWN = (
@@ -172,30 +167,24 @@ def diagnose(
     known = Baseline.of(arm, before, rng) if baseline else None
     if known is not None and known.errors[0] > 1.0:
         return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
-    asked = _Asked(arm, given, prepared, known, validate, settings, rng, tell)
+    doubt = doubt_of(given, known, baseline, misfit, settings.thresholds)
+    asked = _Asked(arm, given, prepared, known, doubt, validate, settings, rng, tell)
     if settings.partner is not None and tied is not None:
         tell(0.2, f'ties to {settings.partner.source}')
         found = tied(arm, recordings, prepared, settings)
         if found is not None:
             return _said(found, notes, asked)
-    result = _said(_believed(_explainer(asked, misfit).chosen(), misfit), notes, asked)
+    result = _said(_explainer(asked, misfit).chosen(), notes, asked)
     return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
 
 
 def _explainer(asked: _Asked, misfit: Misfit | None) -> Explainer:
     arm, prepared, known = asked.arm, asked.prepared, asked.before
-    written, then = (_left(misfit, arm, part) for part in (prepared, known))
+    written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
     seen = trajectories(asked.validate, prepared.used, arm, prepared.allowed) if known else ()
     information = None if misfit is None else misfit.information
     own = arm, prepared, known, asked.rng, asked.tell, asked.settings
-    return Explainer(*own, written, seen, information, then)
-
-
-def _believed(chosen: Chosen, misfit: Misfit | None) -> Chosen:
-    """Return an explanation that is doubted if the model was unusable when it was identified."""
-    if misfit is None or not misfit.unusable:
-        return chosen
-    return replace(chosen, doubt=chosen.doubt or _UNUSABLE)
+    return Explainer(*own, written, seen, information)
 
 
 def _each_alone(
@@ -224,15 +213,6 @@ def _apart(arm: ArmModel, day: Sequence[Recording], used: Conditioning) -> Itera
             yield one
 
 
-def _left(
-    misfit: Misfit | None, arm: ArmModel, part: Prepared | Baseline | None
-) -> FloatArray | None:
-    """Return what a model left when it was identified, in motions like some data, (n,) [N m]."""
-    if misfit is None or part is None:
-        return None
-    return misfit.of(arm.robot, torque_rms(part.data))
-
-
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
     """Return a result in which all was named, with findings of small share in the small print."""
     large = tuple(one for one in result.findings if one.share >= least)
@@ -248,6 +228,7 @@ class _Asked:
     given: ArmModel
     prepared: Prepared
     before: Baseline | None
+    doubt: str
     validate: Sequence[Recording]
     settings: DiagnosisSettings
     rng: np.random.Generator
@@ -310,7 +291,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
-        doubt=chosen.doubt,
+        doubt=asked.doubt,
         suspected=suspected,
         blind=blind,
     )
@@ -346,7 +327,7 @@ def _doubts(asked: _Asked, chosen: Chosen, verdict: Verdict, blind: Sequence[str
         if blind
         else ''
     )
-    return [text for text in (remedy, chosen.doubt, not_checked, short) if text]
+    return [text for text in (remedy, asked.doubt, not_checked, short) if text]
 
 
 def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:

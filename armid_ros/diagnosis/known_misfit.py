@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel, Misfit
+from armid_ros.arm.misfit import Filters
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import trajectories
@@ -71,4 +72,5 @@ def misfit_of(
         dict(zip(arm.robot.joints, each.tolist(), strict=True))
         for each in (found.misfit, torque_rms(parts))
     )
-    return Misfit(data, rms, 100.0 * found.errors[0], torque)
+    filters = Filters(used.rate_hz, used.cutoff_hz, used.decimation)
+    return Misfit(data, rms, 100.0 * found.errors[0], torque, filters=filters)

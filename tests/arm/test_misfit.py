@@ -3,6 +3,7 @@
 """The misfit in model.yaml: what goes in comes out, and what is wrong is named."""
 
 from armid_ros.arm import ArmModel, load_misfit, load_model, Misfit, save_model
+from armid_ros.arm.misfit import Filters
 from armid_ros.errors import ModelError
 from armid_ros.robots import load_robot
 import numpy as np
@@ -20,7 +21,7 @@ def path(robot, tmp_path):
     """Return a model with a misfit of 0.1, 0.2, ... N m."""
     rms = {joint: 0.1 * (k + 1) for k, joint in enumerate(robot.joints)}
     loud = dict.fromkeys(robot.joints, 2.0)
-    misfit = Misfit('held-out', rms, 5.1, loud)
+    misfit = Misfit('held-out', rms, 5.1, loud, filters=Filters(200.0, 12.5, 8))
     save_model(tmp_path / 'model.yaml', ArmModel(robot), robot.name, misfit=misfit)
     return tmp_path / 'model.yaml'
 
@@ -29,6 +30,7 @@ def test_it_comes_back_and_the_model_is_the_same_without_it(robot, path):
     found = load_misfit(path)
     assert found.data == 'held-out'
     assert found.relative_error_percent == 5.1
+    assert found.filters == (200.0, 12.5, 8)
     np.testing.assert_allclose(found.of(robot), 0.1 * np.arange(1, 7))
     torque = np.array([1.0, 2.0, 3.0, 4.0, 0.0, 8.0])
     factor = np.array([1.0, 1.0, 1.5, 2.0, 1.0, 4.0])
@@ -52,6 +54,8 @@ def test_a_model_that_was_not_identified_has_none(robot, tmp_path):
         ({'torque_rms': {'elbow_pitch': 1.0}}, 'torque_rms'),
         ({'torque_rms': {'elbow_pitch': -1.0}}, 'elbow_pitch'),
         ({'relative_error_percent': None}, 'misfit'),
+        ({'filters': {'rate_hz': 100.0, 'cutoff_hz': -5.0, 'decimation': 4}}, 'cutoff_hz'),
+        ({'filters': {'rate_hz': 100.0}}, 'cutoff_hz'),
     ],
 )
 def test_what_is_wrong_is_named_with_the_file(path, change, said):

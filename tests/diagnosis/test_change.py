@@ -8,7 +8,7 @@ from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
 from armid_ros.diagnosis.search.choice import WRITTEN_MISFIT
 from armid_ros.diagnosis.search.explanation import Chosen
 from armid_ros.diagnosis.verdict import attribution
-from armid_ros.identification import identify
+from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.model import inverse_dynamics
 from armid_ros.report.diagnosis_report import tone_of
 import numpy as np
@@ -115,6 +115,25 @@ def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     assert result.verdict == 'consistent', result.summary
     assert ('times as much in elbow as when it was identified' in result.doubt) == changed
     assert (result.doubt in result.summary) and bool(result.doubt) == changed
+
+
+@pytest.mark.parametrize('told', [False, True])
+def test_the_noise_of_a_wider_band_is_no_reason_to_doubt_a_baseline(bench, told):
+    """The recordings are those that the model is of, behind other filters."""
+    noise = np.random.default_rng(7)
+
+    def shaken(motion, tau):
+        return tau + 0.3 * noise.standard_normal(tau.shape)
+
+    before, after = (bench.recordings(shaken, seed=seed) for seed in (1, 2))
+    narrow, wide = SignalSettings(cutoff_hz=4.0, decimation=25), SignalSettings(decimation=1)
+    rng = np.random.default_rng(0)
+    found = identify(bench.arm, before, settings=IdentificationSettings(signals=narrow), rng=rng)
+    misfit = known_misfit(found, before)
+    misfit = misfit if told else replace(misfit, filters=None)
+    settings = DiagnosisSettings(signals=wide)
+    result = diagnose(found.arm, after, baseline=before, misfit=misfit, settings=settings, rng=rng)
+    assert bool(result.doubt) != told, result.summary
 
 
 def test_a_model_that_was_unusable_is_doubted(bench):

@@ -35,7 +35,6 @@ from armid_ros.diagnosis.search.explanation import (
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
-from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -85,8 +84,6 @@ class Explainer:
         Further data of the day in question, which nothing is fitted to.
     information : ndarray, shape (P, P), or None
         What is known of the parameters of the model, where there is no baseline.
-    known : ndarray, shape (n,), or None
-        Misfit that the model is known to have in motions like the baseline [N m].
 
     """
 
@@ -99,7 +96,6 @@ class Explainer:
     written: FloatArray | None = None
     unseen: Sequence[Trajectory] = ()
     information: FloatArray | None = None
-    known: FloatArray | None = None
 
     def chosen(self) -> Chosen:
         """Return the explanation that is given of the gap."""
@@ -195,7 +191,7 @@ class Explainer:
             unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
             more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
         found = self._changes(evidence, misfit, baseline, more)
-        chosen = Chosen(found, misfit, OWN_MISFIT, doubt=self._doubt(baseline))
+        chosen = Chosen(found, misfit, OWN_MISFIT)
         if not found.steps:
             return chosen
         first = count_recordings(baseline.data)
@@ -207,43 +203,6 @@ class Explainer:
             rest=found,
             notes=(untested,) if untested else (),
             untested=untested,
-        )
-
-    def _doubt(self, baseline: Baseline) -> str:
-        """Say that the model is poor on the baseline itself, or nothing if it is not."""
-        return self._unlike(baseline) or self._poor(baseline)
-
-    def _unlike(self, baseline: Baseline) -> str:
-        """Say that the model leaves much more of a baseline than when it was identified."""
-        if self.known is None:
-            return ''
-        joints = self.arm.robot.joints
-        usual = self.settings.thresholds.other_motion * np.maximum(baseline.varies, 1.0)
-        times = baseline.misfit / np.maximum(self.known, 1e-300)
-        worst = int(np.argmax(times / np.sqrt(usual)))
-        if times[worst] ** 2 <= usual[worst]:
-            return ''
-        return (
-            f'In the baseline the model leaves {times[worst]:.1f} times as much in '
-            f'{joints[worst]} as when it was identified: it is not what the model was identified '
-            'from, or something had changed by then.'
-        )
-
-    def _poor(self, baseline: Baseline) -> str:
-        """Say that a model leaves much of the torque of a baseline."""
-        whole, each = baseline.errors
-        bad = [
-            f'{100.0 * error:.0f} % of the torque of {joint}'
-            for joint, error in zip(self.arm.robot.joints, each, strict=True)
-            if 100.0 * error > LIMITS.unusable
-        ]
-        if 100.0 * whole > LIMITS.poor:
-            bad.insert(0, f'{100.0 * whole:.0f} % of the torque of the arm')
-        if not bad:
-            return ''
-        return (
-            f'In the baseline itself the model leaves {", ".join(bad)}: is it the model of this '
-            'arm? A change of less is not seen.'
         )
 
     def _changes(

@@ -148,8 +148,6 @@ class Chosen:
     rest : Explanation or None
         The same names fitted jointly with a body common to both days: its residual is what they
         leave.
-    doubt : str
-        Why the model itself may be wrong, a sentence; empty if it need not be.
     untested : str
         What would tell a change from another motion's misfit, a sentence; empty if the recordings
         do. Where they do not, names have to take most of the gap.
@@ -161,7 +159,6 @@ class Chosen:
     floor_in_words: str
     notes: tuple[str, ...] = ()
     rest: Explanation | None = None
-    doubt: str = ''
     untested: str = ''
 
     @property
