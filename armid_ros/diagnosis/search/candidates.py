@@ -26,6 +26,8 @@ from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspa
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE, Effect, Kind, Shape
+from armid_ros.effects.friction import CoulombFriction, ViscousFriction
+from armid_ros.effects.friction_level import friction_level
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
@@ -86,7 +88,13 @@ class Question:
 
     def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
         """Return the effects to look for, of those that may be named."""
-        return tuple(kind.as_change() for kind in library) if self.since else tuple(library)
+        if not self.since:
+            return tuple(library)
+        kinds = [kind.as_change() for kind in library]
+        if {ViscousFriction.name, CoulombFriction.name} <= {kind.name for kind in library}:
+            pairs = zip(self.arm.effects, self.arm.values, strict=True)
+            kinds += friction_level(pairs, self.arm.robot)
+        return tuple(kinds)
 
 
 def frees_body(base: BaseParameters | None, arm: ArmModel) -> bool:

@@ -121,6 +121,11 @@ def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
     """Return an arm with an effect, whose values are added to those it has of it already."""
     there = _there(arm, effect)
     if there is None:
+        words = effect.named_as(values, arm)
+        if all(said.linear and _there(arm, said) for said, _ in words):
+            for said, theirs in words:
+                arm = with_named(arm, said, theirs)
+            return arm
         return arm.with_effect(effect, values)
     position, rows = there
     changed = arm.values[position].copy()

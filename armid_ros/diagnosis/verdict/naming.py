@@ -54,12 +54,7 @@ def findings(
         steps = [taken[k] for k in indices]
         joints = _joints([part.effect.joints for part in parts], arm)
         order = [joint for joint in arm.robot.joints if joint in joints]
-        rows = [
-            (parameter, float(value), float(std))
-            for part in parts
-            for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True)
-            if np.isfinite(std)
-        ]
+        rows = _rows(parts)
         places = [*order, '']
         rows.sort(key=lambda row: places.index(row[0].joint) if row[0].joint in places else 0)
         rivals = _rivals(steps, Rival(name, joints), set(merged) - {name}, arm)
@@ -85,6 +80,17 @@ def findings(
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
+
+
+def _rows(parts: Sequence[_Said]) -> list[tuple[ParameterName, float, float]]:
+    """Return the parameters of effects of one name, each once, with values and deviations."""
+    rows: dict[ParameterName, tuple[float, float]] = {}
+    for part in parts:
+        for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):
+            if np.isfinite(std):
+                before, wide = rows.get(parameter, (0.0, 0.0))
+                rows[parameter] = before + float(value), float(np.hypot(wide, std))
+    return [(parameter, *numbers) for parameter, numbers in rows.items()]
 
 
 def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> tuple[str, float]:

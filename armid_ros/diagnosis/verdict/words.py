@@ -10,6 +10,7 @@ from typing import Literal
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
+from armid_ros.diagnosis.search.trial import ROUNDING
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
@@ -217,10 +218,19 @@ def _sentences(findings: Sequence[Finding]) -> str:
         if len(group) == 1:
             said.append(sentence(group[0]))
             continue
-        first, *others = (_subject(other) for other in group)
-        subjects = ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
+        subjects = _subjects(group)
         said.append(f'{subjects} together explain {share_in_words(group[0])}.')
     return ' '.join(said)
+
+
+def _subjects(group: Sequence[Finding]) -> str:
+    """Return what names that are one cause are, where, and their values."""
+    names = ' and '.join(one.name.replace('_', ' ') for one in group)
+    where = {_in_many(one) for one in group}
+    if len(where) == 1 and all(where):
+        return f'{names.capitalize()}{where.pop()}'
+    first, *others = (_subject(one) for one in group)
+    return ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
@@ -244,8 +254,9 @@ def _subject(finding: Finding) -> str:
         return f'{words.capitalize()} at {where}'
     if finding.weighs:
         return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{_put_down(finding)}'
-    if len(finding.joints) > _JOINTS_SAID:
-        return f'{words.capitalize()} in {len(finding.joints)} joints'
+    many = _in_many(finding)
+    if many:
+        return f'{words.capitalize()}{many}'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
     shown = list(_values(finding))
     if len(shown) > 3:
@@ -253,6 +264,24 @@ def _subject(finding: Finding) -> str:
     meant = f': {finding.sign}' if finding.sign else ''
     numbers = f' ({", ".join(shown)}{meant})' if shown else ''
     return f'{article} {words}{where}{numbers}'
+
+
+def _in_many(finding: Finding) -> str:
+    """Say in how many joints a cause is, and by which factor; nothing where these are few."""
+    if len(finding.joints) <= _JOINTS_SAID:
+        return ''
+    return f' in {len(finding.joints)} joints{_by_one_factor(finding)}'
+
+
+def _by_one_factor(finding: Finding) -> str:
+    """Say that all values have changed by one share of what they were; nothing where not."""
+    had = np.array(finding.had)
+    if not len(had) or not np.all(had):
+        return ''
+    shares, wide = (np.array(each) / had for each in (finding.values, finding.std))
+    if np.ptp(shares) > ROUNDING * np.abs(shares).max():
+        return ''
+    return f' (by {as_sure(100.0 * shares[0], 100.0 * wide[0])} % of what it was)'
 
 
 def _values(finding: Finding) -> Iterator[str]:
