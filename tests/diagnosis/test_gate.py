@@ -200,6 +200,13 @@ def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since
     assert remedy in found.summary
 
 
+def test_torques_of_which_none_was_measured_are_one_fault(bench):
+    one = bench.recordings()[0]
+    silent = replace(one, tau=0.0 * one.tau)
+    (said,) = dead_channels(bench.arm, silent, [])
+    assert said.endswith('the torque of every joint is constant; fill in effort')
+
+
 def test_a_joint_that_nobody_drives_is_not_dead(bench):
     """Weight and inertia of a free pendulum cancel; a drive at its limit may stay there."""
     recordings = bench.recordings()

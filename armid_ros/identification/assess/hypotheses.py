@@ -235,15 +235,22 @@ class LateTorque(Hypothesis):
 
 @dataclass(frozen=True)
 class InDegrees(Hypothesis):
-    """Positions are in degrees."""
+    """Positions are in degrees: those of all joints that turn, or of one."""
+
+    joint: int | None = None
 
     def motion(self, motion: Motion) -> Motion:
         """Convert them."""
-        return _changed(motion, 'position', np.deg2rad)
+        if self.joint is None:
+            return _changed(motion, 'position', np.deg2rad)
+        return _scaled(motion, self.joint, 'position', np.deg2rad(1.0))
 
     def sentence(self, robot: Robot) -> str:
-        """Say so."""
-        return 'the positions seem to be in degrees: convert them to rad'
+        """Name the joint, if it is one alone."""
+        if self.joint is None:
+            return 'the positions seem to be in degrees: convert them to rad'
+        joint = robot.joints[self.joint]
+        return f'the position of {joint} seems to be in degrees: convert it to rad'
 
 
 @dataclass(frozen=True)
@@ -373,16 +380,23 @@ def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
     if not np.all(robot.prismatic):
         yield InDegrees()
     for joint in range(robot.n_joints):
-        for unit in TORQUE_UNITS:
-            yield InUnit(joint, unit)
-        for quantity in QUANTITIES:
-            yield Reversed(joint, quantity)
-        if not robot.prismatic[joint]:
-            for degrees in TURNS:
-                yield ZeroOff(joint, degrees)
+        yield from _of_joint(robot, joint)
     for first, second in combinations(range(robot.n_joints), 2):
         for quantity in QUANTITIES:
             yield Exchanged(first, second, quantity)
+
+
+def _of_joint(robot: Robot, joint: int) -> Iterator[Hypothesis]:
+    for unit in TORQUE_UNITS:
+        yield InUnit(joint, unit)
+    for quantity in QUANTITIES:
+        yield Reversed(joint, quantity)
+    if robot.prismatic[joint]:
+        return
+    if robot.n_joints > 1:
+        yield InDegrees(joint)
+    for degrees in TURNS:
+        yield ZeroOff(joint, degrees)
 
 
 def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:

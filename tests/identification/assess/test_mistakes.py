@@ -291,6 +291,14 @@ def test_degrees(robot, sound):
     assert 'in degrees' in mistake_in(robot, replace(sound, q=np.rad2deg(sound.q)))
 
 
+@pytest.mark.parametrize('joint', [0, 1, 2, 3])
+def test_degrees_of_one_joint_alone(robot, sound, joint):
+    wrong = replace(sound, q=with_column(sound.q, joint, np.rad2deg))
+    said = mistake_in(robot, wrong)
+    assert said.startswith(f'the position of {robot.joints[joint]} seems to be in degrees'), said
+    assert ', or ' not in said
+
+
 def test_gravity_of_the_earth_on_a_recording_from_the_moon(robot):
     said = mistake_in(robot, recording_of(robot, 1, (0.0, 0.0, -1.62)))
     assert '--gravity moon' in said
