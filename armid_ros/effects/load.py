@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity, SURELY
+from armid_ros.estimate import ParameterName
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -25,6 +26,12 @@ class _LinkBody(Effect):
     """Ten inertial parameters about the frame of a link's joint, added to the link's own."""
 
     changes_body = True
+
+    def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
+        """Name them; a body has the same units on a joint that slides."""
+        return tuple(
+            ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
+        )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the links' own columns of the regressor, shape (N, n, P)."""

@@ -102,7 +102,7 @@ def test_a_position_that_jumps_is_named_with_its_joint_and_time(bench):
     q[500:, 1] += 0.5
     jumped = replace(first, q=q)
     (said,) = faults(bench, [jumped, *others])
-    assert f'position of elbow jumps by 0.504 at {first.t[500]:.3f} s' in said
+    assert f'position of elbow jumps by 0.504 rad at {first.t[500]:.3f} s' in said
     assert not faults(bench, [first, *others])
 
 

@@ -50,6 +50,7 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
     if not np.any(np.ptp(recording.tau, axis=0)):
         yield f'in {recording.source or "a recording"} {SILENT}'
         return
+    units = arm.robot.torque_units
     t, least = recording.t, max(2, round(_LONG / recording.period))
     for j, joint in enumerate(recording.joints):
         reading, q = recording.tau[:, j], recording.q[:, j]
@@ -62,11 +63,11 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
         if _changes(arm, motions, j, float(t[start]), float(t[stop - 1])):
             always = stop - start == len(reading)
             when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
-            value = reading[start] + 0.0
+            value = f'{reading[start] + 0.0:.4g} {units[j]}'
             remedy = 'record with the joint held still' if always else 'leave that time out'
             yield (
                 f'in {recording.source or "a recording"} the torque of {joint} stays at '
-                f'{value:.4g} {when} while the joint moves: its channel is dead; {remedy}'
+                f'{value} {when} while the joint moves: its channel is dead; {remedy}'
             )
 
 

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
 from armid_ros.identification.assess.torque_units import unit_of
-from armid_ros.identification.rows.checks import TORQUE_UNITS
+from armid_ros.identification.rows.checks import effort_unit, TORQUE_UNITS
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot
@@ -241,9 +241,8 @@ class InDegrees(Hypothesis):
 
     def motion(self, motion: Motion) -> Motion:
         """Convert them."""
-        if self.joint is None:
-            return _changed(motion, 'position', np.deg2rad)
-        return _scaled(motion, self.joint, 'position', np.deg2rad(1.0))
+        joint = slice(None) if self.joint is None else self.joint
+        return _scaled(motion, joint, 'position', np.deg2rad(1.0))
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint, if it is one alone."""
@@ -336,8 +335,9 @@ class InUnit(Hypothesis):
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint and the unit."""
-        joint = robot.joints[self.joint]
-        return f'the torque of {joint} seems to be in {self.unit} instead of N m: convert it'
+        joint, right = robot.joints[self.joint], robot.torque_units[self.joint]
+        wrong = effort_unit(robot, self.joint, self.unit)
+        return f'the torque of {joint} seems to be in {wrong} instead of {right}: convert it'
 
 
 @dataclass(frozen=True)
@@ -432,8 +432,8 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
     return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
 
 
-def _scaled(motion: Motion, joint: int, quantity: Quantity, factor: float) -> Motion:
-    """Return a motion in which a quantity of one joint is multiplied."""
+def _scaled(motion: Motion, joint: int | slice, quantity: Quantity, factor: float) -> Motion:
+    """Return a motion in which a quantity of one joint, or of some, is multiplied."""
     scale = np.ones(motion.n_joints)
     scale[joint] = factor
     return _changed(motion, quantity, lambda values: values * scale)
