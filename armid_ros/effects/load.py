@@ -18,6 +18,8 @@ import numpy as np
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
+#: Moments of inertia among the parameters of a link: Ixx, Iyy, Izz.
+_MOMENTS = 4, 6, 9
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
@@ -201,3 +203,16 @@ class LinkInertia(_LinkBody):
         Quantity(f'{name}_difference', unit)
         for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)
     )
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """
+        Return whether what is left of the link has no inertia of less than nothing.
+
+        Nothing is said where values stand for others that the motion does not tell from them.
+
+        """
+        if not np.all(std[4:] > 0.0):
+            return True
+        (link,) = self.indices(arm.robot.joints)
+        own = arm.robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS))[link]
+        return bool(np.all((own + values + SURELY * std)[list(_MOMENTS)] > 0.0))

@@ -124,6 +124,16 @@ def test_a_body_on_a_lift_has_inertia_and_its_rotor_a_mass():
     assert {unit for name, unit in units.items() if 'Ixx' in name} == {'kg m^2'}
 
 
+@pytest.mark.parametrize(('change', 'possible'), [(-6.7, False), (-1e-5, True), (6.7, True)])
+def test_no_link_has_an_inertia_of_less_than_nothing(robot, change, possible):
+    arm, effect = ArmModel(robot), CATALOGUE['link_inertia'].on(robot, ('elbow_pitch',))
+    values, std = np.zeros(10), np.full(10, 1e-3)
+    values[4] = change
+    assert effect.plausible(values, std, arm) == possible
+    hidden = np.where(np.arange(10) < 6, std, 0.0)  # Izz may stand for Ixx
+    assert effect.plausible(values, hidden, arm)
+
+
 @pytest.mark.parametrize(('shift', 'opposes'), [(0.4, True), (-0.4, True), (0.7, False)])
 def test_friction_of_any_direction_opposes_the_motion(robot, shift, opposes):
     """A joint of 0.5 N m of friction is not pushed forwards by 0.2 N m of it."""

@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -101,10 +103,12 @@ def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> t
 def small_print(
     trials: Sequence[Trial], total: float, tried: int, arm: ArmModel
 ) -> tuple[Finding, ...]:
-    """Return findings of causes that are significant and do not matter."""
+    """Return findings of causes that are significant, can be, and do not matter."""
     result = []
     for trial in trials:
         effect, kept = trial.candidate.effect, list(trial.candidate.kept)
+        if not _can_be(trial, arm):
+            continue
         names = effect.parameters(arm.robot)
         spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
         share, wide = min(trial.gain / total, 1.0), 2.0 * float(spread) / total
@@ -124,6 +128,20 @@ def small_print(
             )
         )
     return tuple(result)
+
+
+def _can_be(trial: Trial, arm: ArmModel) -> bool:
+    """
+    Return whether values are within their bounds, where they exclude zero.
+
+    A search lets values be beyond a bound by what noise makes; there is nothing to say of those.
+
+    """
+    lower, upper = (
+        bound[list(trial.candidate.kept)] for bound in room(trial.candidate.effect, arm)
+    )
+    beyond = (trial.values < lower) | (trial.values > upper)
+    return not np.any(beyond & excludes_zero(trial.values, trial.std))
 
 
 def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
