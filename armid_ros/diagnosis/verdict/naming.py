@@ -264,7 +264,16 @@ def two_names(name: str, joints: Sequence[str], rival: Rival) -> str:
     """Return a name and its rival in words, with their joints."""
     own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
     own = '' if own == other else own
-    return f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
+    first, second = (one.replace('_', ' ') for one in (name, rival.name))
+    return f'{first}{own} from {second}{other}'
+
+
+def on_one_link(name: str, joints: Sequence[str], rival: Rival) -> bool:
+    """Return whether a load and its rival are bodies on the same link, which no motion tells."""
+    both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
+    bodies = len(both) == 2 and all(kind.changes_body for kind in both)
+    carried = any(kind.comes_and_goes for kind in both)
+    return bodies and carried and bool(joints) and set(joints) == set(rival.joints)
 
 
 def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
@@ -274,8 +283,7 @@ def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
     No motion separates a payload from the link that carries it: it has to be taken off.
 
     """
-    both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
-    carried = [kind for kind in both if kind.comes_and_goes and kind.changes_body]
-    one_body = set(joints) == set(rival.joints) and all(kind.changes_body for kind in both)
-    kinds = carried if one_body and carried else both
+    kinds = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
+    if on_one_link(name, joints, rival):
+        kinds = [kind for kind in kinds if kind.comes_and_goes]
     return '; or '.join(dict.fromkeys([kind.shown_by for kind in kinds] or [Effect.shown_by]))

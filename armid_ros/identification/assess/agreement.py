@@ -17,9 +17,9 @@ WIDTH = 2.0
 #: Share of all experiments in which a right estimate is within the range.
 _COVERED = 0.95
 #: Independent values that a covariance is as if estimated from: it follows the spectrum of the
-#: residual in the band of the motion, of which a run of 20 s shows little. In 23 simulations of the
-#: demo the distance of 56 parameters had mean 56 and deviation 17, which this makes; a covariance
-#: that is known makes 11, and called five of them wrong in place of one.
+#: residual in the band of the motion, of which a run of 20 s shows little. In 23 simulations of
+#: the demo the distance of 56 parameters had mean 56 and deviation 17, which this makes; a
+#: covariance that is known makes 11, and called five of them wrong in place of one.
 FREEDOM = 40.0
 
 
