@@ -11,6 +11,7 @@ from typing import Literal
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
+from armid_ros.identification.rows.stamps import rounded_stamps
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
@@ -184,7 +185,10 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
     if report.clock_note:
         yield Remark('doubt', f'time is that of reception: header stamps {report.clock_note}')
     lost = report.duplicates + report.out_of_order + report.restarted + report.nan
-    if lost or report.malformed or report.unstamped or report.incomplete:
+    rounded = rounded_stamps(recording)
+    if rounded:
+        yield Remark('doubt', rounded)
+    elif lost or report.malformed or report.unstamped or report.incomplete:
         yield Remark('doubt', report.describe())
     if sampling.gaps:
         yield Remark(

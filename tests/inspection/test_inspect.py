@@ -10,7 +10,7 @@ from armid_ros.identification import identify
 from armid_ros.identification.assess.grade import grade
 from armid_ros.inspection import inspect, Sampling
 from armid_ros.motion import Motion
-from armid_ros.recording import PositionRange, Recording
+from armid_ros.recording import PositionRange, ReadReport, Recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -145,6 +145,20 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
 def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
     wrong = replace(clean, tau=factor * clean.tau)
     assert any(said in remark for remark in remarks(wrong, robot))
+
+
+def test_stamps_that_are_rounded_are_said_with_their_step(clean):
+    """Of five samples in 50 ms two have one stamp if it is rounded to 12.5 ms."""
+    t = np.round(clean.t / 0.0125) * 0.0125
+    first = np.flatnonzero(np.diff(t, prepend=-1.0) > 0.0)
+    lost = len(clean) - len(first)
+    report = ReadReport(messages=len(clean), samples=len(first), duplicates=lost)
+    rounded = replace(clean.select(first), t=t[first], report=report)
+    said = f'rounded to 12.5 ms: all are multiples of that, and {lost} of 2000 samples'
+    assert any(said in remark for remark in remarks(rounded))
+    twice = replace(clean, report=replace(report, samples=len(clean)))
+    jittered = replace(twice, t=clean.t + 1e-3 * np.random.default_rng(1).uniform(size=2000))
+    assert not any('rounded' in remark for remark in remarks(jittered))
 
 
 def test_what_identification_says_as_well_is_said_once(clean, robot):

@@ -25,7 +25,7 @@ from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.identification.rows.checks import moving
-from armid_ros.identification.rows.stamps import uneven_stamps
+from armid_ros.identification.rows.stamps import rounded_stamps, uneven_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -323,6 +323,7 @@ def _velocities(recordings: Sequence[Recording]) -> Iterator[_Reason]:
 
 
 def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
+    """Say of which recordings stamps jumped back, or are rounded."""
     for recording in recordings:
         report = recording.report
         if report.restarted:
@@ -331,6 +332,9 @@ def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
                 f'{report.messages} messages, on the shorter side of it, are left out'
             )
             yield _Reason('good', text)
+        rounded = rounded_stamps(recording)
+        if rounded:
+            yield _Reason('good', f'in {recording.source or "a recording"} {rounded}')
 
 
 def _sentence(text: str) -> str:
