@@ -28,7 +28,12 @@ def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
-    return click.option(*names, callback=_kept, expose_value=False, **facts)
+    return click.option(*names, **{'callback': _kept, 'expose_value': False, **facts})
+
+
+def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Keep pairs of names, each of which has to be one."""
+    return _kept(ctx, parameter, tuple(_rule(text) for text in value))
 
 
 _OPTIONS = (
@@ -70,6 +75,7 @@ _OPTIONS = (
     _option(
         '--rename',
         multiple=True,
+        callback=_rules,
         metavar='OLD:NEW',
         help='Beginning of joint names in the file, and in the description; of bags too.',
     ),
@@ -103,7 +109,7 @@ def settings() -> ColumnSettings:
         zero=numbers(said['zero']),
         gear=numbers(said['gear']),
         coupling=tuple(_coupling(text) for text in said['coupling']),
-        rename=tuple(_rule(text) for text in said['rename']),
+        rename=said['rename'],
         episode=said['episode'],
     )
 
@@ -126,6 +132,7 @@ def read(
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
+    _no_pairs(paths, said.rename)
     return [
         read_anything(
             path,
@@ -140,10 +147,25 @@ def read(
     ]
 
 
+def _no_pairs(paths: Sequence[Path], rename: Sequence[tuple[str, str]]) -> None:
+    """Refuse a pair of names that was taken as a recording, as it has no option of its own."""
+    for path in paths if rename else ():
+        if ':' in path.name and not path.exists():
+            raise RecordingError(
+                f"there is no recording '{path}'; names to exchange need an option for each pair: "
+                f"--rename '{rename[-1][0]}:{rename[-1][1]}' --rename '{path}'"
+            )
+
+
 def _rule(text: str) -> tuple[str, str]:
     old, colon, new = text.partition(':')
     if not colon:
-        raise RecordingError(f"--rename '{text}' has to be OLD:NEW, as in fer_:panda_")
+        first, equals, second = text.partition('=')
+        right = f'{first}:{second}' if equals else f'{text}:NEW'
+        raise RecordingError(
+            f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
+            f"option for each pair: --rename '{right}' --rename fer_:panda_"
+        )
     return old, new
 
 

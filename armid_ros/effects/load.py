@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity, SURELY
+from armid_ros.estimate import ParameterName
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -17,6 +18,8 @@ import numpy as np
 
 #: How far from its joint a link's mass may be without a word in the description [m].
 _REACH = 0.1
+#: Moments of inertia among the parameters of a link: Ixx, Iyy, Izz.
+_MOMENTS = 4, 6, 9
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
@@ -25,6 +28,12 @@ class _LinkBody(Effect):
     """Ten inertial parameters about the frame of a link's joint, added to the link's own."""
 
     changes_body = True
+
+    def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
+        """Name them; a body has the same units on a joint that slides."""
+        return tuple(
+            ParameterName(q.name, owner, q.unit) for owner in self.owners for q in self.quantities
+        )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the links' own columns of the regressor, shape (N, n, P)."""
@@ -194,3 +203,16 @@ class LinkInertia(_LinkBody):
         Quantity(f'{name}_difference', unit)
         for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)
     )
+
+    def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """
+        Return whether what is left of the link has no inertia of less than nothing.
+
+        Nothing is said where values stand for others that the motion does not tell from them.
+
+        """
+        if not np.all(std[4:] > 0.0):
+            return True
+        (link,) = self.indices(arm.robot.joints)
+        own = arm.robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS))[link]
+        return bool(np.all((own + values + SURELY * std)[list(_MOMENTS)] > 0.0))

@@ -36,6 +36,7 @@ from armid_ros.identification.rows.checks import (
     too_short_to_tell,
 )
 from armid_ros.identification.rows.damage import without_damage
+from armid_ros.identification.rows.decimation import check_decimation
 from armid_ros.identification.rows.regression import predictions, Regression, regressions
 from armid_ros.identification.rows.signals import (
     Conditioning,
@@ -286,7 +287,6 @@ def identify(
     if settings.signals.cutoff_hz is None:
         used = cutoff_of_torques(whole, theory.independent, recordings, used)
     columns = regressions(whole, theory.independent, recordings, used, progress)
-    check_length(recordings, columns, used)
     _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
@@ -336,7 +336,11 @@ def _require_samples(
 ) -> None:
     """Refuse data with fewer than two torques for a parameter."""
     samples = sum(len(part.motion) for part in columns)
-    if sum(part.tau.size for part in columns) < 2 * theory.rank:
+    few = sum(part.tau.size for part in columns) < 2 * theory.rank
+    if few:
+        check_decimation(recordings, used, -(-2 * theory.rank // recordings[0].n_joints))
+    check_length(recordings, columns, used)
+    if few:
         check_stamps(recordings, used)
         raise IdentificationError(
             f'{recordings[0].source}: {samples} samples remain after filtering at '

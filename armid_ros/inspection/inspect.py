@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.identification.assess.dead_encoders import dead_encoders
-from armid_ros.identification.assess.velocities import time_base_fault
-from armid_ros.identification.rows.checks import beyond_limits, too_short_to_tell
+from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
+from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
+from armid_ros.identification.rows.stamps import rounded_stamps
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
@@ -24,7 +25,6 @@ Weight = Literal['bad', 'doubt', 'note']
 
 #: Beyond two turns to either side positions of an arm are hardly in rad.
 _TURNS = 4.0 * np.pi
-_DEGREE = np.pi / 180.0
 #: Steps between samples that vary by more than this share blur what is differentiated.
 _JITTER = 0.2
 
@@ -90,12 +90,20 @@ class Inspection:
             return 'Fit to be identified, as far as can be said without --robot.'
         if self.trial.refused:
             return 'armid identify refuses it.'
-        if self.trial.dead or self.trial.mistake:
-            return 'armid identify calls what it makes of it unusable.'
+        if self.trial.grade != 'good':
+            return f'armid identify calls what it makes of it {self.trial.grade}{self._why}'
         return (
             f'armid identify takes it: relative error {self.trial.relative_error_percent:.1f} %, '
             f'{self.trial.rank} of {self.trial.theory} parameters told apart.'
         )
+
+    @property
+    def _why(self) -> str:
+        """Return the first reason of a grade; a full stop where a remark says it."""
+        assert self.trial is not None
+        reason = self.trial.reasons[0]
+        said = _said(reason, [remark.text for remark in self.remarks])
+        return '.' if said else f': {reason}'
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -135,12 +143,13 @@ def inspect(
         *_of_motion(recording, joints, sampling),
         *_of_efforts(joints, robot, trial),
         *_of_filters(recording),
-        *(Remark('bad', text) for text in _dead(recording, robot, trial)),
     ]
+    if trial is None or trial.refused:
+        found += [Remark('bad', text) for text in dead_encoders(robot, recording)]
     if trial is not None and trial.refused:
         found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
     elif trial is not None:
-        found += _of_fit(trial)
+        found += _of_fit(trial, [remark.text for remark in found])
         found += [Remark('doubt', text) for text in trial.elsewhere]
         said = {remark.text for remark in found}
         found += [Remark('note', note) for note in trial.notes if note not in said]
@@ -151,17 +160,17 @@ def inspect(
     return Inspection(recording, topics, robot, sampling, joints, trial, remarks)
 
 
-def _dead(recording: Recording, robot: Robot | None, trial: TrialFit | None) -> Iterable[str]:
-    """Say which channels are dead; without a fit, as far as positions and velocities tell."""
-    if trial is None or trial.refused:
-        return dead_encoders(robot, recording)
-    return trial.dead
+def _said(text: str, others: Iterable[str]) -> bool:
+    """Whether one of several texts is in another one, that may be a whole sentence."""
+    return any(other.casefold() in text.casefold() for other in others)
 
 
-def _of_fit(trial: TrialFit) -> Iterator[Remark]:
-    if trial.mistake:
-        yield Remark('bad', trial.mistake)
-    elif trial.poor:
+def _of_fit(trial: TrialFit, said: Sequence[str]) -> Iterator[Remark]:
+    """Say what identify finds wrong with the recording, as far as it is not said."""
+    weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
+    others = [*said, *trial.elsewhere]
+    yield from (Remark(weight, fault) for fault in trial.faults if not _said(fault, others))
+    if trial.poor and not trial.faults:
         yield Remark(
             'doubt',
             f'rigid body and friction leave {", ".join(trial.poor)}; look for axes or zeros '
@@ -176,7 +185,10 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
     if report.clock_note:
         yield Remark('doubt', f'time is that of reception: header stamps {report.clock_note}')
     lost = report.duplicates + report.out_of_order + report.restarted + report.nan
-    if lost or report.malformed or report.unstamped or report.incomplete:
+    rounded = rounded_stamps(recording)
+    if rounded:
+        yield Remark('doubt', rounded)
+    elif lost or report.malformed or report.unstamped or report.incomplete:
         yield Remark('doubt', report.describe())
     if sampling.gaps:
         yield Remark(
@@ -216,20 +228,7 @@ def _of_units(
     if recording.dq is None:
         yield Remark('note', 'no velocities; they are taken from the positions anyway')
         return
-    for text, ratio, weight in (
-        ('are in degrees/s while positions are in rad', 1.0 / _DEGREE, 'bad'),
-        ('are in rad/s while positions are in degrees', _DEGREE, 'bad'),
-        ('have the opposite sign of what the positions do', -1.0, 'bad'),
-    ):
-        off = [
-            j.name
-            for j in joints
-            if j.velocity_ratio
-            and j.velocity_fit * np.sign(ratio) > 0.7
-            and 0.8 < j.velocity_ratio / ratio < 1.25
-        ]
-        if off:
-            yield Remark(weight, f'velocities of {", ".join(off)} {text}')  # type: ignore[arg-type]
+    yield from (Remark('doubt', text) for text in velocity_faults(recording))
     time_base = time_base_fault(recording)
     if time_base:
         yield Remark('bad', time_base)
@@ -262,7 +261,7 @@ def _of_efforts(
         yield Remark('bad', 'no efforts: nothing can be identified; is JointState.effort filled?')
         return
     silent = [joint.name for joint in joints if not joint.effort_varies]
-    if silent:
+    if silent and not (trial is not None and SILENT in trial.refused):
         weight: Weight = 'bad' if len(silent) == len(joints) else 'doubt'
         yield Remark(weight, f'efforts of {", ".join(silent)} never change')
     if robot is not None:
@@ -279,7 +278,7 @@ def _of_efforts(
                 f'efforts beyond three times the limit of the description: {", ".join(beyond)}; '
                 'mN m, or torques of the description too low?',
             )
-    if trial is None or trial.scale is None:
+    if trial is None or trial.scale is None or trial.faults:
         return
     known = np.flatnonzero(np.isfinite(trial.scale))
     off = [k for k in known if not 0.4 < trial.scale[k] < 2.5]

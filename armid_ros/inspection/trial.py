@@ -11,14 +11,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import ArmidError
 from armid_ros.identification import Identification, identify, Score
-from armid_ros.identification.assess.dead_channels import dead_channels
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.grade import grade
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.hypotheses import OtherUnit
 from armid_ros.identification.assess.joint_errors import beyond_noise
-from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
-from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -53,10 +49,12 @@ class TrialFit:
         Joints that moved, or stood elsewhere, without being driven.
     poor : tuple of str
         Joints whose torque the fit hardly describes, each with its error.
-    dead : tuple of str
-        Channels that read the same though their joint moves.
-    mistake : str
-        Names or signs that seem to be wrong; empty where none do.
+    grade : str
+        What ``identify`` calls the result: good, poor or unusable; empty where it refuses.
+    reasons : tuple of str
+        Why, the worst first.
+    faults : tuple of str
+        Those that are of the recording itself, without a full stop.
 
     """
 
@@ -70,8 +68,9 @@ class TrialFit:
     notes: tuple[str, ...] = ()
     elsewhere: tuple[str, ...] = ()
     poor: tuple[str, ...] = ()
-    dead: tuple[str, ...] = ()
-    mistake: str = ''
+    grade: str = ''
+    reasons: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
@@ -93,6 +92,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         arm = arm.with_effect(make_effect(name, robot))
     try:
         result = identify(arm, [recording], rng=rng)
+        graded = grade(result, arm, [recording], {})
     except ArmidError as refusal:
         return TrialFit(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
@@ -107,20 +107,10 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         notes=result.notes,
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
         poor=tuple(_poor(result, score.joint_relative_error_percent)),
-        dead=(
-            *dead_encoders(robot, recording, motions),
-            *dead_channels(arm, recording, motions),
-        ),
-        mistake=_mistake(robot, recording, result.used),
+        grade=graded.word,
+        reasons=graded.reasons,
+        faults=graded.faults,
     )
-
-
-def _mistake(robot: Robot, recording: Recording, used: Conditioning) -> str:
-    """Say which names or signs seem to be wrong; factors of efforts are said by themselves."""
-    found = find_mistake(robot, recording, used)
-    if found is None or any(isinstance(one, OtherUnit) for one in found.hypotheses):
-        return ''
-    return found.sentence(robot)
 
 
 def _poor(result: Identification, errors: FloatArray) -> Iterator[str]:

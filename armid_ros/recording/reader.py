@@ -147,12 +147,19 @@ def assemble(
         gaps=_gaps(t),
         absent=absent,
         clock_note=note,
-        damage=damage,
+        damage=_with_what_is_left(damage, decoder.messages, float(t[-1])),
         **counts,
     )
     recording = _recording(path, topic, joints, int(stamps[0]), t, (q, dq, tau), clock, report)
     others = tuple(PositionRange(name, *ends) for name, ends in decoder.others.items())
     return replace(recording, others=others)
+
+
+def _with_what_is_left(damage: str, messages: int, duration: float) -> str:
+    """Say of a damaged bag what could be read of it, before what is wrong with it."""
+    if not damage:
+        return ''
+    return f'of a damaged bag {messages} messages over {duration:.4g} s could be read: {damage}'
 
 
 def _recording(

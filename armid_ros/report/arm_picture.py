@@ -11,7 +11,7 @@ and directions the one is taken in which the arm covers the largest area.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -24,6 +24,8 @@ import pinocchio as pin
 _HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
 #: Names are so far above their joints, a line is so high, a letter about so wide [px].
 _ABOVE, _LINE, _LETTER = 14.0, 14.0, 8.5
+#: Half of the width of a line [px], and points of it that are held against a name.
+_HALF, _SAMPLES = 4.5, 100
 _VIEWS = tuple(Camera(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
 #: Poses that are tried, and how far the last body is drawn beyond its centre of mass.
 _POSES, _BEYOND = 12, 2.0
@@ -150,7 +152,9 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         [
             _dot(place(origins[k + 1]), name, name in marked, width)
             for k, name in enumerate(robot.joints)
-        ]
+        ],
+        ways,
+        width,
     )
     return ArmPicture(
         round(width, 1),
@@ -221,16 +225,51 @@ def _dot(at: tuple[float, float], name: str, marked: bool, width: float) -> Dot:
     return Dot(x, y, name, marked, round(x + shift, 1), round(y - _ABOVE, 1), side)
 
 
-def _apart(dots: Sequence[Dot]) -> list[Dot]:
-    """Return joints with the names of those that are pointed out above each other."""
+def _apart(dots: Sequence[Dot], sticks: Sequence[Stick], width: float) -> list[Dot]:
+    """Return joints with names where nothing else is; else above each other."""
     result: list[Dot] = []
     for dot in dots:
+        free = next((one for one in _places(dot) if _free(one, result, sticks, width)), None)
+        if free is not None:
+            result.append(free)
+            continue
         y = dot.label_y
         near = [other for other in result if other.marked and _one_above_other(other, dot)]
         while dot.marked and (over := [o.label_y for o in near if abs(o.label_y - y) < _LINE]):
             y = min(over) - _LINE
         result.append(replace(dot, label_y=round(y, 1)))
     return result
+
+
+def _places(dot: Dot) -> Iterator[Dot]:
+    """Yield where the name of a joint that is pointed out may be: above, beside or below it."""
+    if not dot.marked:
+        return
+    yield dot
+    level, below = round(dot.y + _LINE / 3.0, 1), round(dot.y + _ABOVE + _LINE, 1)
+    yield replace(dot, label_x=round(dot.x + _ABOVE, 1), label_y=level, anchor='start')
+    yield replace(dot, label_x=round(dot.x - _ABOVE, 1), label_y=level, anchor='end')
+    yield replace(dot, label_y=below)
+
+
+def _free(dot: Dot, others: Sequence[Dot], sticks: Sequence[Stick], width: float) -> bool:
+    """Return whether a name is within the drawing, and over no line and no other name."""
+    start, end = _reach(dot)
+    if start < 0.0 or end > width:
+        return False
+    if any(
+        other.marked and _one_above_other(other, dot) and abs(other.label_y - dot.label_y) < _LINE
+        for other in others
+    ):
+        return False
+    share = np.linspace(0.0, 1.0, _SAMPLES)
+    for stick in sticks:
+        x = stick.x1 + share * (stick.x2 - stick.x1)
+        y = stick.y1 + share * (stick.y2 - stick.y1)
+        beside = (x > start - _HALF) & (x < end + _HALF)
+        if np.any(beside & (y > dot.label_y - _LINE) & (y < dot.label_y + 2.0 * _HALF)):
+            return False
+    return True
 
 
 def _one_above_other(one: Dot, other: Dot) -> bool:

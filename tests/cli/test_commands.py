@@ -210,6 +210,12 @@ def test_a_joint_of_a_bag_with_another_name_is_read_as_the_error_says(bags, tmp_
     armid(*asked, '--rename', rule)
 
 
+def test_a_second_pair_of_names_without_its_option_is_no_recording(bags, tmp_path):
+    asked = ('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o')
+    said = armid(*asked, '--rename', 'zz:b', 'c:d', code=2).stderr
+    assert "no recording 'c:d'" in said and "--rename 'zz:b' --rename 'c:d'" in said
+
+
 def test_joints_have_values_of_their_own_where_an_effect_is_given_for_each(tmp_path):
     robot = load_robot(ROBOT)
     given = {'elbow_pitch': 0.6, 'forearm_yaw': 0.8}

@@ -65,6 +65,7 @@ def test_a_table_is_identified_as_the_bag_is(bags, csv, tmp_path):
     [
         (('{csv}', '--robot', ROBOT, '--effort', 'torque{}'), "no column is 'torque{}'"),
         (('{csv}', '--rename', 'fer'), "--rename 'fer' has to be OLD:NEW"),
+        (('{csv}', '--rename', 'a=b', 'c=d'), "each pair: --rename 'a:b'"),
         (('{csv}', '--gear', '3', '--coupling', '5'), "--coupling '5' has to be MOTOR,JOINT"),
         (('{csv}', '{bag}'), 'several files have to be tables'),
         (('{bag}',), 'nothing to do: a bag of ROS 2 stays as it is without --rename'),

@@ -102,7 +102,7 @@ def test_a_position_that_jumps_is_named_with_its_joint_and_time(bench):
     q[500:, 1] += 0.5
     jumped = replace(first, q=q)
     (said,) = faults(bench, [jumped, *others])
-    assert f'position of elbow jumps by 0.504 at {first.t[500]:.3f} s' in said
+    assert f'position of elbow jumps by 0.504 rad at {first.t[500]:.3f} s' in said
     assert not faults(bench, [first, *others])
 
 
@@ -198,6 +198,13 @@ def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since
     assert found.verdict == 'bad_data'
     assert 'the torque of shoulder stays at' in found.summary
     assert remedy in found.summary
+
+
+def test_torques_of_which_none_was_measured_are_one_fault(bench):
+    one = bench.recordings()[0]
+    silent = replace(one, tau=0.0 * one.tau)
+    (said,) = dead_channels(bench.arm, silent, [])
+    assert said.endswith('the torque of every joint is constant; fill in effort')
 
 
 def test_a_joint_that_nobody_drives_is_not_dead(bench):

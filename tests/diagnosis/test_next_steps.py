@@ -101,8 +101,17 @@ def test_what_may_stand_in_its_place_is_looked_at_as_well():
     steps = next_steps(diagnosis('payload', ('wrist',), LINK, 'ambiguous'))
     assert steps[1].startswith('If it is link inertia, look at wrist: ')
     assert steps[2] == (
-        'If looking does not tell payload from link inertia of wrist, record what shows them '
-        'best: the same motion with and without the tool.'
+        'No motion tells payload from link inertia of wrist, as they move as one body: weigh what '
+        'the link carries, or record the same motion with and without the tool.'
+    )
+
+
+def test_loads_of_two_links_are_told_by_a_recording_that_names_their_joints():
+    other = (Rival('payload', ('fore_arm',)),)
+    steps = next_steps(diagnosis('payload', ('wrist_1',), other, 'ambiguous'))
+    assert steps[2] == (
+        'If looking does not tell payload of wrist_1 from payload of fore_arm, record what shows '
+        'them best: the same motion with and without the tool.'
     )
 
 
@@ -112,7 +121,7 @@ def test_a_run_that_tells_the_names_is_the_only_recording_that_is_asked_for():
     assert told[-1] == 'Run it.'
     alike = next_steps(doubt, planned('link_inertia', False))
     assert alike[-2] == 'Run it.'
-    assert alike[-1].startswith('If neither looking nor that run tells payload from link inertia')
+    assert alike[-1].startswith('No motion tells payload from link inertia of wrist')
 
 
 def test_why_there_is_no_run_is_said_once():

@@ -10,7 +10,7 @@ from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.diagnosis.verdict.naming import _rivals, _separating, _without_later
+from armid_ros.diagnosis.verdict.naming import _rivals, _separating, _without_later, small_print
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
@@ -138,6 +138,13 @@ def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
     )
 
 
+def test_a_small_angle_is_no_zero_in_degrees(bench):
+    effect = CATALOGUE['base_tilt'].on(bench.robot)
+    numbers = (effect.parameters(bench.robot), (0.03517, 0.0006), (0.00017, 0.00015))
+    tilt = Finding('base_tilt', (), *numbers, 0.9, (0.8, 1.0), 0.0)
+    assert 'tilt y 0.00060 +- 0.00029 rad, 0.034 degrees)' in sentence(tilt)
+
+
 def test_names_that_are_one_cause_are_one_sentence(bench):
     closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
 
@@ -194,6 +201,21 @@ def test_an_experiment_names_the_joints_of_both():
     assert same.endswith('elbow: the same motion with and without the tool.')
     other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
     assert other.startswith('To separate torque offset of elbow from link inertia of wrist: ')
+
+
+@pytest.mark.parametrize(('value', 'shown'), [(-0.06, 0), (-0.01, 1), (0.06, 1)])
+def test_the_small_print_has_no_value_beyond_its_bound(bench, value, shown):
+    """A search lets a share of lost torque be negative by what noise makes."""
+    effect = CATALOGUE['actuator_saturation'].on(bench.robot, ('elbow',))
+    trial = SimpleNamespace(
+        candidate=SimpleNamespace(effect=effect, kept=(1,)),
+        values=np.array([value]),
+        std=np.array([0.02]),
+        gains=np.array([1.0, 2.0]),
+        gain=3.0,
+        p=1e-6,
+    )
+    assert len(small_print([trial], 10.0, 1, bench.arm)) == shown
 
 
 def test_the_same_name_in_another_joint_is_a_rival():

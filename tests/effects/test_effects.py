@@ -5,7 +5,7 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.model import inverse_dynamics
-from armid_ros.robots import load_robot
+from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -105,6 +105,33 @@ def test_a_body_may_be_a_payload_and_one_lighter_about_its_axis_than_a_point_may
     nothing = np.concatenate([values[:4], 0.1 * values[4:]])
     assert effect.is_correction(nothing, std, arm)
     assert not effect.is_correction(nothing, np.abs(values), arm)
+
+
+def test_a_body_on_a_lift_has_inertia_and_its_rotor_a_mass():
+    """What a joint feels depends on how it moves, and a body does not."""
+    lift = robot_from_urdf(
+        '<robot name="lift"><link name="floor"/><link name="stage"><inertial><mass value="2"/>'
+        '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>'
+        '<joint name="z" type="prismatic"><parent link="floor"/><child link="stage"/>'
+        '<axis xyz="0 0 1"/><limit lower="0" upper="1" velocity="1" effort="50"/></joint></robot>'
+    )
+    units = {
+        name.name: name.unit
+        for effect in ('payload', 'rotor_inertia')
+        for name in make_effect(effect, lift).parameters(lift)
+    }
+    assert units['rotor_inertia'] == 'kg'
+    assert {unit for name, unit in units.items() if 'Ixx' in name} == {'kg m^2'}
+
+
+@pytest.mark.parametrize(('change', 'possible'), [(-6.7, False), (-1e-5, True), (6.7, True)])
+def test_no_link_has_an_inertia_of_less_than_nothing(robot, change, possible):
+    arm, effect = ArmModel(robot), CATALOGUE['link_inertia'].on(robot, ('elbow_pitch',))
+    values, std = np.zeros(10), np.full(10, 1e-3)
+    values[4] = change
+    assert effect.plausible(values, std, arm) == possible
+    hidden = np.where(np.arange(10) < 6, std, 0.0)  # Izz may stand for Ixx
+    assert effect.plausible(values, hidden, arm)
 
 
 @pytest.mark.parametrize(('shift', 'opposes'), [(0.4, True), (-0.4, True), (0.7, False)])

@@ -1,6 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
+import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -96,6 +97,16 @@ class TestRefusals:
             recording, t=recording.t[part], q=recording.q[part], tau=recording.tau[part]
         )
         self.refused(structure, short, 'too short; record')
+
+    def test_a_decimation_that_leaves_nothing_is_answered_with_one_that_works(
+        self, structure, recording
+    ):
+        settings = IdentificationSettings(signals=SignalSettings(decimation=100_000))
+        with pytest.raises(IdentificationError, match='--decimation 100000 leaves 0') as caught:
+            identify(structure, [recording], settings, rng=np.random.default_rng(0))
+        (largest,) = re.findall(r'--decimation (\d+) is the largest', str(caught.value))
+        works = IdentificationSettings(signals=SignalSettings(decimation=int(largest)))
+        identify(structure, [recording], works, rng=np.random.default_rng(0))
 
     def test_no_motion(self, structure, recording):
         self.refused(structure, replace(recording, q=0.0 * recording.q), 'no motion')

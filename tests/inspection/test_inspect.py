@@ -5,10 +5,12 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, USUAL_EFFECTS
+from armid_ros.identification import identify
+from armid_ros.identification.assess.grade import grade
 from armid_ros.inspection import inspect, Sampling
 from armid_ros.motion import Motion
-from armid_ros.recording import PositionRange, Recording
+from armid_ros.recording import PositionRange, ReadReport, Recording
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -136,12 +138,27 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
     [
         (1e3, 'bad: identify refuses it: run: torques of'),
         (-1.0, 'bad: identify refuses it: run: torques of'),
-        (12.0, 'currents, torques before the gear'),
+        (12.0, 'seem to be in kgf cm instead of N m'),
+        (4.0, 'times the torque in N m (currents?): convert them'),
     ],
 )
 def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
     wrong = replace(clean, tau=factor * clean.tau)
     assert any(said in remark for remark in remarks(wrong, robot))
+
+
+def test_stamps_that_are_rounded_are_said_with_their_step(clean):
+    """Of five samples in 50 ms two have one stamp if it is rounded to 12.5 ms."""
+    t = np.round(clean.t / 0.0125) * 0.0125
+    first = np.flatnonzero(np.diff(t, prepend=-1.0) > 0.0)
+    lost = len(clean) - len(first)
+    report = ReadReport(messages=len(clean), samples=len(first), duplicates=lost)
+    rounded = replace(clean.select(first), t=t[first], report=report)
+    said = f'rounded to 12.5 ms: all are multiples of that, and {lost} of 2000 samples'
+    assert any(said in remark for remark in remarks(rounded))
+    twice = replace(clean, report=replace(report, samples=len(clean)))
+    jittered = replace(twice, t=clean.t + 1e-3 * np.random.default_rng(1).uniform(size=2000))
+    assert not any('rounded' in remark for remark in remarks(jittered))
 
 
 def test_what_identification_says_as_well_is_said_once(clean, robot):
@@ -181,6 +198,28 @@ def test_a_fit_that_explains_little_is_doubted(clean, robot):
 def test_joints_that_are_exchanged_are_named_as_identify_does(clean, robot):
     swapped = replace(clean, tau=clean.tau[:, [1, 0, 2, 3, 4, 5]])
     found = inspect(swapped, robot, rng=np.random.default_rng(0))
-    assert 'exchanged' in found.trial.mistake
-    assert ('bad', found.trial.mistake) in [(one.weight, one.text) for one in found.remarks]
+    (fault,) = found.trial.faults
+    assert 'exchanged' in fault
+    assert ('bad', fault) in [(one.weight, one.text) for one in found.remarks]
     assert 'takes it' not in found.verdict
+
+
+def test_what_identify_calls_unusable_is_not_taken(clean, robot):
+    """The grade of identify is asked, whatever it is for: here a torque that is no arm's."""
+    pushed = clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]
+    other = replace(clean, tau=clean.tau + pushed)
+    arm = ArmModel(robot)
+    for name in USUAL_EFFECTS:
+        arm = arm.with_effect(make_effect(name, robot))
+    result = identify(arm, [other], rng=np.random.default_rng(0))
+    graded = grade(result, arm, [other], {})
+    found = inspect(other, robot, rng=np.random.default_rng(0))
+    assert graded.word != 'good'
+    assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
+    said = f'armid identify calls what it makes of it {graded.word}: {graded.reasons[0]}'
+    assert found.verdict == said
+
+
+def test_torques_that_nobody_measured_are_said_once(clean, robot):
+    silent = remarks(replace(clean, tau=0.0 * clean.tau), robot)
+    assert sum('torque' in one or 'effort' in one for one in silent) == 1

@@ -80,3 +80,15 @@ def test_names_are_not_printed_over_one_another():
     for k, (left, right, y) in enumerate(boxes):
         for start, end, other in boxes[k + 1 :]:
             assert right <= start or end <= left or abs(y - other) >= 14.0
+
+
+def test_a_name_is_not_written_over_the_link_above_its_joint():
+    """The column of a lift goes up from its joint: the name is beside it."""
+    upright = ENDLESS.replace('0.3 0 0', '0 0 0.6')
+    drawn = draw_arm(robot_from_urdf(upright), ['turn'])
+    (dot,) = [one for one in drawn.dots if one.marked]
+    above = [one for one in drawn.sticks if min(one.y1, one.y2) < dot.y - 30.0]
+    assert above
+    left = dot.label_x - (8.5 * len(dot.name) if dot.anchor == 'end' else 0.0)
+    assert dot.anchor != 'middle'
+    assert all(not left < one.x1 < left + 8.5 * len(dot.name) for one in above)

@@ -7,6 +7,7 @@ from pathlib import Path
 import subprocess
 import sys
 
+from armid_ros.identification.assess.agreement import FREEDOM
 from armid_ros.report.figures import (
     convergence_figure,
     parameter_figure,
@@ -149,5 +150,6 @@ def test_nothing_is_cut_off_at_the_edges(case):
 def test_parameter_figure_says_what_is_expected_of_all_parameters_together(case):
     estimate = case.result.estimate
     written = '\n'.join(texts(parameter_figure(estimate, estimate.values)))
-    lower, upper = scipy.stats.chi2.ppf((0.025, 0.975), len(estimate.values))
+    count = len(estimate.values)
+    lower, upper = count * scipy.stats.f.ppf((0.025, 0.975), count, FREEDOM)
     assert f'in 95 of 100 experiments {lower:.0f} to {upper:.0f}' in written

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
-from armid_ros.diagnosis.verdict.naming import shown_best, two_names
+from armid_ros.diagnosis.verdict.naming import on_one_link, shown_best, two_names
 from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
@@ -158,12 +158,23 @@ def _look_at(name: str, diagnosis: Diagnosis) -> str:
 
 
 def _records(finding: Finding, run: NextRun | None) -> list[str]:
-    """Say what else to record of the likeliest rival, unless the planned run tells it apart."""
+    """Say what else tells a name from its likeliest rival, unless the planned run does."""
     separated = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
-    tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'
     return [
-        f'If {tried} {two_names(finding.name, finding.joints, rival)}, record what shows them '
-        f'best: {shown_best(finding.name, finding.joints, rival)}.'
+        _telling(finding, rival, run)
         for rival in finding.rivals[:1]
         if (finding.name, rival.name) not in separated
     ]
+
+
+def _telling(finding: Finding, rival: Rival, run: NextRun | None) -> str:
+    """Say what tells a name from a rival; a load and the link below it move as one body."""
+    names = two_names(finding.name, finding.joints, rival)
+    best = shown_best(finding.name, finding.joints, rival)
+    if on_one_link(finding.name, finding.joints, rival):
+        return (
+            f'No motion tells {names}, as they move as one body: weigh what the link carries, or '
+            f'record {best}.'
+        )
+    tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'
+    return f'If {tried} {names}, record what shows them best: {best}.'

@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Step, Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -107,10 +109,12 @@ def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> t
 def small_print(
     trials: Sequence[Trial], total: float, tried: int, arm: ArmModel
 ) -> tuple[Finding, ...]:
-    """Return findings of causes that are significant and do not matter."""
+    """Return findings of causes that are significant, can be, and do not matter."""
     result = []
     for trial in trials:
         effect, kept = trial.candidate.effect, list(trial.candidate.kept)
+        if not _can_be(trial, arm):
+            continue
         names = effect.parameters(arm.robot)
         spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
         share, wide = min(trial.gain / total, 1.0), 2.0 * float(spread) / total
@@ -130,6 +134,20 @@ def small_print(
             )
         )
     return tuple(result)
+
+
+def _can_be(trial: Trial, arm: ArmModel) -> bool:
+    """
+    Return whether values are within their bounds, where they exclude zero.
+
+    A search lets values be beyond a bound by what noise makes; there is nothing to say of those.
+
+    """
+    lower, upper = (
+        bound[list(trial.candidate.kept)] for bound in room(trial.candidate.effect, arm)
+    )
+    beyond = (trial.values < lower) | (trial.values > upper)
+    return not np.any(beyond & excludes_zero(trial.values, trial.std))
 
 
 def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
@@ -252,7 +270,16 @@ def two_names(name: str, joints: Sequence[str], rival: Rival) -> str:
     """Return a name and its rival in words, with their joints."""
     own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
     own = '' if own == other else own
-    return f'{name}{own} from {rival.name}{other}'.replace('_', ' ')
+    first, second = (one.replace('_', ' ') for one in (name, rival.name))
+    return f'{first}{own} from {second}{other}'
+
+
+def on_one_link(name: str, joints: Sequence[str], rival: Rival) -> bool:
+    """Return whether a load and its rival are bodies on the same link, which no motion tells."""
+    both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
+    bodies = len(both) == 2 and all(kind.changes_body for kind in both)
+    carried = any(kind.comes_and_goes for kind in both)
+    return bodies and carried and bool(joints) and set(joints) == set(rival.joints)
 
 
 def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
@@ -262,8 +289,7 @@ def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
     No motion separates a payload from the link that carries it: it has to be taken off.
 
     """
-    both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
-    carried = [kind for kind in both if kind.comes_and_goes and kind.changes_body]
-    one_body = set(joints) == set(rival.joints) and all(kind.changes_body for kind in both)
-    kinds = carried if one_body and carried else both
+    kinds = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
+    if on_one_link(name, joints, rival):
+        kinds = [kind for kind in kinds if kind.comes_and_goes]
     return '; or '.join(dict.fromkeys([kind.shown_by for kind in kinds] or [Effect.shown_by]))

@@ -326,9 +326,11 @@ def _mass(finding: Finding) -> tuple[float, float]:
 
 
 def _with_degrees(value: float, std: float, unit: str) -> str:
+    """Return a value with its interval; an angle in degrees as well, to the same digits."""
     text = f'{as_sure(value, std)} {unit}'.strip()
     if unit == 'rad':
-        return f'{text}, {np.rad2deg(value):.1f} degrees'
+        degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
+        return f'{text}, {degrees} degrees'
     return text
 
 

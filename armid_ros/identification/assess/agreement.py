@@ -16,6 +16,11 @@ import scipy.stats
 WIDTH = 2.0
 #: Share of all experiments in which a right estimate is within the range.
 _COVERED = 0.95
+#: Independent values that a covariance is as if estimated from: it follows the spectrum of the
+#: residual in the band of the motion, of which a run of 20 s shows little. In 23 simulations of
+#: the demo the distance of 56 parameters had mean 56 and deviation 17, which this makes; a
+#: covariance that is known makes 11, and called five of them wrong in place of one.
+FREEDOM = 40.0
 
 
 @dataclass(frozen=True)
@@ -25,7 +30,7 @@ class Agreement:
 
     The misses of correlated parameters come together, so that their number says little. The
     distance of all parameters together, in the metric of their covariance, has a distribution
-    that is known: chi-squared, with as many degrees of freedom as there are parameters.
+    that is known: that of Fisher's F times their number, for a covariance that is estimated.
 
     Attributes
     ----------
@@ -50,13 +55,25 @@ class Agreement:
     upper: float
 
     @staticmethod
-    def of(estimate: Estimate, truth: FloatArray) -> Agreement:
-        """Compare an estimate of P parameters with the truth, shape (P,)."""
+    def of(estimate: Estimate, truth: FloatArray, freedom: float = FREEDOM) -> Agreement:
+        """
+        Compare an estimate of P parameters with the truth, shape (P,).
+
+        Parameters
+        ----------
+        estimate : Estimate
+            Values with covariance.
+        truth : ndarray, shape (P,)
+            What they should be.
+        freedom : float
+            Independent values that the covariance is estimated from; many if it is known.
+
+        """
         scaled = (estimate.values - truth) / estimate.std
         correlation = estimate.covariance / np.outer(estimate.std, estimate.std)
         count = len(scaled)
         tail = 0.5 * (1.0 - _COVERED)
-        lower, upper = scipy.stats.chi2.ppf((tail, 1.0 - tail), count)
+        lower, upper = count * scipy.stats.f.ppf((tail, 1.0 - tail), count, freedom)
         return Agreement(
             parameters=count,
             within=int(np.sum(np.abs(scaled) < WIDTH)),

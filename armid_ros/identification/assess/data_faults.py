@@ -132,7 +132,7 @@ def check_data(
     for one in recordings:
         faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
     faults += [] if faults else _signs(arm, recordings, data)
-    notes = [*_clipped(recordings), *_beyond_limits(arm.robot, recordings)]
+    notes = [*_clipped(arm.robot, recordings), *_beyond_limits(arm.robot, recordings)]
     notes += _described_friction(arm)
     for held in held_elsewhere(arm.robot, recordings, [part.motion for part in data]):
         (faults if held.spoils else notes).append(held.text)
@@ -244,7 +244,8 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
         step = recording.q[row + 1, joint] - recording.q[row, joint]
         yield (
             f'in {recording.source or "a recording"} the position of {robot.joints[joint]} jumps '
-            f'by {step:.3g} at {recording.t[row + 1]:.3f} s: leave out what is faulty'
+            f'by {step:.3g} {robot.position_units[joint]} at {recording.t[row + 1]:.3f} s: leave '
+            'out what is faulty'
         )
 
 
@@ -281,7 +282,7 @@ def _laws(arm: ArmModel, data: Sequence[Stretch]) -> Iterator[str]:
             yield f'{part.source or "recording"}: {law}'
 
 
-def _clipped(recordings: Sequence[Recording]) -> list[str]:
+def _clipped(robot: Robot, recordings: Sequence[Recording]) -> list[str]:
     notes = []
     for recording in recordings:
         if recording.tau is None:
@@ -293,7 +294,7 @@ def _clipped(recordings: Sequence[Recording]) -> list[str]:
             if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
                 notes.append(
                     f'{recording.source or "recording"}: {100 * share:.0f} % of the torque of '
-                    f'{joint} is at {top:.4g}, its highest value: a limit'
+                    f'{joint} is at {top:.4g} {robot.torque_units[j]}, its highest value: a limit'
                 )
     return notes
 
@@ -308,5 +309,5 @@ def _beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> Iterator[st
         for j in np.flatnonzero(largest > _BEYOND * limit).tolist():
             yield (
                 f'{recording.source or "recording"}: the torque of {robot.joints[j]} reaches '
-                f'{largest[j]:.4g}, its limit is {limit[j]:.4g}'
+                f'{largest[j]:.4g}, its limit is {limit[j]:.4g} {robot.torque_units[j]}'
             )

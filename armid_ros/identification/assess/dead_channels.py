@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
+from armid_ros.identification.rows.checks import SILENT
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
@@ -27,6 +28,8 @@ _TAKEN = 0.5
 def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]) -> Iterator[str]:
     """
     Say whose torque stays the same, though the joint moves and takes another one.
+
+    Where it is that of every joint, nobody measured any, and that alone is said.
 
     Parameters
     ----------
@@ -44,6 +47,10 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 
     """
     assert recording.tau is not None
+    if not np.any(np.ptp(recording.tau, axis=0)):
+        yield f'in {recording.source or "a recording"} {SILENT}'
+        return
+    units = arm.robot.torque_units
     t, least = recording.t, max(2, round(_LONG / recording.period))
     for j, joint in enumerate(recording.joints):
         reading, q = recording.tau[:, j], recording.q[:, j]
@@ -56,10 +63,11 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
         if _changes(arm, motions, j, float(t[start]), float(t[stop - 1])):
             always = stop - start == len(reading)
             when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+            value = f'{reading[start] + 0.0:.4g} {units[j]}'
             remedy = 'record with the joint held still' if always else 'leave that time out'
             yield (
                 f'in {recording.source or "a recording"} the torque of {joint} stays at '
-                f'{reading[start]:.4g} {when} while the joint moves: its channel is dead; {remedy}'
+                f'{value} {when} while the joint moves: its channel is dead; {remedy}'
             )
 
 

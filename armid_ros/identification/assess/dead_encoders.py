@@ -59,8 +59,9 @@ def dead_encoders(
 
     """
     source = recording.source or 'a recording'
+    units = ('rad',) * recording.n_joints if robot is None else robot.position_units
     for j, joint in enumerate(recording.joints):
-        unit = 'rad' if robot is None else robot.position_units[j]
+        unit = units[j]
         start, stop, hidden = _stands(recording, j)
         goes = _distance(recording, j, start, stop)
         always = stop - start == len(recording)
@@ -83,10 +84,10 @@ def dead_encoders(
                 'joint at rest: its encoder is dead; '
                 + ('record again' if always else 'leave that time out')
             )
-    yield from _dead_velocities(recording, source)
+    yield from _dead_velocities(recording, source, units)
 
 
-def _dead_velocities(recording: Recording, source: str) -> Iterator[str]:
+def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) -> Iterator[str]:
     """Say which velocities stay the same, if those of other joints that move do not."""
     if recording.dq is None:
         return
@@ -94,12 +95,13 @@ def _dead_velocities(recording: Recording, source: str) -> Iterator[str]:
     same = moves & (np.ptp(recording.dq, axis=0) == 0.0)
     if not np.any(moves & ~same):
         return  # a driver that does not measure velocities
-    for j in np.flatnonzero(same):
+    for j in np.flatnonzero(same).tolist():
+        moved = f'{np.ptp(recording.q[:, j]):.3g} {units[j]}'
         yield (
             f'in {source} the velocity of {recording.joints[j]} stays at '
-            f'{recording.dq[0, j] + 0.0:.4g} throughout, while its position goes '
-            f'{np.ptp(recording.q[:, j]):.3g}: one of the two is dead; record again, or leave '
-            'velocities out if the positions are right'
+            f'{recording.dq[0, j] + 0.0:.4g} {units[j]}/s throughout, while its position goes '
+            f'{moved}: one of the two is dead; record again, or '
+            'leave velocities out if the positions are right'
         )
 
 

@@ -10,6 +10,7 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import GAP_PERIODS
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -38,8 +39,8 @@ class FaultySamples:
     sound: npt.NDArray[np.bool_]
 
 
-def faulty_samples(recording: Recording) -> FaultySamples | None:
-    """Find the samples of a recording that cannot be; None where there are none."""
+def faulty_samples(robot: Robot, recording: Recording) -> FaultySamples | None:
+    """Find the samples of a recording of a robot that cannot be; None where there are none."""
     assert recording.tau is not None
     torque = _spikes(recording.tau)
     position = _jumps(recording)
@@ -53,10 +54,12 @@ def faulty_samples(recording: Recording) -> FaultySamples | None:
         sound[max(0, jump - width) : jump + width] = False
     name, t = recording.joints[joint], recording.t[row]
     if torque[row, joint]:
-        first = f'the torque of {name} is {recording.tau[row, joint]:.3g} at {t:.3f} s'
+        unit = robot.torque_units[joint]
+        first = f'the torque of {name} is {recording.tau[row, joint]:.3g} {unit} at {t:.3f} s'
     else:
         step = recording.q[row, joint] - recording.q[row - 1, joint]
-        first = f'the position of {name} jumps by {step:.3g} at {t:.3f} s'
+        unit = robot.position_units[joint]
+        first = f'the position of {name} jumps by {step:.3g} {unit} at {t:.3f} s'
     return FaultySamples(first, len(np.unique(at[:, 0])), sound)
 
 

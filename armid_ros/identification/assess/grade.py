@@ -22,10 +22,10 @@ from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import find_mistake, Mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
-from armid_ros.identification.assess.velocities import time_base_fault
+from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.identify import Fit, Identification, Score
 from armid_ros.identification.rows.checks import moving
-from armid_ros.identification.rows.stamps import uneven_stamps
+from armid_ros.identification.rows.stamps import rounded_stamps, uneven_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -45,11 +45,14 @@ class Grade:
         The worst that any reason says.
     reasons : tuple of str
         Why, the worst first; one at least.
+    faults : tuple of str
+        What the recordings themselves show to be wrong, the worst first, without a full stop.
 
     """
 
     word: Word
     reasons: tuple[str, ...]
+    faults: tuple[str, ...] = ()
 
     def document(self) -> dict[str, object]:
         """Return the grade for programs to read."""
@@ -87,18 +90,30 @@ def grade(
     """
     blind = _blind(result, description, validation, [*recordings, *held_out])
     seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
-    reasons = [
-        *(_Reason('unusable', _sentence(text)) for texts in blind.values() for text in texts),
+    faults = [
+        *(_Reason('unusable', text) for texts in blind.values() for text in texts),
         *_time_bases([*recordings, *held_out], result),
         *_of_recordings(result, description, validation, seeing),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
+    ]
+    reasons = [
+        *faults,
         *_errors(result, validation),
         *_resting(result, validation),
         *_clocks([*recordings, *held_out]),
+        *_velocities([*recordings, *held_out]),
     ]
-    ordered = sorted(reasons, key=lambda reason: -_WORDS.index(reason.word))
-    return Grade(ordered[0].word, tuple(reason.text for reason in ordered))
+    ordered = _worst_first(reasons)
+    return Grade(
+        ordered[0].word,
+        tuple(_sentence(reason.text) for reason in ordered),
+        tuple(fault.text for fault in _worst_first(faults) if fault.word != 'good'),
+    )
+
+
+def _worst_first(reasons: Sequence[_Reason]) -> list[_Reason]:
+    return sorted(reasons, key=lambda reason: -_WORDS.index(reason.word))
 
 
 def by_error(error: float) -> Word:
@@ -118,7 +133,7 @@ def _of_recordings(
         return mistakes
     motions = [fit.motion for fit in _fits(result, validation)]
     units = units_beyond_drives(description.robot, recordings, motions)
-    return [_Reason('poor', _sentence(text)) for text in units]
+    return [_Reason('poor', text) for text in units]
 
 
 def _mistakes(
@@ -139,7 +154,7 @@ def _mistakes(
             text = f'in {where}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
-        yield _Reason('unusable' if certain else 'poor', _sentence(text))
+        yield _Reason('unusable' if certain else 'poor', text)
 
 
 def _blind(
@@ -168,7 +183,7 @@ def _dead(
     for recording in recordings:
         motions = [fit.motion for fit in fits if fit.source == recording.source]
         for text in dead_channels(description, recording, motions):
-            yield _Reason('unusable', _sentence(text))
+            yield _Reason('unusable', text)
 
 
 def _fits(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[Fit]:
@@ -186,7 +201,7 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
             'unusable': ': the model does not describe this motion',
         }
         text = f'the predicted torque of {bag}, held out, is off by {worst.said}{use[word]}'
-        yield _Reason(word, _sentence(text))
+        yield _Reason(word, text)
     if not validation:
         yield _halves(result)
     fits = _fits_that_count(result, validation)
@@ -197,7 +212,7 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
             f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
         )
         text = f'the torque is hardly predicted of {named}, where it is noise or friction at rest'
-        yield _Reason('good', _sentence(text))
+        yield _Reason('good', text)
 
 
 def _fits_that_count(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[Fit]:
@@ -248,7 +263,7 @@ def _halves(result: Identification) -> _Reason:
             f'{training[joint]:.2g} %: {time:.2g} s of this motion do not determine '
             f'{result.base.rank} parameters; record longer, or move more'
         )
-    return _Reason(word, _sentence(text))
+    return _Reason(word, text)
 
 
 def _elsewhere(
@@ -260,7 +275,7 @@ def _elsewhere(
     """Say which joints move, or stand elsewhere, without being driven."""
     motions = [fit.motion for fit in _fits(result, validation)]
     for found in held_elsewhere(description.robot, recordings, motions):
-        yield _Reason('poor' if found.spoils else 'good', _sentence(found.text))
+        yield _Reason('poor' if found.spoils else 'good', found.text)
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[_Reason]:
@@ -276,11 +291,11 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
             f'not identified and not checked, as they do not move: {names}; record a motion of '
             f'all joints, or ask for the others alone with --joints {others}'
         )
-        reasons.append(_Reason('poor', _sentence(text)))
+        reasons.append(_Reason('poor', text))
     if np.any(fitted & ~checked):
         names = ', '.join(joints[fitted & ~checked])
         text = f'not checked, as they do not move in what was held out: {names}'
-        reasons.append(_Reason('good', _sentence(text)))
+        reasons.append(_Reason('good', text))
     return reasons
 
 
@@ -290,13 +305,25 @@ def _time_bases(recordings: Sequence[Recording], result: Identification) -> Iter
     for recording in recordings:
         text = time_base_fault(recording)
         if text:
-            yield _Reason('poor', _sentence(f'in {recording.source}: {text}'))
+            yield _Reason('poor', f'in {recording.source}: {text}')
         uneven = uneven_stamps(recording, result.used.cutoff_hz, band_hz)
         if uneven:
-            yield _Reason('poor', _sentence(f'in {uneven}'))
+            yield _Reason('poor', f'in {uneven}')
+
+
+def _velocities(recordings: Sequence[Recording]) -> Iterator[_Reason]:
+    """Say whose recorded velocities are not those of the positions, which alone were used."""
+    alike: dict[str, list[str]] = {}
+    for recording in recordings:
+        for text in velocity_faults(recording):
+            alike.setdefault(text, []).append(recording.source or 'a recording')
+    for text, sources in alike.items():
+        where = '' if len(sources) == len(recordings) else f'in {", ".join(sources)}, '
+        yield _Reason('good', f'{where}{text}; the fit takes velocities from the positions')
 
 
 def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
+    """Say of which recordings stamps jumped back, or are rounded."""
     for recording in recordings:
         report = recording.report
         if report.restarted:
@@ -304,7 +331,10 @@ def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
                 f'the clock of {recording.source} jumped back; {report.restarted} of '
                 f'{report.messages} messages, on the shorter side of it, are left out'
             )
-            yield _Reason('good', _sentence(text))
+            yield _Reason('good', text)
+        rounded = rounded_stamps(recording)
+        if rounded:
+            yield _Reason('good', f'in {recording.source or "a recording"} {rounded}')
 
 
 def _sentence(text: str) -> str:

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
 from armid_ros.identification.assess.torque_units import unit_of
-from armid_ros.identification.rows.checks import TORQUE_UNITS
+from armid_ros.identification.rows.checks import effort_unit, TORQUE_UNITS
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import GRAVITIES, Robot
@@ -235,15 +235,21 @@ class LateTorque(Hypothesis):
 
 @dataclass(frozen=True)
 class InDegrees(Hypothesis):
-    """Positions are in degrees."""
+    """Positions are in degrees: those of all joints that turn, or of one."""
+
+    joint: int | None = None
 
     def motion(self, motion: Motion) -> Motion:
         """Convert them."""
-        return _changed(motion, 'position', np.deg2rad)
+        joint = slice(None) if self.joint is None else self.joint
+        return _scaled(motion, joint, 'position', np.deg2rad(1.0))
 
     def sentence(self, robot: Robot) -> str:
-        """Say so."""
-        return 'the positions seem to be in degrees: convert them to rad'
+        """Name the joint, if it is one alone."""
+        if self.joint is None:
+            return 'the positions seem to be in degrees: convert them to rad'
+        joint = robot.joints[self.joint]
+        return f'the position of {joint} seems to be in degrees: convert it to rad'
 
 
 @dataclass(frozen=True)
@@ -329,8 +335,9 @@ class InUnit(Hypothesis):
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint and the unit."""
-        joint = robot.joints[self.joint]
-        return f'the torque of {joint} seems to be in {self.unit} instead of N m: convert it'
+        joint, right = robot.joints[self.joint], robot.torque_units[self.joint]
+        wrong = effort_unit(robot, self.joint, self.unit)
+        return f'the torque of {joint} seems to be in {wrong} instead of {right}: convert it'
 
 
 @dataclass(frozen=True)
@@ -373,16 +380,23 @@ def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
     if not np.all(robot.prismatic):
         yield InDegrees()
     for joint in range(robot.n_joints):
-        for unit in TORQUE_UNITS:
-            yield InUnit(joint, unit)
-        for quantity in QUANTITIES:
-            yield Reversed(joint, quantity)
-        if not robot.prismatic[joint]:
-            for degrees in TURNS:
-                yield ZeroOff(joint, degrees)
+        yield from _of_joint(robot, joint)
     for first, second in combinations(range(robot.n_joints), 2):
         for quantity in QUANTITIES:
             yield Exchanged(first, second, quantity)
+
+
+def _of_joint(robot: Robot, joint: int) -> Iterator[Hypothesis]:
+    for unit in TORQUE_UNITS:
+        yield InUnit(joint, unit)
+    for quantity in QUANTITIES:
+        yield Reversed(joint, quantity)
+    if robot.prismatic[joint]:
+        return
+    if robot.n_joints > 1:
+        yield InDegrees(joint)
+    for degrees in TURNS:
+        yield ZeroOff(joint, degrees)
 
 
 def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
@@ -418,8 +432,8 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
     return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
 
 
-def _scaled(motion: Motion, joint: int, quantity: Quantity, factor: float) -> Motion:
-    """Return a motion in which a quantity of one joint is multiplied."""
+def _scaled(motion: Motion, joint: int | slice, quantity: Quantity, factor: float) -> Motion:
+    """Return a motion in which a quantity of one joint, or of some, is multiplied."""
     scale = np.ones(motion.n_joints)
     scale[joint] = factor
     return _changed(motion, quantity, lambda values: values * scale)

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.hypotheses import InUnit
 from armid_ros.identification.assess.torque_units import NEAR
-from armid_ros.identification.rows.checks import TORQUE_UNITS
+from armid_ros.identification.rows.checks import effort_unit, TORQUE_UNITS
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -64,11 +64,14 @@ def units_beyond_drives(
     for joint in np.flatnonzero(beyond & (needed < robot.torque_limit)).tolist():
         limit, unit = robot.torque_limit[joint], robot.torque_units[joint]
         units = [name for name, per in TORQUE_UNITS.items() if usual[joint] / per < limit]
-        in_unit = ' or '.join(one for one in units if one != 'kN m') or 'another unit'
+        in_unit = (
+            ' or '.join(effort_unit(robot, joint, one) for one in units if one != 'kN m')
+            or 'another unit'
+        )
         yield (
-            f'the torque of {robot.joints[joint]} seems to be in {in_unit} instead of N m: half '
-            f'of its readings are beyond {usual[joint]:.3g}, its drive gives {limit:.4g} {unit}; '
-            'convert it, or correct the limit in the description'
+            f'the torque of {robot.joints[joint]} seems to be in {in_unit} instead of {unit}: '
+            f'half of its readings are beyond {usual[joint]:.3g}, its drive gives '
+            f'{limit:.4g} {unit}; convert it, or correct the limit in the description'
         )
 
 

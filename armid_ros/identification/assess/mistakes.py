@@ -116,7 +116,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
     tried = list(hypotheses(robot))
-    faults = faulty_samples(recording)
+    faults = faulty_samples(robot, recording)
     if faults is not None:
         without = tuple(slow_motions(recording.select(faults.sound), used))
         tried.append(Faulty(faults.first, faults.count, without))

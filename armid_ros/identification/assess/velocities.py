@@ -10,6 +10,7 @@ be differentiated do not matter, and neither do time stamps that jitter.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from armid_ros.identification.rows.checks import REST_RANGE
@@ -29,6 +30,9 @@ _PLAIN = 0.98
 #: A common factor is one from so much on. A twentieth of the time is a tenth of what inertia
 #: takes; scales of encoders and clocks are wrong by a hundredth at most, and so is the integral.
 _TOLERANCE = 0.05
+#: A velocity of this correlation with what its position does, within this factor of a unit, is in
+#: that unit: half of its power follows, and no other unit or sign is near.
+_FOLLOWS, _NEAR = 0.7, 1.25
 #: Factors of joints that are one differ by less than this.
 _ALIKE = 0.02
 #: Velocities in degrees/s beside positions in rad, or the other way round, are no matter of time.
@@ -94,6 +98,33 @@ def time_base_fault(recording: Recording) -> str:
         f'recorded time: time stamps run {factor:.3g} times as long as it took, and inertias are '
         'off by the square of that, or velocities are in another unit; put right which it is'
     )
+
+
+def velocity_faults(recording: Recording) -> Iterator[str]:
+    """
+    Say whose velocities have another unit, or another sign, than what their positions do.
+
+    Yields
+    ------
+    str
+        Joints and what is wrong, without a full stop. Identification takes velocities from the
+        positions, so that it may be right all the same.
+
+    """
+    found = velocity_ratio(recording)
+    if found is None:
+        return
+    degree = np.deg2rad(1.0)
+    for text, ratio in (
+        ('are in degrees/s while positions are in rad', 1.0 / degree),
+        ('are in rad/s while positions are in degrees', degree),
+        ('have the opposite sign of what the positions do', -1.0),
+    ):
+        relative = found.ratio / ratio
+        follows = found.fit * np.sign(ratio) > _FOLLOWS
+        off = np.flatnonzero(follows & (relative > 1.0 / _NEAR) & (relative < _NEAR))
+        if len(off):
+            yield f'velocities of {", ".join(recording.joints[k] for k in off)} {text}'
 
 
 def _pieces(recording: Recording) -> list[npt.NDArray[np.intp]]:

@@ -35,8 +35,10 @@ _SHORT = 5.0
 _CLEAR = 0.8
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
+#: What they are of a joint that slides, whose effort is a force.
+_FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Said of torques that are absent.
-SILENT = 'the torque of every joint is constant; is effort filled in?'
+SILENT = 'the torque of every joint is constant; fill in effort'
 
 
 def check_motion(
@@ -279,12 +281,29 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
     if not excess[worst] > allowed[worst]:
         return ''
     reach = max(abs(lowest[worst]), abs(highest[worst]))
-    hint = '' if robot.prismatic[worst] else ' (degrees?)'
+    degrees = _in_degrees(robot, lowest, highest) & (excess > allowed)
+    hint = '' if robot.prismatic[worst] or degrees[worst] else ' (degrees?)'
+    said = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
+    if degrees[worst]:
+        names = ', '.join(np.array(robot.joints)[degrees])
+        said = f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees: {said}'
     return (
-        f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its limits are '
-        f'{robot.lower[worst]:.4g} to {robot.upper[worst]:.4g}; positions have to be in rad '
-        'or m, with the zero of the description'
+        f'{said} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
+        f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '
+        'description'
     )
+
+
+def _in_degrees(robot: Robot, lowest: FloatArray, highest: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return of which joints positions would be within the limits if they were in degrees."""
+    slack = _LIMIT_SLACK * (robot.upper - robot.lower)
+    above = np.deg2rad(lowest) > robot.lower - slack
+    return ~robot.prismatic & above & (np.deg2rad(highest) < robot.upper + slack)
+
+
+def effort_unit(robot: Robot, joint: int, unit: str) -> str:
+    """Return a unit of torque, or that of force that is as large where the joint slides."""
+    return _FORCE_UNITS[unit] if robot.prismatic[joint] else unit
 
 
 def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, ...]:

@@ -67,7 +67,7 @@ def laws_of_controllers(
     needed = inverse_dynamics(robot, motion)
     said: list[str] = []
     silent = 0
-    for joint, name in enumerate(robot.joints):
+    for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
         rows = told[:, joint] & ~_turning(motion.dq[:, joint])
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
@@ -84,7 +84,7 @@ def laws_of_controllers(
         said.append(
             f'the torque of {name} is a law of position and direction of motion alone, to '
             f'{100 * left / size:.1f} %: it holds the weight or pushes along, as a controller '
-            f'commands it, and has nothing of the {lacking:.2g} N m that inertia takes. '
+            f'commands it, and has nothing of the {lacking:.2g} {unit} that inertia takes. '
             'Something else moves the arm, or body and friction cannot be told apart: record '
             'the arm while it follows a trajectory'
         )

@@ -14,6 +14,8 @@ _UNEVEN = 0.05
 #: Jitter of stamps that blurs a signal at the end of the band by less than this share of it is
 #: harmless.
 _BLURRED = 0.1
+#: A step in time is a multiple of another one within this share of it.
+_WHOLE = 0.01
 #: Stamps are compared with an even grid over so many samples: jitter shows in them, and a clock
 #: that is slewed does not.
 _WINDOW = 50
@@ -45,6 +47,26 @@ def uneven_stamps(recording: Recording, cutoff_hz: float, band_hz: float) -> str
     return (
         f'{recording.source or "recording"}: {100 * uneven:.0f} % of the time stamps are uneven '
         'by more than half a period; record with the stamps of the driver'
+    )
+
+
+def rounded_stamps(recording: Recording) -> str:
+    """
+    Say to what time stamps are rounded, where samples share them for that; empty otherwise.
+
+    Samples that share a stamp are dropped but one, and the others are off by half of the step.
+
+    """
+    report, steps = recording.report, np.diff(recording.t)
+    if report.duplicates <= _UNEVEN * report.messages or len(steps) == 0:
+        return ''
+    step = float(steps.min())
+    if np.any(np.abs(steps / step - np.round(steps / step)) > _WHOLE):
+        return ''
+    return (
+        f'time stamps seem to be rounded to {1e3 * step:.4g} ms: all are multiples of that, and '
+        f'{report.duplicates} of {report.messages} samples had the stamp of another and are left '
+        'out; write stamps with more digits, or record with those of the driver'
     )
 
 

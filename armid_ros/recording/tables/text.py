@@ -186,4 +186,18 @@ def _cell_by_cell(
             raise RecordingError(
                 f"{path}: line {line_number}, column {names[j]}: '{cell}' is no number"
             )
-    return values, tuple(notes)
+    return values, (*notes, *_gaps(values, names, first_line))
+
+
+def _gaps(values: FloatArray, names: list[str], first_line: int) -> list[str]:
+    """Say how many cells of columns of numbers are empty, and where the first is."""
+    missing = np.isnan(values) & (np.isfinite(values).mean(axis=0) >= _NUMERIC)
+    at = np.argwhere(missing)
+    if not len(at):
+        return []
+    row, column = at[0]
+    many = '1 cell is' if len(at) == 1 else f'{len(at)} cells are'
+    return [
+        f'{many} empty and read as NaN, the first in line {first_line + row}, '
+        f'column {names[column]}'
+    ]

@@ -245,6 +245,17 @@ def test_a_mistake_of_one_recording_names_it(structure, run, other):
     assert said.startswith('In other: the position of shoulder_roll')
 
 
+def test_a_velocity_of_the_opposite_sign_is_said_and_condemns_nothing(structure, run, other):
+    """Positions alone are fitted, so that a velocity that is wrong harms no model."""
+    turned = np.gradient(other.q, other.t, axis=0)
+    turned[:, 1] *= -1.0
+    found, _ = graded(structure, [run], [replace(other, dq=turned)])
+    joint = run.joints[1]
+    said = f'In other, velocities of {joint} have the opposite sign of what the positions do; '
+    assert found.word == 'good'
+    assert any(reason.startswith(said) for reason in found.reasons)
+
+
 def test_torques_that_come_late_are_not_good(structure, run):
     """A free fit takes them for friction and inertia, and is not far off."""
     late = replace(run, t=run.t[:-10], q=run.q[10:], tau=run.tau[:-10])

@@ -10,6 +10,7 @@ from armid_ros.identification.assess import mistakes
 from armid_ros.identification.assess.faulty_samples import faulty_samples
 from armid_ros.identification.assess.hypotheses import (
     hypotheses,
+    InUnit,
     known_gravity,
     OtherUnit,
 )
@@ -291,6 +292,14 @@ def test_degrees(robot, sound):
     assert 'in degrees' in mistake_in(robot, replace(sound, q=np.rad2deg(sound.q)))
 
 
+@pytest.mark.parametrize('joint', [0, 1, 2, 3])
+def test_degrees_of_one_joint_alone(robot, sound, joint):
+    wrong = replace(sound, q=with_column(sound.q, joint, np.rad2deg))
+    said = mistake_in(robot, wrong)
+    assert said.startswith(f'the position of {robot.joints[joint]} seems to be in degrees'), said
+    assert ', or ' not in said
+
+
 def test_gravity_of_the_earth_on_a_recording_from_the_moon(robot):
     said = mistake_in(robot, recording_of(robot, 1, (0.0, 0.0, -1.62)))
     assert '--gravity moon' in said
@@ -311,18 +320,28 @@ def test_one_torque_out_of_all_proportion(robot, sound):
     tau = np.array(sound.tau)
     tau[700, 2] = 1e6
     said = mistake_in(robot, replace(sound, tau=tau))
-    assert said.startswith('the torque of upper_arm_yaw is 1e+06 at 7.000 s')
+    assert said.startswith('the torque of upper_arm_yaw is 1e+06 N m at 7.000 s')
 
 
 def test_a_position_that_jumps_by_a_turn(robot, sound):
     q = np.array(sound.q)
     q[700:720, 1] += 2.0 * np.pi
     said = mistake_in(robot, replace(sound, q=q))
-    assert said.startswith('the position of shoulder_roll jumps by 6.2')
+    assert said.startswith('the position of shoulder_roll jumps by 6.29 rad at 7.000 s')
 
 
-def test_reversals_of_friction_are_no_faulty_samples(sound):
-    assert faulty_samples(sound) is None
+def test_a_slide_jumps_by_metres_and_pushes_in_newtons():
+    lift = robot_from_urdf(GANTRY)
+    recording = recording_of(lift, 1)
+    q = np.array(recording.q)
+    q[700:720, 0] += 40.0
+    assert 'lift jumps by 40 m at 7.000 s' in mistake_in(lift, replace(recording, q=q))
+    said = InUnit(0, 'N mm').sentence(lift)
+    assert said == 'the torque of lift seems to be in mN instead of N: convert it'
+
+
+def test_reversals_of_friction_are_no_faulty_samples(robot, sound):
+    assert faulty_samples(robot, sound) is None
 
 
 def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, sound):

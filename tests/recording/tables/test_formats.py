@@ -318,3 +318,17 @@ def test_a_column_without_a_number_is_said(tmp_path, motion):
     path.write_text('\n'.join([lines[0], *rows]))
     with pytest.raises(RecordingError, match='without a number: q2'):
         read_anything(path, joints=JOINTS)
+
+
+def test_empty_cells_are_counted_and_the_first_is_named_with_its_line(motion, tmp_path):
+    lines = text(motion).splitlines()
+    for row, cell in ((3, 1), (5, 4)):
+        cells = lines[row].split(',')
+        cells[cell] = ''
+        lines[row] = ','.join(cells)
+    path = tmp_path / 'run.csv'
+    path.write_text('\n'.join(lines))
+    table = open_table(path)
+    assert table.notes == ('2 cells are empty and read as NaN, the first in line 4, column q1',)
+    lacking = read_anything(path, joints=JOINTS).report.not_finite
+    assert len(lacking) == 2 and all(one.endswith(' in 1') for one in lacking)

@@ -1,0 +1,58 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Decimations that leave too few samples, and the largest one that leaves enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.signals import Conditioning, decimated_samples, segments
+from armid_ros.recording import Recording
+
+
+def check_decimation(recordings: Sequence[Recording], used: Conditioning, least: int) -> None:
+    """
+    Refuse a decimation that leaves too few samples where a smaller one leaves enough.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters.
+    least : int
+        Samples that are needed, of all recordings together.
+
+    Raises
+    ------
+    IdentificationError
+        Naming the option and the largest decimation that works.
+
+    """
+    left = _samples(recordings, used)
+    largest = 0 if left >= least else _largest(recordings, used, least)
+    if largest:
+        raise IdentificationError(
+            f'{recordings[0].source}: --decimation {used.decimation} leaves {left} samples, '
+            f'{least} or more are needed: --decimation {largest} is the largest that works'
+        )
+
+
+def _largest(recordings: Sequence[Recording], used: Conditioning, least: int) -> int:
+    """Return the largest decimation that leaves so many samples; zero where none does."""
+    works, fails = 0, min(used.decimation, max(len(one) for one in recordings))
+    while fails - works > 1:
+        middle = (works + fails) // 2
+        if _samples(recordings, replace(used, decimation=middle)) >= least:
+            works = middle
+        else:
+            fails = middle
+    return works
+
+
+def _samples(recordings: Sequence[Recording], used: Conditioning) -> int:
+    """Return how many samples are left of recordings behind the filters."""
+    parts = (part for one in recordings for part in segments(one, used))
+    return sum(len(decimated_samples(len(part), used)) for part in parts)
