@@ -208,11 +208,13 @@ class LinkInertia(_LinkBody):
         """
         Return whether what is left of the link has no inertia of less than nothing.
 
-        Nothing is said where values stand for others that the motion does not tell from them.
+        Nothing is said where values stand for others that the motion does not tell from them, nor
+        of links that a fit has left without such an inertia before.
 
         """
         if not np.all(std[4:] > 0.0):
             return True
         (link,) = self.indices(arm.robot.joints)
         own = arm.robot.rigid_parameters.reshape(-1, len(LINK_PARAMETERS))[link]
-        return bool(np.all((own + values + SURELY * std)[list(_MOMENTS)] > 0.0))
+        there, left = (each[list(_MOMENTS)] for each in (own, own + values + SURELY * std))
+        return bool(np.all(left > 0.0) or np.any(there <= 0.0))
