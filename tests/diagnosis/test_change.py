@@ -8,6 +8,7 @@ from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
 from armid_ros.diagnosis.search.choice import WRITTEN_MISFIT
 from armid_ros.diagnosis.search.explanation import Chosen
 from armid_ros.diagnosis.verdict import attribution
+from armid_ros.effects import CATALOGUE
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.model import inverse_dynamics
 from armid_ros.report.diagnosis_report import tone_of
@@ -115,6 +116,30 @@ def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     assert result.verdict == 'consistent', result.summary
     assert ('times as much in elbow as when it was identified' in result.doubt) == changed
     assert (result.doubt in result.summary) and bool(result.doubt) == changed
+
+
+@pytest.mark.parametrize('factor', [0.75, 1.3])
+def test_an_arm_that_is_warmer_or_colder_has_another_friction_in_all_joints(bench, factor):
+    """Not a delay, which acts in all joints with one value, nor causes joint by joint."""
+    viscous, coulomb = bench.friction
+
+    def with_friction(level):
+        def torque(motion, tau):
+            own = viscous * motion.dq + coulomb * np.sign(motion.dq)
+            return 0.05 * hose(motion, tau) + (level - 1.0) * own
+
+        return torque
+
+    before = bench.recordings(with_friction(1.0), seed=1)
+    after, new = (bench.recordings(with_friction(factor), seed=seed) for seed in (2, 3))
+    found = asked(bench, before, after, new)
+    assert found.verdict == 'named', found.summary
+    assert {one.name for one in found.findings} == {'viscous_friction', 'coulomb_friction'}
+    for one in found.findings:
+        shares, wide = (np.array(each) / one.added_to for each in (one.values, one.std))
+        assert one.joints == bench.robot.joints
+        np.testing.assert_allclose(shares, factor - 1.0, atol=5.0 * wide.max())
+    assert {effect.name for effect in found.arm.effects} <= set(CATALOGUE)
 
 
 @pytest.mark.parametrize('told', [False, True])

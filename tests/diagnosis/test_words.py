@@ -21,6 +21,7 @@ from armid_ros.diagnosis.verdict.words import (
     share_in_words,
 )
 from armid_ros.effects import CATALOGUE
+from armid_ros.estimate import ParameterName
 import numpy as np
 import pytest
 
@@ -163,6 +164,31 @@ def test_names_that_are_one_cause_are_one_sentence(bench):
         'difference 0.300 +- 0.020 m/s^2) together explain 90 % of the gap. A time delay (delay '
         '0.300 +- 0.020 s) explains 0.1 % of the gap. The rest is '
         'the misfit that the model had before.'
+    )
+
+
+def test_friction_of_many_joints_that_changed_by_one_factor_is_said_with_it(bench):
+    joints = tuple(f'joint_{k}' for k in range(5))
+    both = {'viscous_friction': 'viscous_coefficient', 'coulomb_friction': 'coulomb_torque'}
+    had = np.arange(1.0, 6.0)
+    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
+
+    def finding(name, shares):
+        parameters = tuple(ParameterName(both[name], joint, 'N m') for joint in joints)
+        numbers = parameters, tuple(shares * had), tuple(0.005 * had)
+        other = tuple(one for one in both if one != name)
+        share = 0.97, (0.9, 1.0), 0.0
+        return Finding(name, joints, *numbers, *share, together=other, added_to=tuple(had))
+
+    def said(shares):
+        return decide([finding(one, shares) for one in both], (), [closed], bench.arm, FLOOR)
+
+    assert said(np.full(5, -0.3)).summary.startswith(
+        'Viscous friction and coulomb friction in 5 joints (by -30.00 +- 0.98 % of what it was) '
+        'together explain 97 % of the gap.'
+    )
+    assert said(np.linspace(-0.3, -0.2, 5)).summary.startswith(
+        'Viscous friction and coulomb friction in 5 joints together explain 97 % of the gap.'
     )
 
 

@@ -1,0 +1,69 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Friction of all joints by one factor is viscous and Coulomb friction of each, in one value."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import CATALOGUE, merge_actions, parse_effect
+from armid_ros.effects.friction_level import friction_level
+from armid_ros.motion import Motion
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope='module')
+def robot():
+    return load_robot('humanoid_arm')
+
+
+@pytest.fixture(scope='module')
+def arm(robot):
+    """Return an arm of which four joints have friction, one of them viscous friction alone."""
+    first, second, third, fourth = robot.joints[:4]
+    arm = ArmModel(robot)
+    for text in (
+        f'viscous_friction@{first}+{third}:viscous_coefficient=0.4',
+        f'viscous_friction@{second}:viscous_coefficient=0.1',
+        f'coulomb_friction@{first}+{second}+{fourth}:coulomb_torque=0.7',
+    ):
+        arm = arm.with_effect(*parse_effect(text, robot))
+    return arm
+
+
+@pytest.fixture(scope='module')
+def level(arm, robot):
+    (kind,) = friction_level(zip(arm.effects, arm.values, strict=True), robot)
+    return kind.on(robot)
+
+
+@pytest.fixture(scope='module')
+def motion(robot):
+    rng = np.random.default_rng(0)
+    q, dq, ddq = rng.standard_normal((3, 50, robot.n_joints))
+    return Motion(robot.joints, 0.01 * np.arange(50), q, dq, ddq)
+
+
+def test_its_column_is_the_friction_that_there_was(arm, level, motion, robot):
+    friction = arm.torque(motion) - ArmModel(robot).torque(motion)
+    assert level.joints == robot.joints[:4]
+    np.testing.assert_allclose(level.columns(motion, arm)[:, :, 0], friction, atol=1e-12)
+
+
+def test_it_acts_as_it_is_said(arm, level, motion, robot):
+    k = np.array([-0.3])
+    said = level.named_as(k, arm)
+    assert [effect.name for effect, _ in said] == ['viscous_friction', 'coulomb_friction']
+    assert all(effect.name in CATALOGUE for effect, _ in said)
+    together = sum(effect.columns(motion, arm) @ values for effect, values in said)
+    np.testing.assert_allclose(together, level.columns(motion, arm) @ k, atol=1e-12)
+    bare = ArmModel(robot)
+    own = level.action(k, bare)
+    parts = merge_actions(robot, [effect.action(values, bare) for effect, values in said])
+    np.testing.assert_allclose(own.damping, parts.damping)
+    load = np.zeros(robot.n_joints)
+    np.testing.assert_allclose(own.dry_friction.largest(load), parts.dry_friction.largest(load))
+
+
+@pytest.mark.parametrize('effects', [(), ('viscous_friction@elbow_pitch:viscous_coefficient=1',)])
+def test_nothing_is_looked_for_where_one_joint_at_most_has_friction(robot, effects):
+    assert friction_level((parse_effect(text, robot) for text in effects), robot) == ()
