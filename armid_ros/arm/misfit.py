@@ -28,7 +28,7 @@ import numpy as np
 _DATA = ('held-out', 'training')
 
 
-class Filters(NamedTuple):
+class RowFilters(NamedTuple):
     """
     What recordings were filtered with: sampling rate and cut-off [Hz], and decimation.
 
@@ -61,7 +61,7 @@ class Misfit:
         inverse of a covariance), where it is known; model.yaml does not have it.
     unusable : bool
         Whether the model was called unusable when it was identified; model.yaml does not have it.
-    filters : Filters or None
+    filters : RowFilters or None
         What it was measured behind; None where it is not known.
 
     """
@@ -72,7 +72,7 @@ class Misfit:
     torque_rms: Mapping[str, float] | None = None
     information: FloatArray | None = None
     unusable: bool = False
-    filters: Filters | None = None
+    filters: RowFilters | None = None
 
     def document(self) -> dict[str, Any]:
         """Return the block that model.yaml holds."""
@@ -162,12 +162,12 @@ def misfit_of_block(block: Any) -> Misfit:
     return Misfit(data, rms, relative, loud, filters=filters)
 
 
-def _filters(block: Any) -> Filters:
-    values = {name: finite(block[name], f'misfit: {name}') for name in Filters._fields}
+def _filters(block: Any) -> RowFilters:
+    values = {name: finite(block[name], f'misfit: {name}') for name in RowFilters._fields}
     wrong = [name for name, value in values.items() if value <= 0.0]
     if wrong:
         raise ModelError(f'misfit: {wrong[0]} is {values[wrong[0]]:g}, not above zero')
-    return Filters(values['rate_hz'], values['cutoff_hz'], round(values['decimation']))
+    return RowFilters(values['rate_hz'], values['cutoff_hz'], round(values['decimation']))
 
 
 def _torques(block: Any) -> dict[str, float]:

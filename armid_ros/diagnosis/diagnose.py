@@ -18,7 +18,7 @@ from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajectory
-from armid_ros.diagnosis.doubt import doubt_of
+from armid_ros.diagnosis.doubt import doubt_of, doubt_of_names
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
@@ -234,6 +234,11 @@ class _Asked:
     rng: np.random.Generator
     tell: Progress
 
+    def naming(self, found: Sequence[Finding]) -> _Asked:
+        """Return the same, doubted where what was named does not happen between two days."""
+        doubt = self.doubt or (doubt_of_names(found) if self.before else '')
+        return replace(self, doubt=doubt)
+
 
 def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     """Return the diagnosis of an explanation, measured on held-out data."""
@@ -249,6 +254,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if unseen is not None and not names.shares.predicted:
         notes.append(_HARDLY_SHOWN)
     found = findings(explanation, names.shares, arm, asked.rng)
+    asked = asked.naming(found)
     worse = _harmed(chosen, explanation, unseen, settings)
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
     left, resting = _excesses(asked, chosen, names, unseen)

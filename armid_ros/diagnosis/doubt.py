@@ -11,6 +11,8 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
@@ -53,6 +55,17 @@ def doubt_of(
         if said:
             return said
     return _UNUSABLE if misfit is not None and misfit.unusable else ''
+
+
+def doubt_of_names(findings: Sequence[Finding]) -> str:
+    """Say that what was named never happens between two days; empty where it may have."""
+    never = [one for one in findings if one.name in CATALOGUE and CATALOGUE[one.name].corrects]
+    if not never:
+        return ''
+    return (
+        f'Links do not change between two days: unless that of {" and ".join(never[0].joints)} '
+        'was exchanged or something was bolted to it, what is not in the catalogue acts like it.'
+    )
 
 
 def _unlike(

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel, Misfit
-from armid_ros.arm.misfit import Filters
+from armid_ros.arm.misfit import RowFilters
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import trajectories
@@ -56,7 +56,7 @@ def misfit_of(
     recordings : sequence of Recording
         The recordings.
     used : Conditioning
-        Filters; the narrower the band, the less noise.
+        RowFilters; the narrower the band, the less noise.
     data : {'held-out', 'training'}
         Whether the model was fitted to them.
 
@@ -72,5 +72,5 @@ def misfit_of(
         dict(zip(arm.robot.joints, each.tolist(), strict=True))
         for each in (found.misfit, torque_rms(parts))
     )
-    filters = Filters(used.rate_hz, used.cutoff_hz, used.decimation)
+    filters = RowFilters(used.rate_hz, used.cutoff_hz, used.decimation)
     return Misfit(data, rms, 100.0 * found.errors[0], torque, filters=filters)

@@ -41,13 +41,13 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     """
     Return the colour of a verdict.
 
-    None is good if the model is doubted, a cause suspected, a joint not checked, or a simulation
-    got worse in some joints.
+    None is good if the model is doubted, or not patched with what was named, if a cause is
+    suspected, a joint not checked, or a simulation got worse in some joints.
 
     """
     tone = _TONES.get(diagnosis.verdict, 'bad')
-    doubtful = bool(diagnosis.not_checked or diagnosis.doubt or diagnosis.suspected or worse)
-    return 'fair' if tone == 'good' and doubtful else tone
+    open_ends = diagnosis.not_checked, diagnosis.doubt, diagnosis.suspected, diagnosis.harmful
+    return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 """The misfit in model.yaml: what goes in comes out, and what is wrong is named."""
 
 from armid_ros.arm import ArmModel, load_misfit, load_model, Misfit, save_model
-from armid_ros.arm.misfit import Filters
+from armid_ros.arm.misfit import RowFilters
 from armid_ros.errors import ModelError
 from armid_ros.robots import load_robot
 import numpy as np
@@ -21,7 +21,7 @@ def path(robot, tmp_path):
     """Return a model with a misfit of 0.1, 0.2, ... N m."""
     rms = {joint: 0.1 * (k + 1) for k, joint in enumerate(robot.joints)}
     loud = dict.fromkeys(robot.joints, 2.0)
-    misfit = Misfit('held-out', rms, 5.1, loud, filters=Filters(200.0, 12.5, 8))
+    misfit = Misfit('held-out', rms, 5.1, loud, filters=RowFilters(200.0, 12.5, 8))
     save_model(tmp_path / 'model.yaml', ArmModel(robot), robot.name, misfit=misfit)
     return tmp_path / 'model.yaml'
 

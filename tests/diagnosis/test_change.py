@@ -5,9 +5,11 @@
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
+from armid_ros.diagnosis.doubt import doubt_of_names
 from armid_ros.diagnosis.search.choice import WRITTEN_MISFIT
 from armid_ros.diagnosis.search.explanation import Chosen
 from armid_ros.diagnosis.verdict import attribution
+from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.model import inverse_dynamics
@@ -159,6 +161,12 @@ def test_the_noise_of_a_wider_band_is_no_reason_to_doubt_a_baseline(bench, told)
     settings = DiagnosisSettings(signals=wide)
     result = diagnose(found.arm, after, baseline=before, misfit=misfit, settings=settings, rng=rng)
     assert bool(result.doubt) != told, result.summary
+
+
+@pytest.mark.parametrize(('name', 'doubted'), [('link_inertia', True), ('payload', False)])
+def test_a_link_that_is_named_between_two_days_is_doubted(name, doubted):
+    found = Finding(name, ('elbow',), (), (), (), 0.9, (0.8, 1.0), 0.0)
+    assert ('that of elbow was exchanged' in doubt_of_names([found])) == doubted
 
 
 def test_a_model_that_was_unusable_is_doubted(bench):

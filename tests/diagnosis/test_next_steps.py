@@ -51,10 +51,12 @@ def test_a_payload_sends_a_person_to_the_hand_first():
     ]
 
 
-def test_a_model_that_is_not_patched_is_the_one_that_was_given():
+def test_a_model_that_what_was_named_makes_worse_is_not_to_be_used():
     found = diagnosis('payload', ('wrist',))
     found.harmful = True
-    assert next_steps(found)[-1].startswith('Use the model that was given in simulation')
+    steps = next_steps(found)
+    assert steps[-1].startswith('Identify the arm anew')
+    assert not any(step.startswith('Use') for step in steps)
 
 
 def test_a_joint_that_shows_nothing_is_to_be_recorded_and_its_model_not_used():

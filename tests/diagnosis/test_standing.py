@@ -129,6 +129,7 @@ def test_a_joint_that_never_moves_is_said_not_to_be_checked(bench, baseline):
     assert 'Move elbow as well, and record again.' in next_steps(found)
     assert not any('simulation and control' in step for step in next_steps(found))
     moved = replace(found, data=())
-    tones = [tone_of(one) for one in (found, moved, replace(moved, doubt='It is poor.'))]
-    assert tones == ['fair', 'good', 'fair']
+    doubted, harmful = replace(moved, doubt='It is poor.'), replace(moved, harmful=True)
+    tones = [tone_of(one) for one in (found, moved, doubted, harmful)]
+    assert tones == ['fair', 'good', 'fair', 'fair']
     assert tone_of(replace(found, verdict='unknown')) == 'bad'

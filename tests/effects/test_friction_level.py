@@ -4,7 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, merge_actions, parse_effect
-from armid_ros.effects.friction_level import friction_level
+from armid_ros.effects.friction import friction_level
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np

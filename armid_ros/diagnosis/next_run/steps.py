@@ -72,7 +72,8 @@ def next_steps(
             f'{", ".join(worse)}, and diagnose all recordings together.'
         )
     elif verdict in ('named', 'consistent'):
-        steps.append(_ANEW if diagnosis.doubt else _use(diagnosis, model))
+        anew = diagnosis.doubt or diagnosis.harmful
+        steps.append(_ANEW if anew else _use(diagnosis, model))
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
@@ -101,8 +102,7 @@ def _more(finding: Finding) -> str:
 
 def _use(diagnosis: Diagnosis, model: str) -> str:
     """Say which model is to be used: the one that was given, unless it is patched."""
-    patched = bool(diagnosis.findings) and not diagnosis.harmful
-    which = f'the patched model, {model},' if patched else 'the model that was given'
+    which = f'the patched model, {model},' if diagnosis.findings else 'the model that was given'
     return f'Use {which} in simulation and control; keep these bags to compare with.'
 
 

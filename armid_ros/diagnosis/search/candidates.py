@@ -26,8 +26,7 @@ from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspa
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE, Effect, Kind, Shape
-from armid_ros.effects.friction import CoulombFriction, ViscousFriction
-from armid_ros.effects.friction_level import friction_level
+from armid_ros.effects.friction import CoulombFriction, friction_level, ViscousFriction
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError

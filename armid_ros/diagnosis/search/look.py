@@ -175,7 +175,8 @@ def _joint_by_joint(
 
     They are simpler and gain more. Friction of three joints is one candidate each, and a person
     who pulls at all of them gains more than any. The joints have the same effect, or, where the
-    best is from outside the arm and can imitate any, each its own. The best that has changed comes
+    best is from outside the arm and can imitate any, each its own. Friction is of each joint as a
+    rule: a level that all have in common has to be worth as much. The best that has changed comes
     first; empty if there is none.
 
     """
@@ -200,6 +201,7 @@ def _joint_by_joint(
     resolution = np.concatenate([trial.resolution for trial in parts])
     whole = replace(parts[0], cross=cross, square=square, resolution=resolution)
     simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
+    simpler = simpler or first.candidate.effect.friction
     if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
         return []
     return sorted(parts, key=lambda trial: (trial.candidate.key not in able, -worth(trial, here)))
