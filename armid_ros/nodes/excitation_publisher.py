@@ -14,8 +14,6 @@ from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import (
     brought_back,
     Excitation,
-    Halt,
-    held,
     MeasuredPose,
     plan_run,
     Rehearsal,
@@ -40,6 +38,7 @@ from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.trajectory.action import Tolerances
+from armid_ros.nodes.trajectory.halting import HaltWatch
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
 from rclpy.clock import Clock, ClockType
@@ -114,7 +113,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._trouble = self._rehearsed = ''
         self._runs, self._outcome = 0, 'none'
         self._rehearsal: Rehearsal | None = None
-        self._halt: Halt | None = None
+        self._halting = HaltWatch(self._insist)
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
         self._controller = TrajectorySenders(self, self._on_goal_ended)
@@ -206,12 +205,12 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
+        if self.missing_clock:
+            raise TrajectoryError(f'{self.missing_clock}; the arm is not started')
         robot = self._planner.arm.robot
         lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
         if lost:
             raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
-        self._trouble, self._rehearsed = '', ''
-        self._halt, self._rehearsal = None, None
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
@@ -229,7 +228,9 @@ class ExcitationPublisherNode(ArmidNode):
             self.value('goal_time_tolerance'),
         )
         receiver = self._controller.begin(message, tolerances)
-        self._run = planned
+        self._trouble, self._rehearsed = '', ''
+        self._halting.forget()
+        self._run, self._rehearsal = planned, None
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self._tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
@@ -307,8 +308,10 @@ class ExcitationPublisherNode(ArmidNode):
         stamp = message.sec * 10**9 + message.nanosec
         self._speed = self._speed.looked(now, self._pose.q)
         elapsed = self.elapsed
-        if self._halt is not None:
-            self._watch_halt(self._halt, now)
+        stopping, patience = self.value('stopping'), self.value('state_timeout')
+        going_on = self._halting.look(now, self._pose, stopping, patience)
+        if going_on:
+            self._say_trouble(going_on)
         if elapsed is None or self._run is None or now - self._tracked < _TRACKING_PERIOD:
             return
         self._tracked = now
@@ -330,14 +333,15 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _look_for_partners(self) -> None:
         lost = self._staleness()
-        if not (lost or self._controller.missing):
+        missing = self.missing_clock or (lost and f'{self._states.topic_name}: {lost}')
+        missing = missing or self._controller.missing
+        if not missing:
             try:
                 self.start()
             except TrajectoryError as error:
                 self._say_trouble(f'not started: {error}')
         elif time.monotonic() > self._deadline:
             self._waiting = False
-            missing = f'{self._states.topic_name}: {lost}' if lost else self._controller.missing
             self.get_logger().warning(f'{missing}; call ~/start when that has changed')
 
     def _give_up(self, reason: str, *, follows: bool = True) -> None:
@@ -357,7 +361,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._run = self._rehearsal = None
         self._outcome = 'stopped'
         self._controller.bring_to_rest(self._stamped(motion, HANDOVER))
-        self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER, 1)
+        self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER)
 
     def _on_goal_ended(self, reason: str) -> None:
         """Take what a controller says of the run: that it is at its end, or why it is not."""
@@ -369,29 +373,15 @@ class ExcitationPublisherNode(ArmidNode):
             self._tell('the controller has reached the end')
             return
         self._rehearsal, self._outcome = None, 'stopped'
-        self._expect_rest(HANDOVER, 1)
+        self._expect_rest(HANDOVER)
         self._say_trouble(f'stopped {elapsed or 0.0:.2f} s after the start: {reason}')
 
-    def _expect_rest(self, duration: float, asked: int) -> None:
+    def _expect_rest(self, duration: float) -> None:
         """Look from then on whether the arm is at rest that was told to stop."""
-        by = self._now() + duration + self.value('state_timeout')
-        self._halt = Halt(by, asked, -math.inf, self._pose.q)
+        self._halting.expect(self._now() + duration + self.value('state_timeout'), self._pose)
 
-    def _watch_halt(self, halt: Halt, now: float) -> None:
-        """Tell an arm that goes on to stay where it is, again and again, and say so."""
-        self._halt, at_rest = halt.looked(now, self._pose.q)
-        if at_rest:
-            self._halt = None
-        elif at_rest is False:
-            stopping = self.value('stopping')
-            still = held(self._pose.joints, self._pose.q, stopping)
-            self._controller.insist(self._stamped(still, HANDOVER))
-            self._expect_rest(stopping, halt.asked + 1)
-            times = 'once' if halt.asked == 1 else f'{halt.asked} times'
-            self._say_trouble(
-                f'the arm goes on moving though it was stopped {times}: its controller does not '
-                'take trajectories any more; use the emergency stop'
-            )
+    def _insist(self, still: Motion) -> None:
+        self._controller.insist(self._stamped(still, HANDOVER))
 
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
         """Say how the rehearsal went, and what to do next."""

@@ -61,11 +61,17 @@ def plans(tmp_path_factory):
 class StandIn:
     """Stands in for the drivers of an arm: publishes joint states, and hears trajectories."""
 
-    def __init__(self, bench, joints, q):
+    def __init__(self, bench, joints, q, *, listens=True):
         self._bench = bench
         self.joints, self.q = tuple(joints), np.array(q, dtype=float)
         self._publisher = bench.probe.create_publisher(JointState, 'joint_states', 10)
-        self.heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+        self.heard = []
+        if listens:
+            self.listen()
+
+    def listen(self):
+        """Hear trajectories from now on."""
+        self.heard = self._bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
 
     def report(self, seconds, q=None, joints=None):
         """Publish a joint state with a stamp, and let it be taken."""
@@ -170,6 +176,61 @@ def test_without_a_fresh_joint_state_it_does_not_start(bench, arm, excitation, r
     report(bench, arm)
     answer = bench.call('excitation_publisher/start')
     assert not answer.success and words in answer.message and not arm.heard
+
+
+@pytest.mark.parametrize('service', ['start', 'rehearse'])
+@pytest.mark.parametrize('published', [False, True], ids=['no clock', 'a clock that stands'])
+def test_without_a_clock_it_does_not_start(bench, arm, excitation, service, published):
+    planner = free_planner(load_robot('humanoid_arm'))
+    node = bench.add(ExcitationPublisherNode, excitation, planner, start=False, use_sim_time=True)
+    if not published:
+        bench.stop_clock()
+        bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
+    arm.report(100.0)
+    answer = bench.call(f'excitation_publisher/{service}')
+    assert not answer.success and not arm.heard and node.elapsed is None
+    assert answer.message == (
+        'simulated time, but no time has come on /clock: let the simulation run; the arm is not '
+        'started'
+        if published
+        else 'simulated time, but nothing publishes /clock: start what does, or set '
+        'use_sim_time:=false; the arm is not started'
+    )
+
+
+def test_that_nothing_publishes_the_clock_is_logged_once(bench, excitation):
+    bench.stop_clock()
+    said = bench.rosout()
+    node = bench.add(
+        ExcitationPublisherNode,
+        excitation,
+        free_planner(load_robot('humanoid_arm')),
+        use_sim_time=True,
+    )
+    bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
+    node.look_for_clock()
+    bench.spin_until(lambda: said, 'the warning')
+    for _ in range(2):
+        node.look_for_clock()
+        bench.settle()
+    node.get_logger().info('the end')
+    bench.spin_until(lambda: said[-1].msg == 'the end', 'the log')
+    assert [m.msg for m in said if 'nothing publishes /clock' in m.msg] == [
+        'simulated time, but nothing publishes /clock: start what does, or set '
+        'use_sim_time:=false; until then the node waits'
+    ]
+
+
+def test_with_nobody_to_take_the_trajectory_it_does_not_start(bench, robot, excitation):
+    node = waiting_publisher(bench, excitation)
+    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0, listens=False)
+    arm.report(100.0)
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and node.elapsed is None
+    assert answer.message == 'nobody subscribes to /joint_trajectory; the arm is not started'
+    arm.listen()
+    bench.spin_until(lambda: node.readers, 'a subscriber')
+    assert bench.call('excitation_publisher/start').success
 
 
 def test_a_joint_state_that_is_sent_again_is_not_fresh(bench, arm, excitation):

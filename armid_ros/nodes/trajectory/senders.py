@@ -106,13 +106,13 @@ class TrajectorySenders:
         Raises
         ------
         TrajectoryError
-            If it is to go to an action that nobody offers.
+            If nobody is there to take it.
 
         """
         self.look()
         if self.action is not None and self._offered:
             self.action.wait(_DISCOVERY)
-        if self._kind == 'action' and not self._has_action:
+        if self.missing:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
         self._by_action = self._has_action
         if self._by_action:
