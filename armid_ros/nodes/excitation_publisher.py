@@ -12,7 +12,7 @@ from typing import Any
 
 from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import (
-    brought_back,
+    brought_to_rest,
     Excitation,
     MeasuredPose,
     plan_run,
@@ -349,19 +349,20 @@ class ExcitationPublisherNode(ArmidNode):
         elapsed, stopping = self.elapsed, self.value('stopping')
         if elapsed is None or self._run is None:
             return
-        if follows:
+        if follows or self._staleness():
             motion = slowed(self._run, elapsed, stopping, self._rate)
         else:
-            fastest = self._planner.arm.robot.velocity_limit
-            motion = brought_back(self._run, elapsed, self._pose.q, fastest, stopping, self._rate)
+            robot, wanted = self._planner.arm.robot, self._run.at([elapsed])
+            measured, velocity = self._pose.q, self._speed.velocity
+            motion = brought_to_rest(wanted, measured, velocity, robot, stopping, self._rate)
         self._end_run(motion)
         self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _end_run(self, motion: Motion) -> None:
         self._run = self._rehearsal = None
         self._outcome = 'stopped'
-        self._controller.bring_to_rest(self._stamped(motion, HANDOVER))
-        self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER)
+        self._controller.bring_to_rest(self._stamped(motion, float(motion.t[0])))
+        self._expect_rest(float(motion.t[-1]))
 
     def _on_goal_ended(self, reason: str) -> None:
         """Take what a controller says of the run: that it is at its end, or why it is not."""

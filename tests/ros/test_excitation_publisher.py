@@ -337,12 +337,34 @@ def test_stop_brings_it_to_rest_on_the_path(bench, arm, excitation, robot, secon
 
 def test_an_arm_that_does_not_follow_is_stopped_where_it_is(bench, arm, excitation, robot):
     node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
+    follow(bench, arm, 104.0)
+    where = read_trajectory(arm.heard[0]).sample(np.array([4.0])).q[0]
+    for time in np.arange(104.05, 110.0, 0.05):  # a blocked arm: it stays where it is
+        bench.tick(round(time * SECOND))
+        arm.report(time, where)
+        if node.elapsed is None:
+            break
+    stamp, reference = sent(bench, arm.heard, 2)
+    assert stamp == pytest.approx(time)
+    np.testing.assert_allclose(reference.q[0], where, atol=1e-9)
+    np.testing.assert_allclose(reference.q[-1], where, atol=1e-9)
+    np.testing.assert_allclose(reference.dq, 0.0, atol=1e-9)
+    set_point = read_trajectory(arm.heard[0]).sample(np.array([time - 100.0]))
+    curve = reference.for_robot(robot).after(set_point.q[0], set_point.dq[0], set_point.ddq[0])
+    curve.require_limits(robot, 0.001)
+    status = bench.diagnose(node, diagnostics)
+    assert 'from where it should be, more than 0.2 rad' in status.message
+
+
+def test_an_arm_that_goes_elsewhere_is_stopped_from_there(bench, arm, excitation, robot):
+    node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
     off = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
     follow(bench, arm, 104.0, off=off)
     stamp, reference = sent(bench, arm.heard, 2)
-    where = read_trajectory(arm.heard[0]).sample(np.array([4.0])).q[0] + off
+    asked = read_trajectory(arm.heard[0]).sample(np.array([4.0]))
     assert stamp == 104.0 and node.elapsed is None
-    np.testing.assert_allclose(reference.q[-1], where, atol=1e-6)
+    away = np.abs(reference.q[0] - (asked.q[0] + off))
+    assert np.all(away <= np.abs(asked.dq[0]) * reference.t[0] + 1e-9)
     np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
     status = bench.diagnose(node, diagnostics)
     assert f"'{robot.joints[2]}' is 0.3 rad from where it should be" in status.message
