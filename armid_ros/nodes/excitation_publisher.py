@@ -27,6 +27,7 @@ from armid_ros.excitation.supervision import HANDOVER, Speedometer
 from armid_ros.motion import Motion
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.measured_pose import efforts, PoseReader
+from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.excitation import (
     checked,
     EXCITATION_PARAMETERS,
@@ -37,7 +38,6 @@ from armid_ros.nodes.parameters.run import RUN_PARAMETERS, SIMULATION
 from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from armid_ros.nodes.trajectory.action import Tolerances
 from armid_ros.nodes.trajectory.halting import HaltWatch
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
@@ -106,6 +106,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
         self._measured = PoseReader(self._excitation.joints)
         self._speed = Speedometer.unknown(len(self._excitation.joints))
+        self._stamps = StampDifference(self.get_clock())
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
         self._begun_ns, self._sent_at = 0, -math.inf
@@ -205,12 +206,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        if self.missing_clock:
-            raise TrajectoryError(f'{self.missing_clock}; the arm is not started')
-        robot = self._planner.arm.robot
-        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
-        if lost:
-            raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
+        self._require_ready()
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
@@ -222,12 +218,7 @@ class ExcitationPublisherNode(ArmidNode):
         motion = planned.motion()
         first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
         message = self._stamped(motion.select(slice(first, None)), first / self._rate)
-        tolerances = Tolerances(
-            self.value('tracking_tolerance'),
-            self.value('goal_tolerance'),
-            self.value('goal_time_tolerance'),
-        )
-        receiver = self._controller.begin(message, tolerances)
+        receiver = self._controller.begin(message)
         self._trouble, self._rehearsed = '', ''
         self._halting.forget()
         self._run, self._rehearsal = planned, None
@@ -236,6 +227,16 @@ class ExcitationPublisherNode(ArmidNode):
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
         )
+
+    def _require_ready(self) -> None:
+        """Refuse to start an arm that cannot be watched, moves, or has another clock."""
+        robot, topic = self._planner.arm.robot, self._states.topic_name
+        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
+        lost = self.missing_clock or (lost and f'{topic}: {lost}')
+        if not (lost or self.value('zero_stamp')):
+            lost = self._stamps.of_start(topic, self.value('state_timeout'), self._simulated)
+        if lost:
+            raise TrajectoryError(f'{lost}; the arm is not started')
 
     def stop(self) -> str:
         """Bring the arm to rest on the path it is on."""
@@ -307,6 +308,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._looked_at = now
         stamp = message.sec * 10**9 + message.nanosec
         self._speed = self._speed.looked(now, self._pose.q)
+        self._stamps.take(stamp)
         elapsed = self.elapsed
         stopping, patience = self.value('stopping'), self.value('state_timeout')
         going_on = self._halting.look(now, self._pose, stopping, patience)

@@ -19,6 +19,7 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
 from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
@@ -55,6 +56,8 @@ class LiveDiagnosisNode(ArmidNode):
         Stamp of the last one [ns].
     freshness : Freshness
         Whether joint states still come.
+    stamps : StampDifference
+        How far their stamps are from the clock.
 
     """
 
@@ -81,6 +84,7 @@ class LiveDiagnosisNode(ArmidNode):
         self.received = 0
         self.last_stamp_ns = 0
         self.freshness = Freshness('joint states')
+        self.stamps = StampDifference(self.get_clock())
         self._description: str | None = None
         self._said: object = ()
         self._waiting: list[Save | Plan] = []
@@ -163,6 +167,7 @@ class LiveDiagnosisNode(ArmidNode):
         self.freshness.heard()
         stamp = message.header.stamp
         self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        self.stamps.take(self.last_stamp_ns)
         if self.live is None:
             return
         learning = self.live.learning
@@ -204,7 +209,10 @@ class LiveDiagnosisNode(ArmidNode):
             return 'no joint states so far', values
         if not self.freshness.stopped and live.learning:
             return 'learning the misfit of the model: nothing may be wrong yet', values
-        return self.freshness.trouble(), values
+        trouble = self.freshness.trouble()
+        if not (trouble or self.complaints.fresh):
+            trouble = self.stamps.of_results(self.joint_states.topic)
+        return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
         """Say what the last diagnosis was."""

@@ -29,6 +29,7 @@ from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.estimates import estimate_message, FILES, save_identification
 from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
 from armid_ros.nodes.messages.learning_status import change_status, parameter_status
+from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
@@ -85,6 +86,8 @@ class OnlineIdentifierNode(ArmidNode):
         Processor time of the last updates [s].
     freshness : Freshness
         Whether joint states still come.
+    stamps : StampDifference
+        How far their stamps are from the clock.
 
     """
 
@@ -116,6 +119,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.last_stamp_ns = 0
         self.update_times: deque[float] = deque(maxlen=_TIMED)
         self.freshness = Freshness('joint states')
+        self.stamps = StampDifference(self.get_clock())
         self._stopped = False
         self._description: str | None = None
         self._published = -1
@@ -284,9 +288,11 @@ class OnlineIdentifierNode(ArmidNode):
             return '; '.join(filter(None, (stopped, fresh)))
         if identifier.error:
             return identifier.error
+        differ = '' if self.complaints.fresh else self.stamps.of_results(self.joint_states.topic)
         if not identifier.samples:
-            return ''
-        return too_little_motion(self._progress.look(self._last_sample, identifier.estimate()))
+            return differ
+        learned = self._progress.look(self._last_sample, identifier.estimate())
+        return '; '.join(filter(None, (too_little_motion(learned), differ)))
 
     def _on_description(self, message: String) -> None:
         if message.data == self._description:
@@ -311,6 +317,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.received += 1
         self.freshness.heard()
         self.last_stamp_ns = header_stamp(data)
+        self.stamps.take(self.last_stamp_ns)
         if self.identifier is None:
             return
         for sample in self._reader.read_serialized(data):

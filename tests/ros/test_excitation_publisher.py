@@ -20,7 +20,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
-from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording import read_joint_trajectory
 from armid_ros.robots import load_robot
@@ -69,9 +69,9 @@ class StandIn:
         if listens:
             self.listen()
 
-    def listen(self):
+    def listen(self, quality=LATCHED):
         """Hear trajectories from now on."""
-        self.heard = self._bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+        self.heard = self._bench.listen(JointTrajectory, 'joint_trajectory', quality)
 
     def report(self, seconds, q=None, joints=None):
         """Publish a joint state with a stamp, and let it be taken."""
@@ -87,6 +87,10 @@ class StandIn:
 @pytest.fixture
 def arm(bench, robot):
     return StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0)
+
+
+def now_of(node):
+    return node.get_clock().now().nanoseconds / SECOND
 
 
 def free_planner(robot):
@@ -233,6 +237,32 @@ def test_with_nobody_to_take_the_trajectory_it_does_not_start(bench, robot, exci
     assert bench.call('excitation_publisher/start').success
 
 
+@pytest.mark.parametrize(
+    ('parameters', 'shift', 'words'),
+    [
+        ({}, -3600.0, "3600 s behind this computer's clock: set the clocks, or zero_stamp:=true;"),
+        ({}, 3610.0, "s ahead of this computer's clock: set the clocks, or zero_stamp:=true;"),
+        ({'zero_stamp': True}, -3600.0, ''),
+        ({}, 0.0, ''),
+    ],
+    ids=['behind', 'ahead', 'zero stamps', 'one clock'],
+)
+def test_an_arm_of_another_clock_is_not_started(
+    bench, robot, excitation, parameters, shift, words
+):
+    node = bench.add(
+        ExcitationPublisherNode, excitation, free_planner(robot), state_timeout=10.0, **parameters
+    )
+    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0, listens=False)
+    arm.listen(STREAM)
+    bench.spin_until(lambda: node.readers, 'a subscriber')
+    arm.report(now_of(node) + shift)
+    answer = bench.call('excitation_publisher/start')
+    assert answer.success is not bool(words)
+    assert not words or answer.message.startswith('stamps of /joint_states are 36')
+    assert words in answer.message
+
+
 def test_a_joint_state_that_is_sent_again_is_not_fresh(bench, arm, excitation):
     waiting_publisher(bench, excitation)
     arm.report(100.0)
@@ -283,13 +313,13 @@ def test_it_begins_by_itself_only_in_a_simulation(bench, arm, excitation, robot)
 
 
 def test_on_hardware_nothing_is_sent_until_it_is_asked_for(bench, arm, excitation, robot):
-    node = bench.add(ExcitationPublisherNode, excitation, free_planner(robot))
-    arm.report(1.0)
+    node = bench.add(ExcitationPublisherNode, excitation, free_planner(robot), state_timeout=10.0)
+    arm.report(now_of(node))
     for _ in range(3):
         node.look()
     bench.settle()
     assert not arm.heard
-    arm.report(2.0)
+    arm.report(now_of(node))
     assert bench.call('excitation_publisher/start').success
     sent(bench, arm.heard, 1)
 

@@ -173,6 +173,27 @@ def test_questions_wait_until_the_one_before_is_answered(bench, idle):
     assert node.received == 4000
 
 
+def take(node, t, q, tau):
+    message = JointState(name=list(ROBOT.joints), position=[q] * 6, effort=[tau] * 6)
+    nanoseconds = round(t * 1e9)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
+    node.take_joint_states(message)
+
+
+def status(bench, node):
+    node.freshness.now = lambda: 0.0
+    return bench.diagnose(node, bench.diagnostics())
+
+
+@pytest.mark.parametrize('behind', [0.0, 3600.0])
+def test_stamps_of_another_clock_are_said(bench, idle, behind):
+    node, _ = idle
+    take(node, node.get_clock().now().nanoseconds * 1e-9 - behind, 0.0, 0.0)
+    said = status(bench, node).message
+    expected = "stamps of /joint_states are 3600 s behind this computer's clock, and so are"
+    assert said.startswith(expected) if behind else said == 'running'
+
+
 def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(
     bench, idle, tmp_path
 ):
