@@ -26,6 +26,7 @@ from armid_ros.identification.online.learning_progress import LearningProgress, 
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
+from armid_ros.nodes.messages.disturbances import disturbance, DISTURBANCES
 from armid_ros.nodes.messages.estimates import estimate_message, FILES, save_identification
 from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
 from armid_ros.nodes.messages.learning_status import change_status, parameter_status
@@ -52,22 +53,6 @@ _FOLDER = 'online_identification'
 _LOOK_PERIOD = 0.1
 #: Update times that are kept for diagnostics.
 _TIMED = 2000
-#: What is said of joint states that are left out, or begin a new stretch.
-_DISTURBANCES = {
-    'out_of_order': 'joint states whose stamp is not after that of the one before are left out; '
-    'do two nodes publish them?',
-    'impossible': 'joint states with numbers that no arm has are left out',
-    'stamp': 'joint states whose stamp alone is off are left out',
-    'erratic': 'joint states that follow neither those before nor each other are left out; do two '
-    'nodes publish them?',
-    'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
-    'jump_back': 'joint states jump back in time: the filters begin anew',
-    'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
-    'begin anew',
-    'missing': 'joint states are missing between those that came: a history of the publisher of '
-    'less than a second at their rate, or a computer that has too much to do, loses some',
-    'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
-}
 
 
 class OnlineIdentifierNode(ArmidNode):
@@ -270,13 +255,14 @@ class OnlineIdentifierNode(ArmidNode):
     def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
         counted = Counter(identifier.rejected) + Counter(identifier.restarts)
         counted['missing'] = identifier.missing
-        for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
-            self.complaints.say(reason, _DISTURBANCES[reason])
-        if counted['spike'] > self._disturbed['spike']:
+        news = counted - self._disturbed
+        several = self.joint_states.several if news else ''
+        for reason in news.keys() & DISTURBANCES.keys():
+            self.complaints.say(reason, disturbance(reason, several))
+        if news['spike']:
             for joint, signal in identifier.spikes:
-                self.complaints.say(
-                    'spike', f"the {signal} of '{joint}' jumps for single samples: left out"
-                )
+                text = f"the {signal} of '{joint}' jumps for single samples: left out"
+                self.complaints.say('spike', disturbance('spike', several, text))
         self._disturbed = counted
 
     def _trouble(self, identifier: OnlineIdentifier) -> str:

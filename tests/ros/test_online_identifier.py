@@ -18,6 +18,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 import pytest
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -266,6 +267,24 @@ def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected)
     np.testing.assert_allclose(
         node.identifier.estimate().values, expected.estimate().values, rtol=5e-2, atol=5e-3
     )
+
+
+@pytest.mark.parametrize('second', [True, False])
+def test_who_contradict_each_other_are_named(bench, arm, samples, second):
+    diagnostics = bench.diagnostics()
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    if second:
+        bench.add(Node, node_name='other').create_publisher(JointState, 'joint_states', 10)
+        bench.spin_until(lambda: node.joint_states.publishers == 2, 'the second publisher')
+    first = messages(arm, samples)[:200]
+    mixed = [one for pair in zip(first, first, strict=True) for one in pair]
+    publish(bench, node, publisher, mixed)
+    bench.diagnose(node, diagnostics)
+    said = {d.status[0].message for d in diagnostics}
+    late = 'joint states whose stamp is not after that of the one before are left out'
+    named = '; 2 nodes publish /joint_states: /other, /probe; stop one'
+    assert late + (named if second else '') in said
 
 
 def test_messages_out_of_order_are_said_and_left_out(bench, arm, samples):
