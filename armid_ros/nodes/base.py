@@ -129,6 +129,11 @@ class ArmidNode(Node):
         return ''
 
     @property
+    def activity(self) -> str:
+        """What the node does while all is well, in a word."""
+        return 'running'
+
+    @property
     def hardware(self) -> str:
         """Name of the robot, for diagnostics."""
         return ''
@@ -241,7 +246,7 @@ class ArmidNode(Node):
         )
         troubled = bool(trouble) or self.complaints.fresh
         status.level = self.level(troubled)
-        status.message = trouble or (self.complaints.latest if troubled else 'running')
+        status.message = trouble or (self.complaints.latest if troubled else self.activity)
         rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
         for key, value in {**values, **rejected}.items():
             status.values.append(KeyValue(key=key, value=_text(value)))

@@ -112,9 +112,9 @@ class ExcitationPublisherNode(ArmidNode):
         self._begun_ns, self._sent_at = 0, -math.inf
         self._looked_at = self._tracked = -math.inf
         self._trouble = self._rehearsed = ''
-        self._runs, self._outcome = 0, 'none'
+        self._runs, self._outcome = 0, 'ready'
         self._rehearsal: Rehearsal | None = None
-        self._halting = HaltWatch(self._insist)
+        self._halting = HaltWatch(lambda m: self._controller.insist(self._stamped(m, HANDOVER)))
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
         self._controller = TrajectorySenders(self, self._on_goal_ended)
@@ -185,7 +185,10 @@ class ExcitationPublisherNode(ArmidNode):
             lost = lost or self._controller.trouble(patience)
             if lost:
                 self._give_up(lost)
-        elif self._rehearsal is not None:
+            return
+        if self._run is not None:
+            self._end_complete(self._run)
+        if self._rehearsal is not None:
             self._end_rehearsal(self._rehearsal)
         elif self._waiting:
             self._look_for_partners()
@@ -244,9 +247,13 @@ class ExcitationPublisherNode(ArmidNode):
         elapsed = self.elapsed
         if elapsed is None or self._run is None:
             raise TrajectoryError('nothing is under way')
-        motion = slowed(self._run, elapsed, self.value('stopping'), self._rate)
-        self._end_run(motion)
+        self._end_run(slowed(self._run, elapsed, self.value('stopping'), self._rate))
         return self._tell(f'stopped {elapsed:.2f} s after the start')
+
+    @property
+    def activity(self) -> str:
+        """Whether the run is under way, and if not, how the last one ended."""
+        return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far the run is."""
@@ -256,7 +263,7 @@ class ExcitationPublisherNode(ArmidNode):
             'elapsed': elapsed or 0.0,
             'duration': self.duration,
             'runs': self._runs,
-            'run': 'under way' if elapsed is not None else self._outcome,
+            'run': self._outcome if elapsed is None else 'under way',
         }
         if math.isfinite(self._controller.error):
             values['controller_error'] = self._controller.error
@@ -366,15 +373,19 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.bring_to_rest(self._stamped(motion, float(motion.t[0])))
         self._expect_rest(float(motion.t[-1]))
 
+    def _end_complete(self, planned: Run) -> None:
+        self._run = None
+        self._tell(f'run complete: {planned.duration:.1f} s, approach included')
+
     def _on_goal_ended(self, reason: str) -> None:
         """Take what a controller says of the run: that it is at its end, or why it is not."""
         elapsed = self.elapsed
         if self._run is None:
             return  # it was stopped, and whether the arm is at rest is seen
-        self._run = None
         if not reason:
-            self._tell('the controller has reached the end')
+            self._end_complete(self._run)
             return
+        self._run = None
         self._rehearsal, self._outcome = None, 'stopped'
         self._expect_rest(HANDOVER)
         self._say_trouble(f'stopped {elapsed or 0.0:.2f} s after the start: {reason}')
@@ -382,9 +393,6 @@ class ExcitationPublisherNode(ArmidNode):
     def _expect_rest(self, duration: float) -> None:
         """Look from then on whether the arm is at rest that was told to stop."""
         self._halting.expect(self._now() + duration + self.value('state_timeout'), self._pose)
-
-    def _insist(self, still: Motion) -> None:
-        self._controller.insist(self._stamped(still, HANDOVER))
 
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
         """Say how the rehearsal went, and what to do next."""

@@ -443,6 +443,26 @@ def test_a_node_that_ends_stops_the_arm(bench, arm, excitation, end):
     assert reference.duration < 1.0
 
 
+def test_that_a_run_is_complete_is_logged_once_and_in_the_status(bench, arm, excitation):
+    diagnostics, said = bench.diagnostics(), []
+    node = waiting_publisher(bench, excitation)
+    node.get_logger().info = said.append
+    assert bench.diagnose(node, diagnostics).message == 'ready'
+    arm.report(100.0)
+    node.start()
+    sent(bench, arm.heard, 1)
+    length = node.duration
+    follow(bench, arm, 103.0)
+    assert bench.diagnose(node, diagnostics).message == 'running'
+    bench.tick(round((100.0 + length + 0.1) * SECOND))
+    for _ in range(3):
+        node.look()
+    assert bench.diagnose(node, diagnostics).message == 'complete'
+    words = f'run complete: {length:.1f} s, approach included'
+    assert [text for text in said if 'complete' in text] == [words]
+    assert node.condition()[1]['run'] == 'complete'
+
+
 def test_after_the_end_it_can_start_again(bench, arm, excitation):
     node = running(bench, arm, excitation)
     end = 100.0 + node.duration + 0.1
