@@ -34,6 +34,12 @@ class StreamWatch:
         self._n = n_joints
         self._seen: set[str] = set()
         self._in_motion = np.array([np.full(n_joints, np.inf), np.full(n_joints, -np.inf)])
+        self._q: FloatArray | None
+        self._tau: FloatArray | None
+        self._last: float | None
+        self._at_rest: FloatArray
+        self._changes: FloatArray
+        self._count: int
         self._begin(None)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
@@ -71,8 +77,7 @@ class StreamWatch:
         """Begin to look for efforts that change though positions do not."""
         self._last = t
         self._since = np.inf if t is None else t
-        self._q: FloatArray | None = None
-        self._tau: FloatArray | None = None
+        self._q = self._tau = None
         self._changes, self._count = np.zeros(self._n), 0
         self._at_rest = np.array([np.full(self._n, np.inf), np.full(self._n, -np.inf)])
 
