@@ -35,7 +35,7 @@ from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import CRITERIA, Information
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.supervision import (
-    brought_back,
+    brought_to_rest,
     Halt,
     held,
     jump_fault,
@@ -73,7 +73,7 @@ __all__ = [
     'Transfer',
     'TransferPlanner',
     'Violation',
-    'brought_back',
+    'brought_to_rest',
     'check_limits',
     'design',
     'design_speeds',

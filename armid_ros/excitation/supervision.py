@@ -10,6 +10,7 @@ import math
 from typing import Protocol
 
 from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -17,8 +18,9 @@ import numpy.typing as npt
 AT_REST, LOOK = 0.02, 0.1
 #: How long a controller may take to begin with a trajectory that slows the arm down [s].
 HANDOVER = 0.05
-#: Factor by which coming to rest is made longer where it would be too fast, and how often.
-_LONGER, _TRIES = 1.3, 12
+#: Time that a set point has to get somewhere, in units of what it takes at the velocity limit: a
+#: quintic is 1.875 times as fast as its mean, and the rest is for the speed that it comes with.
+_CATCHING = 3.0
 
 
 class Path(Protocol):
@@ -231,14 +233,14 @@ class Speedometer:
         When the arm was looked at last [s]; minus infinity before.
     q : ndarray, shape (n,)
         Where it was then [rad or m].
-    speed : ndarray, shape (n,)
-        Mean speed since the look before [rad/s or m/s]; 0 while none is known.
+    velocity : ndarray, shape (n,)
+        Mean velocity since the look before [rad/s or m/s]; 0 while none is known.
 
     """
 
     seen: float
     q: FloatArray
-    speed: FloatArray
+    velocity: FloatArray
 
     @classmethod
     def unknown(cls, n_joints: int) -> Speedometer:
@@ -249,14 +251,15 @@ class Speedometer:
         """Look at the arm, where it is long enough since it was looked at last."""
         if now - self.seen < LOOK:
             return self
-        return Speedometer(now, q, np.nan_to_num(np.abs(q - self.q) / (now - self.seen)))
+        return Speedometer(now, q, np.nan_to_num((q - self.q) / (now - self.seen)))
 
     def fault(self, joints: Sequence[str], units: Sequence[str]) -> str:
         """Say which joint moves, and how fast; empty when all are at rest."""
-        fastest = int(np.argmax(self.speed))
-        if self.speed[fastest] < AT_REST:
+        speed = np.abs(self.velocity)
+        fastest = int(np.argmax(speed))
+        if speed[fastest] < AT_REST:
             return ''
-        return f"joint '{joints[fastest]}' moves at {self.speed[fastest]:.2g} {units[fastest]}/s"
+        return f"joint '{joints[fastest]}' moves at {speed[fastest]:.2g} {units[fastest]}/s"
 
 
 @dataclass(frozen=True)
@@ -302,65 +305,57 @@ class Halt:
         return replace(self, seen=now, q=q), bool(speed < AT_REST)
 
 
-def brought_back(
-    path: Path,
-    phase: float,
+def brought_to_rest(
+    now: Motion,
     measured: FloatArray,
-    fastest: FloatArray,
+    velocity: FloatArray,
+    robot: Robot,
     duration: float,
     rate: float,
 ) -> Motion:
     """
-    Return the way of the set point to where an arm was measured that does not follow.
+    Return the way to rest of an arm that does not follow, from where it was measured.
+
+    A controller begins with it where the arm is, or where its set point is. The first point is
+    where the arm is by then, so that the one has nothing to make up, and late enough for the set
+    point of the other to get there.
 
     Parameters
     ----------
-    path : Run, Excitation or Transfer
-        What the arm should follow.
-    phase : float
-        Where it should be, time since the start [s].
+    now : Motion
+        What the arm should do, one sample.
     measured : ndarray, shape (n,)
         Where it is [rad or m].
-    fastest : ndarray, shape (n,)
-        Velocity limits [rad/s or m/s].
+    velocity : ndarray, shape (n,)
+        How fast it was measured to be [rad/s or m/s]. A joint is taken to be no faster than it
+        should be, and not to go the other way: what is blocked stays where it is.
+    robot : Robot
+        Gives the limits.
     duration : float
-        Time to come to rest at least [s]; longer where that would be too fast.
+        Time to come to rest [s].
     rate : float
         Samples per second [Hz].
 
     Returns
     -------
     Motion
-        From the handover on: a quintic from the motion it should have, to rest.
+        The speed of each joint falls to 0 as half a cosine.
 
     """
-    now = path.at([phase])
-    fastest = np.maximum(fastest, np.abs(now.dq[0]))
-    motion = _quintic(now, measured, duration, rate)
-    for _ in range(_TRIES):
-        if np.all(np.abs(motion.dq) <= fastest):
-            break
-        duration *= _LONGER
-        motion = _quintic(now, measured, duration, rate)
-    return motion
-
-
-def _quintic(now: Motion, goal: FloatArray, duration: float, rate: float) -> Motion:
-    """Go from a moving state, one sample, to rest at a goal, shape (n,)."""
-    count = int(np.ceil(duration * rate)) + 1
-    t = np.linspace(min(HANDOVER, duration / 2.0), duration, count)
-    x = (t / duration)[:, np.newaxis]
-    v, a = now.dq[0] * duration, 0.5 * now.ddq[0] * duration**2
-    way = goal - now.q[0]
-    c = (
-        now.q[0],
-        v,
-        a,
-        10.0 * way - 6.0 * v - 3.0 * a,
-        -15.0 * way + 8.0 * v + 3.0 * a,
-        6.0 * way - 3.0 * v - a,
+    asked = now.dq[0]
+    speed = np.minimum(np.maximum(velocity * np.sign(asked), 0.0), np.abs(asked))
+    room = np.where(asked > 0.0, robot.upper - measured, measured - robot.lower)
+    speed = np.minimum(speed, 2.0 * np.maximum(room, 0.0) / duration) * np.sign(asked)
+    lead = float(np.max(_CATCHING * np.abs(measured - now.q[0]) / robot.velocity_limit))
+    lead = max(lead, min(HANDOVER, duration / 2.0))
+    end = max(duration, lead + HANDOVER)
+    t = np.linspace(lead, end, int(np.ceil((end - lead) * rate)) + 1)
+    moved = np.minimum(t, duration)[:, np.newaxis]
+    x = np.pi * moved / duration
+    return Motion(
+        now.joints,
+        t,
+        measured + speed * (moved + np.sin(x) * duration / np.pi) / 2.0,
+        speed * (1.0 + np.cos(x)) / 2.0,
+        speed * -np.pi * np.sin(x) / (2.0 * duration),
     )
-    q = sum(c[k] * x**k for k in range(6))
-    dq = sum(k * c[k] * x ** (k - 1) for k in range(1, 6)) / duration
-    ddq = sum(k * (k - 1) * c[k] * x ** (k - 2) for k in range(2, 6)) / duration**2
-    return Motion(now.joints, t, np.asarray(q), np.asarray(dq), np.asarray(ddq))

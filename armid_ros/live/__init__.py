@@ -11,6 +11,7 @@ arm, `Assistant` answers in a process of its own. Nothing here knows ROS.
 from armid_ros.live.assistant import Assistant, InProcess
 from armid_ros.live.belief import Belief, LiveDiagnosis, LiveSettings
 from armid_ros.live.request import Answer, DiagnosisRequest
+from armid_ros.live.stream_watch import StreamWatch
 from armid_ros.live.window import SampleWindow
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     'LiveSettings',
     'DiagnosisRequest',
     'SampleWindow',
+    'StreamWatch',
 ]

@@ -14,11 +14,15 @@ from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodePa
 from armid_ros.nodes.running.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
+
+#: How long a simulation may take to publish /clock before it is said that nothing does [s].
+_CLOCK_PATIENCE = 5.0
 
 EXECUTOR = NodeParameter(
     name='executor',
@@ -52,11 +56,14 @@ class ArmidNode(Node):
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self._paced: dict[str, tuple[Callable[[], None], Timer]] = {}
+        self._clock_missed = False
         declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(_CLOCK_PATIENCE, self.look_for_clock, clock=steady)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
@@ -89,6 +96,29 @@ class ArmidNode(Node):
         return float(self._paced[parameter][1].time_until_next_call()) * 1e-9
 
     @property
+    def missing_clock(self) -> str:
+        """Say that there is no time, simulated as it is; empty where there is one."""
+        clock = self.get_clock()
+        if not clock.ros_time_is_active:
+            return ''
+        topic = self.resolve_topic_name('/clock')
+        if not self.count_publishers(topic):
+            return (
+                f'simulated time, but nothing publishes {topic}: start what does, or set '
+                'use_sim_time:=false'
+            )
+        if not clock.now().nanoseconds:
+            return f'simulated time, but no time has come on {topic}: let the simulation run'
+        return ''
+
+    def look_for_clock(self) -> None:
+        """Log once that there is no simulated time: /diagnostics do not come without it."""
+        missing = self.missing_clock
+        if missing and not self._clock_missed:
+            self.get_logger().warning(f'{missing}; until then the node waits')
+        self._clock_missed = bool(missing)
+
+    @property
     def finished(self) -> bool:
         """Whether there is nothing left to do, so that the process may end."""
         return False
@@ -97,6 +127,11 @@ class ArmidNode(Node):
     def failure(self) -> str:
         """Why the node did not do what it was started for; the process then ends with code 2."""
         return ''
+
+    @property
+    def activity(self) -> str:
+        """What the node does while all is well, in a word."""
+        return 'running'
 
     @property
     def hardware(self) -> str:
@@ -211,7 +246,7 @@ class ArmidNode(Node):
         )
         troubled = bool(trouble) or self.complaints.fresh
         status.level = self.level(troubled)
-        status.message = trouble or (self.complaints.latest if troubled else 'running')
+        status.message = trouble or (self.complaints.latest if troubled else self.activity)
         rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
         for key, value in {**values, **rejected}.items():
             status.values.append(KeyValue(key=key, value=_text(value)))

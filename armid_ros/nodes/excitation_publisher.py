@@ -12,10 +12,8 @@ from typing import Any
 
 from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import (
-    brought_back,
+    brought_to_rest,
     Excitation,
-    Halt,
-    held,
     MeasuredPose,
     plan_run,
     Rehearsal,
@@ -29,6 +27,7 @@ from armid_ros.excitation.supervision import HANDOVER, Speedometer
 from armid_ros.motion import Motion
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.messages.measured_pose import efforts, PoseReader
+from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.excitation import (
     checked,
     EXCITATION_PARAMETERS,
@@ -39,7 +38,7 @@ from armid_ros.nodes.parameters.run import RUN_PARAMETERS, SIMULATION
 from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from armid_ros.nodes.trajectory.action import Tolerances
+from armid_ros.nodes.trajectory.halting import HaltWatch
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
 from rclpy.clock import Clock, ClockType
@@ -107,14 +106,15 @@ class ExcitationPublisherNode(ArmidNode):
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
         self._measured = PoseReader(self._excitation.joints)
         self._speed = Speedometer.unknown(len(self._excitation.joints))
+        self._stamps = StampDifference(self.get_clock())
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._run: Run | None = None
         self._begun_ns, self._sent_at = 0, -math.inf
         self._looked_at = self._tracked = -math.inf
         self._trouble = self._rehearsed = ''
-        self._runs, self._outcome = 0, 'none'
+        self._runs, self._outcome = 0, 'ready'
         self._rehearsal: Rehearsal | None = None
-        self._halt: Halt | None = None
+        self._halting = HaltWatch(lambda m: self._controller.insist(self._stamped(m, HANDOVER)))
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
         self._controller = TrajectorySenders(self, self._on_goal_ended)
@@ -185,7 +185,10 @@ class ExcitationPublisherNode(ArmidNode):
             lost = lost or self._controller.trouble(patience)
             if lost:
                 self._give_up(lost)
-        elif self._rehearsal is not None:
+            return
+        if self._run is not None:
+            self._end_complete(self._run)
+        if self._rehearsal is not None:
             self._end_rehearsal(self._rehearsal)
         elif self._waiting:
             self._look_for_partners()
@@ -206,12 +209,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        robot = self._planner.arm.robot
-        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
-        if lost:
-            raise TrajectoryError(f'{self._states.topic_name}: {lost}; the arm is not started')
-        self._trouble, self._rehearsed = '', ''
-        self._halt, self._rehearsal = None, None
+        self._require_ready()
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
@@ -223,18 +221,25 @@ class ExcitationPublisherNode(ArmidNode):
         motion = planned.motion()
         first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
         message = self._stamped(motion.select(slice(first, None)), first / self._rate)
-        tolerances = Tolerances(
-            self.value('tracking_tolerance'),
-            self.value('goal_tolerance'),
-            self.value('goal_time_tolerance'),
-        )
-        receiver = self._controller.begin(message, tolerances)
-        self._run = planned
+        receiver = self._controller.begin(message)
+        self._trouble, self._rehearsed = '', ''
+        self._halting.forget()
+        self._run, self._rehearsal = planned, None
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self._tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
         )
+
+    def _require_ready(self) -> None:
+        """Refuse to start an arm that cannot be watched, moves, or has another clock."""
+        robot, topic = self._planner.arm.robot, self._states.topic_name
+        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
+        lost = self.missing_clock or (lost and f'{topic}: {lost}')
+        if not (lost or self.value('zero_stamp')):
+            lost = self._stamps.of_start(topic, self.value('state_timeout'), self._simulated)
+        if lost:
+            raise TrajectoryError(f'{lost}; the arm is not started')
 
     def stop(self) -> str:
         """Bring the arm to rest on the path it is on."""
@@ -242,9 +247,13 @@ class ExcitationPublisherNode(ArmidNode):
         elapsed = self.elapsed
         if elapsed is None or self._run is None:
             raise TrajectoryError('nothing is under way')
-        motion = slowed(self._run, elapsed, self.value('stopping'), self._rate)
-        self._end_run(motion)
+        self._end_run(slowed(self._run, elapsed, self.value('stopping'), self._rate))
         return self._tell(f'stopped {elapsed:.2f} s after the start')
+
+    @property
+    def activity(self) -> str:
+        """Whether the run is under way, and if not, how the last one ended."""
+        return 'running' if self.elapsed is not None else self._outcome
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far the run is."""
@@ -254,7 +263,7 @@ class ExcitationPublisherNode(ArmidNode):
             'elapsed': elapsed or 0.0,
             'duration': self.duration,
             'runs': self._runs,
-            'run': 'under way' if elapsed is not None else self._outcome,
+            'run': self._outcome if elapsed is None else 'under way',
         }
         if math.isfinite(self._controller.error):
             values['controller_error'] = self._controller.error
@@ -306,9 +315,12 @@ class ExcitationPublisherNode(ArmidNode):
         self._looked_at = now
         stamp = message.sec * 10**9 + message.nanosec
         self._speed = self._speed.looked(now, self._pose.q)
+        self._stamps.take(stamp)
         elapsed = self.elapsed
-        if self._halt is not None:
-            self._watch_halt(self._halt, now)
+        stopping, patience = self.value('stopping'), self.value('state_timeout')
+        going_on = self._halting.look(now, self._pose, stopping, patience)
+        if going_on:
+            self._say_trouble(going_on)
         if elapsed is None or self._run is None or now - self._tracked < _TRACKING_PERIOD:
             return
         self._tracked = now
@@ -330,14 +342,15 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _look_for_partners(self) -> None:
         lost = self._staleness()
-        if not (lost or self._controller.missing):
+        missing = self.missing_clock or (lost and f'{self._states.topic_name}: {lost}')
+        missing = missing or self._controller.missing
+        if not missing:
             try:
                 self.start()
             except TrajectoryError as error:
                 self._say_trouble(f'not started: {error}')
         elif time.monotonic() > self._deadline:
             self._waiting = False
-            missing = f'{self._states.topic_name}: {lost}' if lost else self._controller.missing
             self.get_logger().warning(f'{missing}; call ~/start when that has changed')
 
     def _give_up(self, reason: str, *, follows: bool = True) -> None:
@@ -345,53 +358,41 @@ class ExcitationPublisherNode(ArmidNode):
         elapsed, stopping = self.elapsed, self.value('stopping')
         if elapsed is None or self._run is None:
             return
-        if follows:
+        if follows or self._staleness():
             motion = slowed(self._run, elapsed, stopping, self._rate)
         else:
-            fastest = self._planner.arm.robot.velocity_limit
-            motion = brought_back(self._run, elapsed, self._pose.q, fastest, stopping, self._rate)
+            robot, wanted = self._planner.arm.robot, self._run.at([elapsed])
+            measured, velocity = self._pose.q, self._speed.velocity
+            motion = brought_to_rest(wanted, measured, velocity, robot, stopping, self._rate)
         self._end_run(motion)
         self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
     def _end_run(self, motion: Motion) -> None:
         self._run = self._rehearsal = None
         self._outcome = 'stopped'
-        self._controller.bring_to_rest(self._stamped(motion, HANDOVER))
-        self._expect_rest(float(motion.t[-1] - motion.t[0]) + HANDOVER, 1)
+        self._controller.bring_to_rest(self._stamped(motion, float(motion.t[0])))
+        self._expect_rest(float(motion.t[-1]))
+
+    def _end_complete(self, planned: Run) -> None:
+        self._run = None
+        self._tell(f'run complete: {planned.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
         """Take what a controller says of the run: that it is at its end, or why it is not."""
         elapsed = self.elapsed
         if self._run is None:
             return  # it was stopped, and whether the arm is at rest is seen
-        self._run = None
         if not reason:
-            self._tell('the controller has reached the end')
+            self._end_complete(self._run)
             return
+        self._run = None
         self._rehearsal, self._outcome = None, 'stopped'
-        self._expect_rest(HANDOVER, 1)
+        self._expect_rest(HANDOVER)
         self._say_trouble(f'stopped {elapsed or 0.0:.2f} s after the start: {reason}')
 
-    def _expect_rest(self, duration: float, asked: int) -> None:
+    def _expect_rest(self, duration: float) -> None:
         """Look from then on whether the arm is at rest that was told to stop."""
-        by = self._now() + duration + self.value('state_timeout')
-        self._halt = Halt(by, asked, -math.inf, self._pose.q)
-
-    def _watch_halt(self, halt: Halt, now: float) -> None:
-        """Tell an arm that goes on to stay where it is, again and again, and say so."""
-        self._halt, at_rest = halt.looked(now, self._pose.q)
-        if at_rest:
-            self._halt = None
-        elif at_rest is False:
-            stopping = self.value('stopping')
-            still = held(self._pose.joints, self._pose.q, stopping)
-            self._controller.insist(self._stamped(still, HANDOVER))
-            self._expect_rest(stopping, halt.asked + 1)
-            times = 'once' if halt.asked == 1 else f'{halt.asked} times'
-            self._say_trouble(
-                f'the arm goes on moving though it was stopped {times}: its controller does not '
-                'take trajectories any more; use the emergency stop'
-            )
+        self._halting.expect(self._now() + duration + self.value('state_timeout'), self._pose)
 
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
         """Say how the rehearsal went, and what to do next."""

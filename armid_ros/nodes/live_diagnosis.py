@@ -13,12 +13,14 @@ from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.errors import ArmidError, IdentificationError, OutputError
 from armid_ros.files.own import refuse_replacing
-from armid_ros.live import Answer, Assistant, LiveDiagnosis
+from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
+from armid_ros.nodes.messages.disturbances import disturbance
 from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
@@ -55,6 +57,8 @@ class LiveDiagnosisNode(ArmidNode):
         Stamp of the last one [ns].
     freshness : Freshness
         Whether joint states still come.
+    stamps : StampDifference
+        How far their stamps are from the clock.
 
     """
 
@@ -81,6 +85,7 @@ class LiveDiagnosisNode(ArmidNode):
         self.received = 0
         self.last_stamp_ns = 0
         self.freshness = Freshness('joint states')
+        self.stamps = StampDifference(self.get_clock())
         self._description: str | None = None
         self._said: object = ()
         self._waiting: list[Save | Plan] = []
@@ -163,10 +168,12 @@ class LiveDiagnosisNode(ArmidNode):
         self.freshness.heard()
         stamp = message.header.stamp
         self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+        self.stamps.take(self.last_stamp_ns)
         if self.live is None:
             return
         learning = self.live.learning
         for sample in self._reader.read(message):
+            self._watch.take(sample.t, sample.q, sample.tau)
             self.live.add(*sample)
         if learning and not self.live.learning:
             self._tell('the misfit of the model is learned; from now on it is diagnosed')
@@ -200,11 +207,16 @@ class LiveDiagnosisNode(ArmidNode):
             'busy': int(self.busy),
             'proposed': int(live.belief.proposed is not None),
         }
+        for reason in sorted(self._watch.news()):
+            self.complaints.say(reason, disturbance(reason, self.joint_states.several))
         if not self.received:
             return 'no joint states so far', values
-        if not self.freshness.stopped and live.learning:
+        if not (self.freshness.stopped or self.complaints.fresh) and live.learning:
             return 'learning the misfit of the model: nothing may be wrong yet', values
-        return self.freshness.trouble(), values
+        trouble = self.freshness.trouble()
+        if not (trouble or self.complaints.fresh):
+            trouble = self.stamps.of_results(self.joint_states.topic)
+        return trouble, values
 
     def further_statuses(self) -> Sequence[DiagnosticStatus]:
         """Say what the last diagnosis was."""
@@ -283,6 +295,7 @@ class LiveDiagnosisNode(ArmidNode):
     def _adopt(self, live: LiveDiagnosis) -> None:
         robot = live.belief.accepted.robot
         self.live = live
+        self._watch = StreamWatch(robot.n_joints)
         self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
         self._publish_model()
 

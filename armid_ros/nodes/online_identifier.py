@@ -26,9 +26,11 @@ from armid_ros.identification.online.learning_progress import LearningProgress, 
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
+from armid_ros.nodes.messages.disturbances import disturbance, DISTURBANCES
 from armid_ros.nodes.messages.estimates import estimate_message, FILES, save_identification
 from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
 from armid_ros.nodes.messages.learning_status import change_status, parameter_status
+from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
@@ -51,22 +53,6 @@ _FOLDER = 'online_identification'
 _LOOK_PERIOD = 0.1
 #: Update times that are kept for diagnostics.
 _TIMED = 2000
-#: What is said of joint states that are left out, or begin a new stretch.
-_DISTURBANCES = {
-    'out_of_order': 'joint states whose stamp is not after that of the one before are left out; '
-    'do two nodes publish them?',
-    'impossible': 'joint states with numbers that no arm has are left out',
-    'stamp': 'joint states whose stamp alone is off are left out',
-    'erratic': 'joint states that follow neither those before nor each other are left out; do two '
-    'nodes publish them?',
-    'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
-    'jump_back': 'joint states jump back in time: the filters begin anew',
-    'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
-    'begin anew',
-    'missing': 'joint states are missing between those that came: a history of the publisher of '
-    'less than a second at their rate, or a computer that has too much to do, loses some',
-    'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
-}
 
 
 class OnlineIdentifierNode(ArmidNode):
@@ -85,6 +71,8 @@ class OnlineIdentifierNode(ArmidNode):
         Processor time of the last updates [s].
     freshness : Freshness
         Whether joint states still come.
+    stamps : StampDifference
+        How far their stamps are from the clock.
 
     """
 
@@ -116,6 +104,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.last_stamp_ns = 0
         self.update_times: deque[float] = deque(maxlen=_TIMED)
         self.freshness = Freshness('joint states')
+        self.stamps = StampDifference(self.get_clock())
         self._stopped = False
         self._description: str | None = None
         self._published = -1
@@ -266,13 +255,14 @@ class OnlineIdentifierNode(ArmidNode):
     def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
         counted = Counter(identifier.rejected) + Counter(identifier.restarts)
         counted['missing'] = identifier.missing
-        for reason in (counted - self._disturbed).keys() & _DISTURBANCES.keys():
-            self.complaints.say(reason, _DISTURBANCES[reason])
-        if counted['spike'] > self._disturbed['spike']:
+        news = counted - self._disturbed
+        several = self.joint_states.several if news else ''
+        for reason in news.keys() & DISTURBANCES.keys():
+            self.complaints.say(reason, disturbance(reason, several))
+        if news['spike']:
             for joint, signal in identifier.spikes:
-                self.complaints.say(
-                    'spike', f"the {signal} of '{joint}' jumps for single samples: left out"
-                )
+                text = f"the {signal} of '{joint}' jumps for single samples: left out"
+                self.complaints.say('spike', disturbance('spike', several, text))
         self._disturbed = counted
 
     def _trouble(self, identifier: OnlineIdentifier) -> str:
@@ -284,9 +274,11 @@ class OnlineIdentifierNode(ArmidNode):
             return '; '.join(filter(None, (stopped, fresh)))
         if identifier.error:
             return identifier.error
+        differ = '' if self.complaints.fresh else self.stamps.of_results(self.joint_states.topic)
         if not identifier.samples:
-            return ''
-        return too_little_motion(self._progress.look(self._last_sample, identifier.estimate()))
+            return differ
+        learned = self._progress.look(self._last_sample, identifier.estimate())
+        return '; '.join(filter(None, (too_little_motion(learned), differ)))
 
     def _on_description(self, message: String) -> None:
         if message.data == self._description:
@@ -311,6 +303,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.received += 1
         self.freshness.heard()
         self.last_stamp_ns = header_stamp(data)
+        self.stamps.take(self.last_stamp_ns)
         if self.identifier is None:
             return
         for sample in self._reader.read_serialized(data):

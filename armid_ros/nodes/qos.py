@@ -108,6 +108,15 @@ class MatchedSubscription:
         """Return the number of publishers that it hears."""
         return int(self.subscription.get_publisher_count()) if self.subscription else 0
 
+    @property
+    def several(self) -> str:
+        """Say which nodes publish the topic, where it is more than one; empty where it is not."""
+        found = self._node.get_publishers_info_by_topic(self.topic)
+        if len(found) < 2:
+            return ''
+        nodes = (f'{p.node_namespace.rstrip("/")}/{p.node_name}' for p in found)
+        return f'{len(found)} nodes publish {self.topic}: {", ".join(sorted(nodes))}; stop one'
+
     def match(self) -> None:
         """Look at the publishers, and subscribe anew where they offer something else."""
         publishers = self._node.get_publishers_info_by_topic(self.topic)

@@ -48,6 +48,8 @@ LONGEST_NS = 60 * 10**9
 #: Longest stretch of work before services are answered [s], and backlog that is given up.
 _BURST = 0.005
 _BACKLOG = 0.2
+#: Time behind the clock of the computer from which on it is said [s]; a start may take as long.
+_BEHIND = 0.5
 #: Timers cannot be much faster [s].
 _SHORTEST_PERIOD = 0.0005
 
@@ -120,6 +122,7 @@ class SimulatedArmNode(ArmidNode):
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
         self._anchor = (time.monotonic(), 0.0)
+        self._given_up = 0.0
         self._states = self.create_publisher(
             JointState,
             'joint_states',
@@ -227,7 +230,9 @@ class SimulatedArmNode(ArmidNode):
         period = self._stride * self._arm.plant.dt
         while self._elapsed() + period <= due and time.monotonic() - now < _BURST:
             self.step()
-        if (due - self._elapsed()) / self._factor > _BACKLOG:
+        behind = (due - self._elapsed()) / self._factor
+        if behind > _BACKLOG:
+            self._given_up += behind
             self._anchor = (time.monotonic(), self._elapsed())
 
     def follow_reference(self, reference: Reference) -> None:
@@ -250,7 +255,17 @@ class SimulatedArmNode(ArmidNode):
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far the simulation is."""
-        return '', {'simulated_time': self._arm.state.t, 'moving': int(self.moving)}
+        trouble = ''
+        if self._given_up > _BEHIND and self._clock_publisher is None:  # else nobody is misled
+            trouble = (
+                f'{self._given_up:.1f} s behind real time: lower its rate, or set a smaller '
+                'real_time_factor, with use_sim_time on the other nodes'
+            )
+        return trouble, {
+            'simulated_time': self._arm.state.t,
+            'moving': int(self.moving),
+            'behind_real_time': self._given_up,
+        }
 
     def objection(self, values: Mapping[str, Any]) -> str:
         """Refuse effects that the arm cannot have, and noise and rates that do not fit it."""
@@ -269,6 +284,9 @@ class SimulatedArmNode(ArmidNode):
         if 'effects' in names:
             self._become(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
+            if self._given_up and self._clock_publisher is None:  # stamps are of now again
+                self._origin_ns = (self._origin_ns or 0) + round(self._given_up * 1e9)
+            self._given_up = 0.0
             self._keep_pace()
         described = sensors_of(self.value, self._arm.plant.robot.n_joints)
         known = {name: getattr(described, name) for name in names & SENSOR_PARAMETERS}
@@ -309,7 +327,7 @@ class SimulatedArmNode(ArmidNode):
                     'need use_sim_time on both or on neither'
                 )
         except TrajectoryError as error:
-            self.complaints.say('trajectory', str(error))
+            self._refuse(error)
             return
         self._pending = (start_ns, reference)
 
@@ -317,9 +335,13 @@ class SimulatedArmNode(ArmidNode):
         try:
             self._arm.set_trajectory(reference)
         except TrajectoryError as error:
-            self.complaints.say('trajectory', str(error))
+            self._refuse(error)
             return
         self.get_logger().info(f'follows a trajectory of {reference.duration:g} s')
+
+    def _refuse(self, error: TrajectoryError) -> None:
+        goes_on = 'goes on with the one before' if self.moving else 'stays where it is'
+        self.complaints.say('trajectory', f'{error}; it is refused, and the arm {goes_on}')
 
 
 def main(args: Sequence[str] | None = None) -> None:

@@ -18,6 +18,20 @@ def test_an_executable_runs_the_node_of_its_name(monkeypatch, capsys):
     assert "'bag'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('name', ['recorder', 'excitation_publisher', 'simulated_arm'])
+def test_help_says_what_the_parameters_are_and_starts_nothing(monkeypatch, capsys, name):
+    monkeypatch.setattr(sys, 'argv', [f'/somewhere/bin/{name}', '--help'])
+    monkeypatch.setattr('rclpy.init', lambda **_: pytest.fail('the node was started'))
+    node.main()
+    said = capsys.readouterr().out
+    assert said.startswith(f'Usage: {name} --ros-args -p NAME:=VALUE')
+    for parameter in {'recorder': ['topics'], 'simulated_arm': ['rate', 'real_time_factor']}.get(
+        name, ['state_timeout', 'zero_stamp', 'file']
+    ):
+        assert f'\n  {parameter}:=' in said
+    assert 'Attributes' not in said
+
+
 def without(module, root, lines, folder):
     """Run lines of Python that cannot import a module."""
     code = f'import sys\nsys.modules[{module!r}] = None\n{lines}'

@@ -101,6 +101,10 @@ class Bench:
             lambda: all(n.get_clock().now().nanoseconds == nanoseconds for n in nodes), '/clock'
         )
 
+    def stop_clock(self) -> None:
+        """Publish /clock no more."""
+        self.probe.destroy_publisher(self._clock)
+
     def call(self, service: str) -> Trigger.Response:
         """Call a Trigger service."""
         client = self.probe.create_client(Trigger, service)

@@ -20,7 +20,7 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
-from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.recording import read_joint_trajectory
 from armid_ros.robots import load_robot
@@ -61,11 +61,17 @@ def plans(tmp_path_factory):
 class StandIn:
     """Stands in for the drivers of an arm: publishes joint states, and hears trajectories."""
 
-    def __init__(self, bench, joints, q):
+    def __init__(self, bench, joints, q, *, listens=True):
         self._bench = bench
         self.joints, self.q = tuple(joints), np.array(q, dtype=float)
         self._publisher = bench.probe.create_publisher(JointState, 'joint_states', 10)
-        self.heard = bench.listen(JointTrajectory, 'joint_trajectory', LATCHED)
+        self.heard = []
+        if listens:
+            self.listen()
+
+    def listen(self, quality=LATCHED):
+        """Hear trajectories from now on."""
+        self.heard = self._bench.listen(JointTrajectory, 'joint_trajectory', quality)
 
     def report(self, seconds, q=None, joints=None):
         """Publish a joint state with a stamp, and let it be taken."""
@@ -81,6 +87,10 @@ class StandIn:
 @pytest.fixture
 def arm(bench, robot):
     return StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0)
+
+
+def now_of(node):
+    return node.get_clock().now().nanoseconds / SECOND
 
 
 def free_planner(robot):
@@ -172,6 +182,87 @@ def test_without_a_fresh_joint_state_it_does_not_start(bench, arm, excitation, r
     assert not answer.success and words in answer.message and not arm.heard
 
 
+@pytest.mark.parametrize('service', ['start', 'rehearse'])
+@pytest.mark.parametrize('published', [False, True], ids=['no clock', 'a clock that stands'])
+def test_without_a_clock_it_does_not_start(bench, arm, excitation, service, published):
+    planner = free_planner(load_robot('humanoid_arm'))
+    node = bench.add(ExcitationPublisherNode, excitation, planner, start=False, use_sim_time=True)
+    if not published:
+        bench.stop_clock()
+        bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
+    arm.report(100.0)
+    answer = bench.call(f'excitation_publisher/{service}')
+    assert not answer.success and not arm.heard and node.elapsed is None
+    assert answer.message == (
+        'simulated time, but no time has come on /clock: let the simulation run; the arm is not '
+        'started'
+        if published
+        else 'simulated time, but nothing publishes /clock: start what does, or set '
+        'use_sim_time:=false; the arm is not started'
+    )
+
+
+def test_that_nothing_publishes_the_clock_is_logged_once(bench, excitation):
+    bench.stop_clock()
+    said = bench.rosout()
+    node = bench.add(
+        ExcitationPublisherNode,
+        excitation,
+        free_planner(load_robot('humanoid_arm')),
+        use_sim_time=True,
+    )
+    bench.spin_until(lambda: not node.count_publishers('/clock'), 'the end of /clock')
+    node.look_for_clock()
+    bench.spin_until(lambda: said, 'the warning')
+    for _ in range(2):
+        node.look_for_clock()
+        bench.settle()
+    node.get_logger().info('the end')
+    bench.spin_until(lambda: said[-1].msg == 'the end', 'the log')
+    assert [m.msg for m in said if 'nothing publishes /clock' in m.msg] == [
+        'simulated time, but nothing publishes /clock: start what does, or set '
+        'use_sim_time:=false; until then the node waits'
+    ]
+
+
+def test_with_nobody_to_take_the_trajectory_it_does_not_start(bench, robot, excitation):
+    node = waiting_publisher(bench, excitation)
+    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0, listens=False)
+    arm.report(100.0)
+    answer = bench.call('excitation_publisher/start')
+    assert not answer.success and node.elapsed is None
+    assert answer.message == 'nobody subscribes to /joint_trajectory; the arm is not started'
+    arm.listen()
+    bench.spin_until(lambda: node.readers, 'a subscriber')
+    assert bench.call('excitation_publisher/start').success
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'shift', 'words'),
+    [
+        ({}, -3600.0, "3600 s behind this computer's clock: set the clocks, or zero_stamp:=true;"),
+        ({}, 3610.0, "s ahead of this computer's clock: set the clocks, or zero_stamp:=true;"),
+        ({'zero_stamp': True}, -3600.0, ''),
+        ({}, 0.0, ''),
+    ],
+    ids=['behind', 'ahead', 'zero stamps', 'one clock'],
+)
+def test_an_arm_of_another_clock_is_not_started(
+    bench, robot, excitation, parameters, shift, words
+):
+    node = bench.add(
+        ExcitationPublisherNode, excitation, free_planner(robot), state_timeout=10.0, **parameters
+    )
+    arm = StandIn(bench, robot.joints, (robot.lower + robot.upper) / 2.0, listens=False)
+    arm.listen(STREAM)
+    bench.spin_until(lambda: node.readers, 'a subscriber')
+    arm.report(now_of(node) + shift)
+    answer = bench.call('excitation_publisher/start')
+    assert answer.success is not bool(words)
+    assert not words or answer.message.startswith('stamps of /joint_states are 36')
+    assert words in answer.message
+
+
 def test_a_joint_state_that_is_sent_again_is_not_fresh(bench, arm, excitation):
     waiting_publisher(bench, excitation)
     arm.report(100.0)
@@ -222,13 +313,13 @@ def test_it_begins_by_itself_only_in_a_simulation(bench, arm, excitation, robot)
 
 
 def test_on_hardware_nothing_is_sent_until_it_is_asked_for(bench, arm, excitation, robot):
-    node = bench.add(ExcitationPublisherNode, excitation, free_planner(robot))
-    arm.report(1.0)
+    node = bench.add(ExcitationPublisherNode, excitation, free_planner(robot), state_timeout=10.0)
+    arm.report(now_of(node))
     for _ in range(3):
         node.look()
     bench.settle()
     assert not arm.heard
-    arm.report(2.0)
+    arm.report(now_of(node))
     assert bench.call('excitation_publisher/start').success
     sent(bench, arm.heard, 1)
 
@@ -276,12 +367,34 @@ def test_stop_brings_it_to_rest_on_the_path(bench, arm, excitation, robot, secon
 
 def test_an_arm_that_does_not_follow_is_stopped_where_it_is(bench, arm, excitation, robot):
     node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
+    follow(bench, arm, 104.0)
+    where = read_trajectory(arm.heard[0]).sample(np.array([4.0])).q[0]
+    for time in np.arange(104.05, 110.0, 0.05):  # a blocked arm: it stays where it is
+        bench.tick(round(time * SECOND))
+        arm.report(time, where)
+        if node.elapsed is None:
+            break
+    stamp, reference = sent(bench, arm.heard, 2)
+    assert stamp == pytest.approx(time)
+    np.testing.assert_allclose(reference.q[0], where, atol=1e-9)
+    np.testing.assert_allclose(reference.q[-1], where, atol=1e-9)
+    np.testing.assert_allclose(reference.dq, 0.0, atol=1e-9)
+    set_point = read_trajectory(arm.heard[0]).sample(np.array([time - 100.0]))
+    curve = reference.for_robot(robot).after(set_point.q[0], set_point.dq[0], set_point.ddq[0])
+    curve.require_limits(robot, 0.001)
+    status = bench.diagnose(node, diagnostics)
+    assert 'from where it should be, more than 0.2 rad' in status.message
+
+
+def test_an_arm_that_goes_elsewhere_is_stopped_from_there(bench, arm, excitation, robot):
+    node, diagnostics = running(bench, arm, excitation), bench.diagnostics()
     off = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
     follow(bench, arm, 104.0, off=off)
     stamp, reference = sent(bench, arm.heard, 2)
-    where = read_trajectory(arm.heard[0]).sample(np.array([4.0])).q[0] + off
+    asked = read_trajectory(arm.heard[0]).sample(np.array([4.0]))
     assert stamp == 104.0 and node.elapsed is None
-    np.testing.assert_allclose(reference.q[-1], where, atol=1e-6)
+    away = np.abs(reference.q[0] - (asked.q[0] + off))
+    assert np.all(away <= np.abs(asked.dq[0]) * reference.t[0] + 1e-9)
     np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
     status = bench.diagnose(node, diagnostics)
     assert f"'{robot.joints[2]}' is 0.3 rad from where it should be" in status.message
@@ -328,6 +441,26 @@ def test_a_node_that_ends_stops_the_arm(bench, arm, excitation, end):
     _, reference = sent(bench, arm.heard, 2)
     np.testing.assert_allclose(reference.dq[-1], 0.0, atol=1e-9)
     assert reference.duration < 1.0
+
+
+def test_that_a_run_is_complete_is_logged_once_and_in_the_status(bench, arm, excitation):
+    diagnostics, said = bench.diagnostics(), []
+    node = waiting_publisher(bench, excitation)
+    node.get_logger().info = said.append
+    assert bench.diagnose(node, diagnostics).message == 'ready'
+    arm.report(100.0)
+    node.start()
+    sent(bench, arm.heard, 1)
+    length = node.duration
+    follow(bench, arm, 103.0)
+    assert bench.diagnose(node, diagnostics).message == 'running'
+    bench.tick(round((100.0 + length + 0.1) * SECOND))
+    for _ in range(3):
+        node.look()
+    assert bench.diagnose(node, diagnostics).message == 'complete'
+    words = f'run complete: {length:.1f} s, approach included'
+    assert [text for text in said if 'complete' in text] == [words]
+    assert node.condition()[1]['run'] == 'complete'
 
 
 def test_after_the_end_it_can_start_again(bench, arm, excitation):

@@ -173,6 +173,62 @@ def test_questions_wait_until_the_one_before_is_answered(bench, idle):
     assert node.received == 4000
 
 
+def take(node, t, q, tau):
+    message = JointState(name=list(ROBOT.joints), position=[q] * 6, effort=[tau] * 6)
+    nanoseconds = round(t * 1e9)
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
+    node.take_joint_states(message)
+
+
+def status(bench, node):
+    node.freshness.now = lambda: 0.0
+    return bench.diagnose(node, bench.diagnostics())
+
+
+@pytest.mark.parametrize('behind', [0.0, 3600.0])
+def test_stamps_of_another_clock_are_said(bench, idle, behind):
+    node, _ = idle
+    take(node, node.get_clock().now().nanoseconds * 1e-9 - behind, 0.0, 0.0)
+    said = status(bench, node).message
+    expected = "stamps of /joint_states are 3600 s behind this computer's clock, and so are"
+    assert said.startswith(expected) if behind else said == 'running'
+
+
+@pytest.mark.parametrize('seconds', [0.0, 0.004, 5.0])
+def test_joint_states_that_jump_back_are_said(bench, idle, seconds):
+    node, _ = idle
+    node.stamps.take = lambda stamp: None
+    diagnostics = bench.diagnostics()
+    for k in range(100):
+        take(node, 100.0 + 0.01 * k, np.sin(0.1 * k), np.cos(0.1 * k))
+    if seconds:
+        take(node, 100.99 - seconds, 0.0, 0.0)
+    bench.diagnose(node, diagnostics)
+    said = {d.status[0].message for d in diagnostics}
+    back = 'joint states jump back in time: what is made of them begins anew'
+    late = 'joint states whose stamp is not after that of the one before are left out'
+    assert (back in said) is (seconds == 5.0)
+    assert (late in said) is (seconds == 0.004)
+
+
+def test_positions_that_are_frozen_while_efforts_swing_are_said(bench, idle):
+    node, _ = idle
+    node.stamps.take = lambda stamp: None
+    diagnostics = bench.diagnostics()
+    frozen = 'positions stay at the same numbers while efforts change'
+    noise = np.random.default_rng(0).normal(scale=0.05, size=3000)
+    for k in range(1000):
+        take(node, 100.0 + 0.01 * k, np.sin(0.01 * k), np.cos(0.01 * k) + noise[k])
+    for k in range(1000, 2000):  # at rest: the effort is that of gravity, and noise
+        take(node, 100.0 + 0.01 * k, 0.5, 1.0 + noise[k])
+    bench.diagnose(node, diagnostics)
+    assert not any(frozen in d.status[0].message for d in diagnostics)
+    for k in range(2000, 3000):
+        take(node, 100.0 + 0.01 * k, 0.5, np.cos(0.01 * k) + noise[k])
+    bench.diagnose(node, diagnostics)
+    assert any(frozen in d.status[0].message for d in diagnostics)
+
+
 def test_all_that_is_asked_while_a_diagnosis_is_under_way_is_done_afterwards(
     bench, idle, tmp_path
 ):

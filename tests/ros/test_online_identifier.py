@@ -18,6 +18,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 import pytest
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -72,8 +73,11 @@ def messages(arm, samples):
 
 
 def identifying(bench, **parameters):
+    watched = parameters.pop('compare_stamps', False)
     node = bench.add(OnlineIdentifierNode, effects=['viscous_friction'], **parameters)
     node.freshness.now = lambda: 0.0  # joint states never stop, however busy the machine is
+    if not watched:
+        node.stamps.take = lambda stamp: None  # they are of the year 1970
     description = bench.probe.create_publisher(String, 'robot_description', LATCHED)
     description.publish(String(data=PENDULUM))
     bench.spin_until(lambda: node.identifier is not None, 'the robot')
@@ -131,6 +135,24 @@ def test_joints_are_matched_by_name_and_others_left_out(bench, arm, samples, exp
     np.testing.assert_allclose(
         node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
     )
+
+
+@pytest.mark.parametrize(
+    ('clock', 'said'), [(1004.0, ''), (4600.0, 'behind'), (400.0, 'ahead of')]
+)
+def test_stamps_of_another_clock_are_said(bench, arm, samples, clock, said):
+    node = identifying(bench, compare_stamps=True, use_sim_time=True)
+    bench.tick(round(clock * 1e9))
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    publish(bench, node, publisher, messages(arm, [x[:800] for x in samples]))
+    state = statuses(bench, node)['state']
+    words = f's {said} /clock, and so are those of what is made of them: set the clocks'
+    assert (words in state.message) is bool(said)
+    assert (state.level == DiagnosticStatus.WARN) is bool(said), state.message
+    bad = messages(arm, [x[800:801] for x in samples])
+    bad[0].effort = []
+    publish(bench, node, publisher, bad)  # what is wrong with one message is said first
+    assert 'needs measured torque' in statuses(bench, node)['state'].message
 
 
 def spoil(good, what):
@@ -245,6 +267,24 @@ def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected)
     np.testing.assert_allclose(
         node.identifier.estimate().values, expected.estimate().values, rtol=5e-2, atol=5e-3
     )
+
+
+@pytest.mark.parametrize('second', [True, False])
+def test_who_contradict_each_other_are_named(bench, arm, samples, second):
+    diagnostics = bench.diagnostics()
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    if second:
+        bench.add(Node, node_name='other').create_publisher(JointState, 'joint_states', 10)
+        bench.spin_until(lambda: node.joint_states.publishers == 2, 'the second publisher')
+    first = messages(arm, samples)[:200]
+    mixed = [one for pair in zip(first, first, strict=True) for one in pair]
+    publish(bench, node, publisher, mixed)
+    bench.diagnose(node, diagnostics)
+    said = {d.status[0].message for d in diagnostics}
+    late = 'joint states whose stamp is not after that of the one before are left out'
+    named = '; 2 nodes publish /joint_states: /other, /probe; stop one'
+    assert late + (named if second else '') in said
 
 
 def test_messages_out_of_order_are_said_and_left_out(bench, arm, samples):

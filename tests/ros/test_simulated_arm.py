@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+import re
+import time
+
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
@@ -11,6 +14,7 @@ from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Duration, Time
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -212,6 +216,42 @@ def test_in_real_time_there_is_no_clock_and_stamps_are_evenly_spaced(bench):
     bench.spin_until(lambda: len(states) >= 50)
     np.testing.assert_array_equal(np.diff(stamps(states)), SECOND // 100)
     assert not clock
+
+
+@pytest.mark.parametrize('factor', [1.0, 2.0])
+def test_who_falls_behind_real_time_says_so_and_goes_on_in_time(bench, factor):
+    arm = still_arm(bench, real_time_factor=factor)
+    assert not arm.condition()[0]
+    arm._anchor = (time.monotonic() - 10.0, 0.0)  # the computer did something else for so long
+    arm.catch_up()
+    said = arm.condition()[0]
+    if factor != 1.0:  # everybody goes by its clock
+        assert not said
+        return
+    found = re.fullmatch(
+        r'(\d+\.\d) s behind real time: lower its rate, or set a smaller real_time_factor, with '
+        'use_sim_time on the other nodes',
+        said,
+    )
+    assert found and float(found[1]) > 9.0
+    before = arm.stamp_ns
+    assert arm.set_parameters([Parameter('rate', value=50.0)])[0].successful
+    assert not arm.condition()[0]
+    assert arm.stamp_ns - before > 9 * SECOND
+
+
+def test_of_a_trajectory_that_is_refused_it_says_what_the_arm_does(bench):
+    arm = still_arm(bench)
+    send(bench, spoil('velocity limit'))
+    arm.step()
+    assert arm.complaints.latest.endswith('; it is refused, and the arm stays where it is')
+    send(bench, trajectory(HOME + 0.1))
+    arm.step()
+    send(bench, spoil('velocity limit'))
+    arm.step()
+    assert arm.complaints.latest.endswith(
+        '; it is refused, and the arm goes on with the one before'
+    )
 
 
 def test_gravity_and_effects_are_parameters(bench):

@@ -102,6 +102,8 @@ class Change:
         """Say what changed, by how much, and what else it may have been."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
+            if lower < upper
+            else f'{p.name} by an amount that is not known until it moves'
             for p, value, (lower, upper) in zip(
                 self.size.parameters, self.size.values, self.size.interval(), strict=True
             )

@@ -35,9 +35,13 @@ BLOCK = 0.25
 _LENGTHS = (2, 4, 8)
 #: Blocks that are kept: the longest window, and one before it.
 _KEPT = 9
-#: Blocks since the change before which it is not named, and after which it is in any case.
+#: Blocks since the change in which its torque shows: with fewer it is not named, and with so many
+#: it is in any case. Friction of a joint at rest does not show: an arm that comes to rest shows
+#: the slow motion in which estimates are least right for a moment, and no more.
 _EARLIEST = 4
 _LATEST = 6
+#: Share of what the torque of a change is in the block with most of it, to show in another one.
+_SHOWS = 0.05
 #: Logarithm of the likelihood ratio by which the best explanation is clear.
 _CLEAR = 5.0
 #: If the log-likelihoods of two onsets differ by less, the later one is taken: soon after a change
@@ -228,8 +232,8 @@ class ChangeSearch:
 
     def _judge(self, residual_scale: float) -> Pieces[FoundChange | None]:
         """Find when the change was and what it is, if that is clear or time is up."""
-        count, rows = len(self._blocks), []
-        for k in range(count - 1):
+        rows = []
+        for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)
             yield
             rows.append(self._likelihood(self._ratios(window)))
@@ -238,7 +242,7 @@ class ChangeSearch:
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
-        seen = count - first
+        seen = self._seen(best, first)
         if not (at[best] > self._least_likelihood() and seen >= _EARLIEST):
             return None
         alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
@@ -248,6 +252,16 @@ class ChangeSearch:
             return None
         blocks = tuple(projected.block for projected in self._blocks)
         return FoundChange(blocks, first, named, rivals, float(at[best]))
+
+    def _seen(self, number: int, first: int) -> int:
+        """Return the blocks from one on in which the torque of a candidate shows."""
+        some = self._slices[number]
+        directions = self._directions[:, some]
+        strength = np.array(
+            [np.einsum('pq,pq->q', directions, one.moved[:, some]) for one in self._blocks]
+        )
+        shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
+        return int(np.count_nonzero(shows[first:]))
 
     def _least_likelihood(self) -> float:
         """Return what counts as a change: soon after one, no mere correction of its size."""

@@ -112,8 +112,9 @@ RUN_PARAMETERS = (
     NodeParameter(
         'state_timeout',
         0.5,
-        'The arm is stopped, and not started, without a joint state for so long; 5 s by '
-        'default in a simulation.',
+        'The arm is stopped, and not started, without a joint state for so long, and not started '
+        'where stamps differ from the clock by more, without zero_stamp; 5 s by default in a '
+        'simulation.',
         's',
         lower=0.01,
         upper=10.0,

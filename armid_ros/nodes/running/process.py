@@ -7,12 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import faulthandler
+from pathlib import Path
 import signal
 import sys
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.running.steady import steady
+from armid_ros.nodes.running.usage import is_asked_for, usage
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
@@ -81,7 +83,7 @@ class _EndedAtOnce(BaseException):
 
 def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -> None:
     """
-    Run a node until it is finished, told to end or hung up.
+    Run a node until it is finished, told to end or hung up; only say what it is with --help.
 
     Raises
     ------
@@ -90,6 +92,9 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         asked, with status 1 when it cannot go on, or was hung up as by a terminal that is closed.
 
     """
+    if isinstance(make_node, type) and is_asked_for(sys.argv[1:] if args is None else args):
+        print(usage(Path(sys.argv[0]).name, make_node))
+        return
     node: ArmidNode | None = None
     trouble: list[str] = []
     ending = _Ending()

@@ -44,7 +44,7 @@ class TrajectorySenders:
         Parameters
         ----------
         node : ArmidNode
-            With the parameters `interface`, `action` and `zero_stamp`.
+            With the parameters `interface`, `action` and `zero_stamp`, and tolerances.
         on_end : callable
             Told why the goal under way ended before it was reached; empty when it was reached.
 
@@ -99,24 +99,25 @@ class TrajectorySenders:
         if self._possible and self.action is None and self._offered:
             self._make_action()
 
-    def begin(self, trajectory: JointTrajectory, tolerances: Tolerances) -> str:
+    def begin(self, trajectory: JointTrajectory) -> str:
         """
         Send the trajectory of a run, and say where to.
 
         Raises
         ------
         TrajectoryError
-            If it is to go to an action that nobody offers.
+            If nobody is there to take it.
 
         """
         self.look()
         if self.action is not None and self._offered:
             self.action.wait(_DISCOVERY)
-        if self._kind == 'action' and not self._has_action:
+        if self.missing:
             raise TrajectoryError(f'{self.missing}; the arm is not started')
         self._by_action = self._has_action
         if self._by_action:
-            self.action.send(trajectory, tolerances)
+            names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
+            self.action.send(trajectory, Tolerances(*map(self._node.value, names)))
             return str(self.action)
         self._publisher.publish(trajectory)
         return f'{self.readers} subscribers'

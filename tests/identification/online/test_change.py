@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.estimate import ParameterName
-from armid_ros.identification.online.change import change_candidates, ChangeCandidate
+from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
 from armid_ros.identification.online.change_score import Block, score_statistics
 from armid_ros.identification.online.change_watch import ChangeWatch
 from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
@@ -234,3 +234,32 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
         assert lower < 5.0 < upper
         widths.append(upper - lower)
     assert 2.0 < widths[1] / widths[0] < 4.0  # one window may be a block longer
+
+
+@pytest.mark.parametrize('rests', [True, False])
+def test_what_shows_for_a_moment_before_an_arm_rests_is_no_change(rests):
+    """A misfit of the slow motion in which an arm comes to rest, or a change that goes on."""
+    rng, truth = np.random.default_rng(8), np.array([1.0, -2.0, 0.5])
+    parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
+    step = np.array([[0.0], [0.0], [1.0]])
+    candidate = ChangeCandidate('friction', 'elbow', parameters[2:], step, step)
+    watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), None, [candidate])
+    for k in range(6000):
+        rows = rng.normal(size=(4, 3))
+        tau = rows @ (truth + 5.0 * (k >= 5000) * step[:, 0]) + rng.normal(size=4)
+        weights = np.zeros(4) if rests and k > 5120 else np.ones(4)
+        watch.update(0.005 * k, WeightedSample(rows, tau, weights))
+    assert len(watch.changes) == (0 if rests else 1)
+
+
+def test_by_how_much_is_not_said_where_it_is_not_known():
+    parameters = (
+        ParameterName('viscous_coefficient', 'elbow', 'N m s/rad'),
+        ParameterName('coulomb_torque', 'elbow', 'N m'),
+    )
+    size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([0.0, 1e-4]))
+    candidate = ChangeCandidate('friction', 'elbow', parameters, np.eye(2), np.eye(2))
+    assert str(Change(candidate, (), 1.0, 2.0, size)) == (
+        'friction at elbow has changed: viscous_coefficient by an amount that is not known until '
+        'it moves, coulomb_torque by +0.2 N m (0.18 to 0.22)'
+    )

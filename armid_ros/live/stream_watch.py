@@ -1,0 +1,93 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether samples follow each other as those of an arm do."""
+
+from __future__ import annotations
+
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: A step back in time that is longer is none of samples out of order [s].
+_OUT_OF_ORDER = 0.1
+#: For so long no position has to change for an arm to be at rest [s].
+_STILL = 2.0
+#: Share of what the effort of a joint ranges over in motion, and multiple of its mean change from
+#: one sample to the next, that is no noise at rest: a million samples of that range over 9.
+_SWING, _NOISE = 0.5, 10.0
+
+
+class StreamWatch:
+    """
+    Looks for samples that are out of order, and for positions that nobody measures any more.
+
+    The efforts of an arm at rest stay what they are, but for noise: where not one position changes
+    and an effort ranges over half of what it did in motion, the positions are not measured.
+
+    Parameters
+    ----------
+    n_joints : int
+        Of the arm.
+
+    """
+
+    def __init__(self, n_joints: int) -> None:
+        self._n = n_joints
+        self._seen: set[str] = set()
+        self._in_motion = np.array([np.full(n_joints, np.inf), np.full(n_joints, -np.inf)])
+        self._q: FloatArray | None
+        self._tau: FloatArray | None
+        self._last: float | None
+        self._at_rest: FloatArray
+        self._changes: FloatArray
+        self._count: int
+        self._begin(None)
+
+    def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
+        """Take in a sample: time [s], position [rad or m] and torque [N m or N], each (n,)."""
+        if self._last is not None and t <= self._last:
+            back = self._last - t > _OUT_OF_ORDER
+            self._seen.add('jump_back' if back else 'out_of_order')
+            if not back:
+                return
+            self._begin(None)
+        self._last = t
+        if self._q is None or not np.array_equal(q, self._q):
+            if self._q is not None:
+                _widen(self._in_motion, tau)
+            self._begin(t)
+            self._last, self._q = t, q
+        _widen(self._at_rest, tau)
+        if self._tau is not None:
+            self._changes += np.abs(tau - self._tau)
+        self._tau, self._count = tau, self._count + 1
+        if t - self._since > _STILL and self._swings():
+            self._seen.add('frozen')
+
+    def news(self) -> frozenset[str]:
+        """Return what was seen since this was asked last: jump_back, out_of_order, frozen."""
+        seen, self._seen = frozenset(self._seen), set()
+        return seen
+
+    def _swings(self) -> bool:
+        swing = _range(self._at_rest)
+        much = swing > _SWING * _range(self._in_motion)
+        return bool(np.any(much & (swing > _NOISE * self._changes / self._count)))
+
+    def _begin(self, t: float | None) -> None:
+        """Begin to look for efforts that change though positions do not."""
+        self._last = t
+        self._since = np.inf if t is None else t
+        self._q = self._tau = None
+        self._changes, self._count = np.zeros(self._n), 0
+        self._at_rest = np.array([np.full(self._n, np.inf), np.full(self._n, -np.inf)])
+
+
+def _widen(ends: FloatArray, values: FloatArray) -> None:
+    """Widen lower and upper ends, shape (2, n), to include values, (n,)."""
+    np.minimum(ends[0], values, out=ends[0])
+    np.maximum(ends[1], values, out=ends[1])
+
+
+def _range(ends: FloatArray) -> FloatArray:
+    """Return how far ends are apart; infinite where there is nothing between them."""
+    return np.where(ends[1] >= ends[0], ends[1] - ends[0], np.inf)

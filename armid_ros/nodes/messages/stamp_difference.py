@@ -1,0 +1,76 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""How far the stamps of a topic are from the clock of a node."""
+
+from __future__ import annotations
+
+from rclpy.clock import ROSClock
+
+#: How old results may be when they are published [s]: tf2, and so RViz, keeps ten seconds, and
+#: nothing that was measured is drawn of what is older. What waits while a node is busy, 1000
+#: messages at most, is younger.
+SHOWN = 10.0
+
+
+class StampDifference:
+    """
+    Compares the stamps of messages with the time at which they come.
+
+    Parameters
+    ----------
+    clock : ROSClock
+        Of the node.
+
+    """
+
+    def __init__(self, clock: ROSClock) -> None:
+        self._clock = clock
+        self._late = 0.0
+
+    def take(self, stamp_ns: int) -> None:
+        """Take note of the stamp of a message that came now [ns]; 0: it has none."""
+        now = self._clock.now().nanoseconds
+        self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
+
+    def fault(self, topic: str, allowed: float) -> str:
+        """Say that the last stamp is further from the clock than is allowed [s]; empty: not."""
+        if abs(self._late) <= allowed:
+            return ''
+        size = f'{abs(self._late):.0f}' if abs(self._late) >= 10.0 else f'{abs(self._late):.2f}'
+        side = 'behind' if self._late > 0.0 else 'ahead of'
+        clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
+        return f'stamps of {topic} are {size} s {side} {clock}'
+
+    def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
+        """
+        Say why a trajectory that is stamped with the time of the node must not be sent.
+
+        Its sender and its controller are in different times: it would begin later or further on
+        by the difference, where the controller takes it at all. Up to what is allowed the stamps
+        are taken for where on the path the arm should be, so that the difference does no harm.
+
+        Parameters
+        ----------
+        topic : str
+            Where the stamps are from.
+        allowed : float
+            How far they may be from the clock [s].
+        simulated : bool
+            Whether the arm is.
+
+        """
+        fault = self.fault(topic, allowed)
+        advice = 'set the clocks, or zero_stamp:=true'
+        if simulated:
+            advice = 'use_sim_time on both nodes or on neither'
+        return f'{fault}: {advice}' if fault else ''
+
+    def of_results(self, topic: str) -> str:
+        """Say what follows for results, which carry the stamps of what they were made of."""
+        fault = self.fault(topic, SHOWN)
+        if not fault:
+            return ''
+        return (
+            f'{fault}, and so are those of what is made of them: set the clocks, or use_sim_time '
+            'on all nodes or on none'
+        )
