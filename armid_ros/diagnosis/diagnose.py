@@ -49,6 +49,7 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.recording import Recording
 import numpy as np
+import numpy.typing as npt
 
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
@@ -199,18 +200,20 @@ def _each_alone(
     return _bad(asked.given, result.data, alone, result.notes) if alone else result
 
 
-def _apart(arm: ArmModel, day: Sequence[Recording], used: Conditioning) -> Iterator[Recording]:
-    """Yield recordings of which a model is unusable in a joint, and not in all of that day."""
+def _apart(
+    arm: ArmModel, day: Sequence[Recording], used: Conditioning
+) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
+    """Yield recordings, and in which joints a model is unusable there and not in all of a day."""
     unit = np.ones(arm.robot.n_joints)
-    errors = np.empty((len(day), len(unit)))
+    bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
         parts = trajectories([one], used, arm)
         rows = Evidence.over_noise(parts, [unit] * len(parts))
-        errors[k] = rows.relative_errors(rows.residuals(arm))
-    bad = 100.0 * errors > LIMITS.unusable
-    for one, own in zip(day, bad, strict=True):
-        if np.any(own & ~bad.all(axis=0)):
-            yield one
+        bad[k] = 100.0 * rows.relative_errors(rows.residuals(arm)) > LIMITS.unusable
+        sound[k] = (rows.count > 0.0) & ~bad[k]
+    for one, own in zip(day, bad & sound.any(axis=0), strict=True):
+        if own.any():
+            yield one, own
 
 
 def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:

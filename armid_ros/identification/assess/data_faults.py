@@ -176,21 +176,32 @@ def _mistaken(
 
 
 def mistaken_recordings(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
+    arm: ArmModel,
+    recordings: Sequence[tuple[Recording, npt.NDArray[np.bool_]]],
+    used: Conditioning,
 ) -> list[str]:
     """
     Say of which recordings names, signs or units are wrong, each by itself, with the remedy.
 
     Where they are wrong in every one `check_data` says so.
 
+    Parameters
+    ----------
+    arm : ArmModel
+        The model.
+    recordings : sequence of (Recording, ndarray of bool, shape (n,))
+        Recordings, and the joints that may be wrong there, as they are not in others.
+    used : Conditioning
+        Filters.
+
     """
     said = []
-    for recording in recordings:
+    for recording, joints in recordings:
         mistake = find_mistake(arm.body, recording, used)
-        faults = (
-            [] if mistake is None else [_fault(m, arm.robot, None) for m in mistake.hypotheses]
-        )
-        if faults and all(faults):
+        if mistake is None or not joints[mistake.joint]:
+            continue
+        faults = [_fault(one, arm.robot, None) for one in mistake.hypotheses]
+        if all(faults):
             said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
     return said
 

@@ -274,7 +274,7 @@ def test_a_dead_channel_of_torque_is_unusable(structure, run, other, since):
     assert found.word == 'unusable'
     joint = structure.robot.joints[3]
     when = f'from {since / RATE:.3f} s' if since else 'throughout'
-    assert f'In run the torque of {joint} stays at 0 {when}' in found.reasons[0]
+    assert f'In run the torque of {joint} stays at 0 N m {when}' in found.reasons[0]
     found, _ = graded(structure, [other], [dead])
     assert found.word == 'unusable'
 
