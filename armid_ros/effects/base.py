@@ -198,6 +198,10 @@ class Effect(ABC):
         """Return the effects, with values, that say the same in the words of the catalogue."""
         return ((self, values),)
 
+    def when_found(self, values: FloatArray) -> tuple[Effect, FloatArray]:
+        """Return what is fitted in its place once a search has found it, and first values."""
+        return self, values
+
     def _default_shape(self, robot: Robot) -> FloatArray:
         """Return a shape to begin with on this robot, shape (number of owners, S)."""
         return self.shape_values
@@ -251,7 +255,7 @@ class Effect(ABC):
 
     def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
         """
-        Return where a search for the shape should start.
+        Return where a search for a shape should start, for each shape (number of owners, G).
 
         Parameters
         ----------
@@ -259,10 +263,6 @@ class Effect(ABC):
             The data that the shape is to explain.
         arm : Arm
             The arm without the effect.
-
-        Returns
-        -------
-        tuple of ndarray, one per shape, each of shape (number of owners, G)
 
         """
         return tuple(np.tile(s.grid, (len(self.owners), 1)) for s in self.shapes)

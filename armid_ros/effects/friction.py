@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
@@ -279,7 +279,8 @@ class FrictionLevel(Effect):
     What several joints have of friction, changed by one factor, tau = k (Fv dq + Fc sign(dq)).
 
     An arm that is warm has less of it everywhere, and one that stood in the cold more. A search
-    looks for that one value and says what it finds as viscous_friction and coulomb_friction.
+    looks for one value; what it finds is fitted with a factor for each joint, as no two warm up
+    alike, and said as viscous_friction and coulomb_friction.
     Source: Bittencourt and Gunnarsson, Static friction in a robot joint - modeling and
     identification of load and temperature effects, 2012.
 
@@ -287,11 +288,14 @@ class FrictionLevel(Effect):
     ----------
     viscous, coulomb : tuple of float
         Coefficients Fv and torques Fc that its joints have.
+    each : bool
+        Whether each joint has a factor of its own.
 
     """
 
     viscous: tuple[float, ...] = ()
     coulomb: tuple[float, ...] = ()
+    each: bool = False
 
     name = 'friction_level'
     summary = 'friction of all joints by one factor'
@@ -303,26 +307,31 @@ class FrictionLevel(Effect):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Return that the arm has the factor once."""
-        return ('',)
+        """Return what has a factor: the joints, or the arm once."""
+        return self.joints if self.each else ('',)
 
     @property
     def said_as(self) -> str:
         """Return the part of which there is something."""
         return CoulombFriction.name if any(self.coulomb) else ViscousFriction.name
 
+    def when_found(self, values: FloatArray) -> tuple[Effect, FloatArray]:
+        """Return the same with a factor of its own for each joint."""
+        return replace(self, each=True), np.resize(values, len(self.joints))
+
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return dtau/dk, the friction torque that there was [N m], shape (N, n, 1)."""
+        """Return dtau/dk, the friction torque that there was [N m], shape (N, n, P)."""
         places = self.indices(motion.joints)
         dq = motion.dq[:, places]
-        columns = np.zeros((len(motion), motion.n_joints, 1))
-        columns[:, places, 0] = dq * self.viscous + np.sign(dq) * self.coulomb
+        columns = np.zeros((len(motion), motion.n_joints, len(self.owners)))
+        own = range(len(places)) if self.each else [0] * len(places)
+        columns[:, places, list(own)] = dq * self.viscous + np.sign(dq) * self.coulomb
         return columns
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return damping and dry friction."""
         viscous, coulomb = (
-            scatter(kind(self.joints), values[0] * np.array(own), arm.robot)[0]
+            scatter(kind(self.joints), values * np.array(own), arm.robot)[0]
             for kind, own in zip(_PARTS, (self.viscous, self.coulomb), strict=True)
         )
         dry = DryFriction(np.eye(len(coulomb)), -coulomb, coulomb)
@@ -335,7 +344,7 @@ class FrictionLevel(Effect):
             there = np.array(own) != 0.0
             joints = tuple(joint for joint, has in zip(self.joints, there, strict=True) if has)
             if joints:
-                said.append((kind(joints), values[0] * np.array(own)[there]))
+                said.append((kind(joints), (values * np.array(own))[there]))
         return tuple(said)
 
 

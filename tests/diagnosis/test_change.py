@@ -144,6 +144,23 @@ def test_an_arm_that_is_warmer_or_colder_has_another_friction_in_all_joints(benc
     assert {effect.name for effect in found.arm.effects} <= set(CATALOGUE)
 
 
+def test_joints_that_warm_up_each_by_its_own_share_are_told_so(bench):
+    viscous, coulomb = bench.friction
+    shares = np.array([-0.35, -0.15])
+
+    def warm(motion, tau):
+        own = viscous * motion.dq + coulomb * np.sign(motion.dq)
+        return 0.05 * hose(motion, tau) + shares * own
+
+    before = bench.recordings(lambda motion, tau: 0.05 * hose(motion, tau), seed=1)
+    after, new = (bench.recordings(warm, seed=seed) for seed in (2, 3))
+    found = asked(bench, before, after, new)
+    assert {one.name for one in found.findings} == {'viscous_friction', 'coulomb_friction'}
+    for one in found.findings:
+        told, wide = (np.array(each) / one.added_to for each in (one.values, one.std))
+        np.testing.assert_allclose(told, shares, atol=5.0 * wide.max())
+
+
 @pytest.mark.parametrize('told', [False, True])
 def test_the_noise_of_a_wider_band_is_no_reason_to_doubt_a_baseline(bench, told):
     """The recordings are those that the model is of, behind other filters."""

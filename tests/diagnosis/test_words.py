@@ -167,7 +167,7 @@ def test_names_that_are_one_cause_are_one_sentence(bench):
     )
 
 
-def test_friction_of_many_joints_that_changed_by_one_factor_is_said_with_it(bench):
+def test_friction_of_many_joints_is_said_with_how_much_of_it_has_changed(bench):
     joints = tuple(f'joint_{k}' for k in range(5))
     both = {'viscous_friction': 'viscous_coefficient', 'coulomb_friction': 'coulomb_torque'}
     had = np.arange(1.0, 6.0)
@@ -183,12 +183,9 @@ def test_friction_of_many_joints_that_changed_by_one_factor_is_said_with_it(benc
     def said(shares):
         return decide([finding(one, shares) for one in both], (), [closed], bench.arm, FLOOR)
 
-    assert said(np.full(5, -0.3)).summary.startswith(
-        'Viscous friction and coulomb friction in 5 joints (by -30.00 +- 0.98 % of what it was) '
-        'together explain 97 % of the gap.'
-    )
     assert said(np.linspace(-0.3, -0.2, 5)).summary.startswith(
-        'Viscous friction and coulomb friction in 5 joints together explain 97 % of the gap.'
+        'Viscous friction and coulomb friction in 5 joints (by -30 to -20 % of what it was) '
+        'together explain 97 % of the gap.'
     )
 
 

@@ -64,6 +64,19 @@ def test_it_acts_as_it_is_said(arm, level, motion, robot):
     np.testing.assert_allclose(own.dry_friction.largest(load), parts.dry_friction.largest(load))
 
 
+def test_each_joint_has_its_own_factor_once_it_is_found(arm, level, motion, robot):
+    found, first = level.when_found(np.array([-0.3]))
+    assert [p.joint for p in found.parameters(robot)] == list(level.joints)
+    columns = found.columns(motion, arm)
+    np.testing.assert_allclose(columns @ first, level.columns(motion, arm) @ [-0.3], atol=1e-12)
+    k = np.array([-0.4, 0.1, 0.2, -0.1])
+    together = sum(e.columns(motion, arm) @ values for e, values in found.named_as(k, arm))
+    np.testing.assert_allclose(together, columns @ k, atol=1e-12)
+    bare = ArmModel(robot)
+    parts = merge_actions(robot, [e.action(values, bare) for e, values in found.named_as(k, arm)])
+    np.testing.assert_allclose(found.action(k, bare).damping, parts.damping)
+
+
 @pytest.mark.parametrize('effects', [(), ('viscous_friction@elbow_pitch:viscous_coefficient=1',)])
 def test_nothing_is_looked_for_where_one_joint_at_most_has_friction(robot, effects):
     assert friction_level((parse_effect(text, robot) for text in effects), robot) == ()

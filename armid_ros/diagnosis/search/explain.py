@@ -212,7 +212,7 @@ class Search:
     ) -> Place:
         """Return the place after a step, with the names that there are then, and their values."""
         candidate = step.trial.candidate
-        if not candidate.effect.linear:
+        if not candidate.effect.linear or named[-1].effect is not candidate.effect:
             return self._fitted_place(named, values, place.look.survey.total, place.current.change)
         arm, here = place.current.arm, place.look.here
         before = None if place.before is None else place.before.and_columns(arm, candidate)
@@ -304,7 +304,9 @@ def _of(step: Step, question: Question) -> Accepted:
     candidate = step.trial.candidate
     values = np.zeros(len(candidate.effect.parameters(question.arm.robot)))
     values[list(candidate.kept)] = step.trial.values
-    return Accepted(Named(candidate.effect, candidate.kept), step, values)
+    effect, first = candidate.effect.when_found(values)
+    kept = candidate.kept if effect is candidate.effect else tuple(range(len(first)))
+    return Accepted(Named(effect, kept), step, first)
 
 
 def _friction(

@@ -41,7 +41,12 @@ def findings(
     arm: ArmModel,
     rng: np.random.Generator,
 ) -> tuple[Finding, ...]:
-    """Return the findings: effects of one name together, the largest share of the gap first."""
+    """
+    Return the findings: effects of one name together, the largest share of the gap first.
+
+    Names that one cause stands for have the share of all causes of theirs in common.
+
+    """
     said = _in_words(explanation, arm)
     taken = _without_later(explanation.steps)
     given = zip(explanation.given.parameters, explanation.given.theta.tolist(), strict=True)
@@ -51,9 +56,11 @@ def findings(
         for part in parts:
             merged.setdefault(part.effect.name, []).append(index)
     result = []
-    for name, indices in merged.items():
+    for name, own in merged.items():
+        together = [other for other, where in merged.items() if set(own) & set(where)]
+        indices = sorted({k for other in together for k in merged[other]})
         parts = [part for k in indices for part in said[k] if part.effect.name == name]
-        steps = [taken[k] for k in indices]
+        steps = [taken[k] for k in own]
         joints = _joints([part.effect.joints for part in parts], arm)
         order = [joint for joint in arm.robot.joints if joint in joints]
         rows = _rows(parts)
@@ -76,7 +83,7 @@ def findings(
                 parts[0].effect.sign,
                 _ties([part.effect for part in parts], order),
                 parts[0].effect.weighs,
-                tuple(own for own, where in merged.items() if where == indices and own != name),
+                tuple(other for other in together if other != name),
                 _of_joint(explanation, indices, attribution.share(indices)),
                 tuple(had.get((row[0].name, row[0].joint), 0.0) for row in rows),
             )

@@ -10,7 +10,6 @@ from typing import Literal
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
-from armid_ros.diagnosis.search.trial import ROUNDING
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
@@ -267,21 +266,19 @@ def _subject(finding: Finding) -> str:
 
 
 def _in_many(finding: Finding) -> str:
-    """Say in how many joints a cause is, and by which factor; nothing where these are few."""
+    """Say in how many joints a cause is, and by how much it was more; nothing where few."""
     if len(finding.joints) <= _JOINTS_SAID:
         return ''
-    return f' in {len(finding.joints)} joints{_by_one_factor(finding)}'
+    return f' in {len(finding.joints)} joints{_by_shares(finding)}'
 
 
-def _by_one_factor(finding: Finding) -> str:
-    """Say that all values have changed by one share of what they were; nothing where not."""
+def _by_shares(finding: Finding) -> str:
+    """Say by how much of what they were values have changed; nothing where they were nothing."""
     had = np.array(finding.had)
     if not len(had) or not np.all(had):
         return ''
-    shares, wide = (np.array(each) / had for each in (finding.values, finding.std))
-    if np.ptp(shares) > ROUNDING * np.abs(shares).max():
-        return ''
-    return f' (by {as_sure(100.0 * shares[0], 100.0 * wide[0])} % of what it was)'
+    ends = sorted(100.0 * np.array(finding.values) / had)
+    return f' (by {ends[0]:.0f} to {ends[-1]:.0f} % of what it was)'
 
 
 def _values(finding: Finding) -> Iterator[str]:
