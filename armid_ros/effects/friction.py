@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 from armid_ros.effects.action import Action, DryFriction
@@ -370,9 +370,23 @@ class FrictionOfJoints:
 
 
 def friction_level(
-    effects: Iterable[tuple[Effect, FloatArray]], robot: Robot
+    effects: Iterable[tuple[Effect, FloatArray]], robot: Robot, library: Collection[str]
 ) -> tuple[FrictionOfJoints, ...]:
-    """Return what is to be looked for where effects with values give joints friction; or none."""
+    """
+    Return what is to be looked for where effects with values give joints friction, or nothing.
+
+    Parameters
+    ----------
+    effects : iterable of (Effect, ndarray)
+        What the arm has, with values.
+    robot : Robot
+        The arm.
+    library : collection of str
+        Names that may be given: both kinds of friction have to be among them.
+
+    """
+    if not {kind.name for kind in _PARTS} <= set(library):
+        return ()
     levels = np.zeros((len(_PARTS), robot.n_joints))
     for effect, values in effects:
         for level, kind in zip(levels, _PARTS, strict=True):

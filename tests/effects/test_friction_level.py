@@ -32,7 +32,7 @@ def arm(robot):
 
 @pytest.fixture(scope='module')
 def level(arm, robot):
-    (kind,) = friction_level(zip(arm.effects, arm.values, strict=True), robot)
+    (kind,) = friction_level(zip(arm.effects, arm.values, strict=True), robot, CATALOGUE)
     return kind.on(robot)
 
 
@@ -79,4 +79,10 @@ def test_each_joint_has_its_own_factor_once_it_is_found(arm, level, motion, robo
 
 @pytest.mark.parametrize('effects', [(), ('viscous_friction@elbow_pitch:viscous_coefficient=1',)])
 def test_nothing_is_looked_for_where_one_joint_at_most_has_friction(robot, effects):
-    assert friction_level((parse_effect(text, robot) for text in effects), robot) == ()
+    found = (parse_effect(text, robot) for text in effects)
+    assert friction_level(found, robot, CATALOGUE) == ()
+
+
+def test_nothing_is_looked_for_that_may_not_be_named(arm, robot):
+    pairs = list(zip(arm.effects, arm.values, strict=True))
+    assert friction_level(pairs, robot, ['viscous_friction']) == ()

@@ -26,7 +26,7 @@ from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspa
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE, Effect, Kind, Shape
-from armid_ros.effects.friction import CoulombFriction, friction_level, ViscousFriction
+from armid_ros.effects.friction import friction_level
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
@@ -90,9 +90,8 @@ class Question:
         if not self.since:
             return tuple(library)
         kinds = [kind.as_change() for kind in library]
-        if {ViscousFriction.name, CoulombFriction.name} <= {kind.name for kind in library}:
-            pairs = zip(self.arm.effects, self.arm.values, strict=True)
-            kinds += friction_level(pairs, self.arm.robot)
+        pairs = zip(self.arm.effects, self.arm.values, strict=True)
+        kinds += friction_level(pairs, self.arm.robot, [kind.name for kind in library])
         return tuple(kinds)
 
 

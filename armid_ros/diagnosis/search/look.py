@@ -323,9 +323,22 @@ def _examined(
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     if here.tested is not None:  # what cannot be named says nothing
-        here = replace(here, tested=here.tested.among(closing, certain))
+        able = [one.candidate.key for one in compared if not _alike_in_joints(one)]
+        here = replace(here, tested=here.tested.among(able, certain))
     there = [change for change in there if changed(change, here)]
     return result, sorted(there, key=lambda t: -worth(t, here)), closing, here
+
+
+def _alike_in_joints(trial: Trial) -> bool:
+    """
+    Return whether a cause is friction that all joints have in common.
+
+    At another speed a friction curve is wrong in all of them alike: that is a misfit, unless one
+    of them shows a change by itself.
+
+    """
+    effect = trial.candidate.effect
+    return effect.friction and len(effect.joints) > 1
 
 
 def _open_squares(here: Round) -> FloatArray:
