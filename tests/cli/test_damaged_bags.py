@@ -53,7 +53,10 @@ def test_what_a_copy_lacks_is_said(damaged, tmp_path):
 
 
 def test_inspect_reads_with_and_without(damaged):
-    assert 'the checksum of the chunk' in armid('inspect', damaged).output
+    said = ' '.join(armid('inspect', damaged).output.split())
+    assert (
+        'of a damaged bag 3940 messages over 16 s could be read: the checksum of the chunk' in said
+    )
     assert 'checksum' not in armid('inspect', damaged, '--no-crc').output
 
 
