@@ -47,9 +47,9 @@ def test_even_stamps_lost_samples_small_jitter_and_a_slewed_clock_are_not(run):
         assert uneven_stamps(one, CUTOFF, BAND) == ''
 
 
-def test_identification_says_it_and_not_to_record_longer(structure, run):
+def test_identification_says_it_and_not_to_decimate_less(structure, run):
     few = IdentificationSettings(signals=SignalSettings(CUTOFF, decimation=60))
-    for by, said in ((0.0, 'record longer'), (0.02, 'time stamps are uneven')):
+    for by, said in ((0.0, 'is the largest that works'), (0.02, 'time stamps are uneven')):
         short = jittered(run, by).select(slice(0, 1000))
         with pytest.raises(IdentificationError, match=said):
             identify(structure, [short], few, rng=np.random.default_rng(0))
