@@ -56,7 +56,7 @@ def misfit_of(
     recordings : sequence of Recording
         The recordings.
     used : Conditioning
-        RowFilters; the narrower the band, the less noise.
+        Filters; the narrower the band, the less noise.
     data : {'held-out', 'training'}
         Whether the model was fitted to them.
 

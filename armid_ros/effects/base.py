@@ -9,8 +9,7 @@ dependence explains a residual. An effect of the joints has its quantities once 
 effect of the whole arm has no joints and its quantities once.
 
 Quantities are amplitudes: the torque is linear in them, or nearly so. What it is not linear in,
-such as a Stribeck velocity, is a shape: it belongs to the effect itself, which has columns and
-acts with the shape that it has.
+such as a Stribeck velocity, is a shape: it belongs to the effect, which has columns with it.
 
 """
 
@@ -50,8 +49,7 @@ class Effect(ABC):
     Examples
     --------
     >>> import armid_ros as ar
-    >>> from armid_ros.effects import Action
-    >>> from armid_ros.effects.layout import joint_columns, scatter
+    >>> from armid_ros.effects import Action, joint_columns, scatter
     >>> class Hose(ar.Effect):
     ...     name = 'hose'
     ...     summary = 'hose that stiffens as it bends'
@@ -89,7 +87,7 @@ class Effect(ABC):
     linear: ClassVar[bool] = True
     #: Whether the columns of a sample depend on that sample alone, or on those around it as well.
     instantaneous: ClassVar[bool] = True
-    #: Whether it acts by changing the rigid body or its gravity.
+    #: Whether it changes the rigid body or its gravity.
     changes_body: ClassVar[bool] = False
     #: Whether every joint may be taken to have it.
     everywhere: ClassVar[bool] = False
@@ -97,6 +95,8 @@ class Effect(ABC):
     usual: ClassVar[bool] = False
     #: Whether it is friction: all that a joint has of it may change at once.
     friction: ClassVar[bool] = False
+    #: Whether joints that each have the effect of another name have it in common here.
+    common: ClassVar[bool] = False
     #: Shapes with which it is learned as a nuisance where nobody asked for it; () if it is not.
     nuisance: ClassVar[tuple[tuple[float, ...], ...]] = ()
     #: Whether it comes and goes all day: a change is put down to it where it explains as well.

@@ -302,6 +302,7 @@ class FrictionLevel(Effect):
     shown_by = ViscousFriction.shown_by
     look_at = ViscousFriction.look_at
     friction = True
+    common = True
     holds_at_rest = True
     quantities = (Quantity('friction_change', '', lower=-1.0, typical=(0.02, 3.0)),)
 
@@ -321,31 +322,32 @@ class FrictionLevel(Effect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dk, the friction torque that there was [N m], shape (N, n, P)."""
-        places = self.indices(motion.joints)
-        dq = motion.dq[:, places]
-        columns = np.zeros((len(motion), motion.n_joints, len(self.owners)))
-        own = range(len(places)) if self.each else [0] * len(places)
-        columns[:, places, list(own)] = dq * self.viscous + np.sign(dq) * self.coulomb
-        return columns
+        of_joints = [kind(self.joints).columns(motion, arm) * own for kind, own in self._parts]
+        each = np.sum(of_joints, axis=0)
+        return np.asarray(each if self.each else each.sum(axis=2, keepdims=True))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return damping and dry friction."""
         viscous, coulomb = (
-            scatter(kind(self.joints), values * np.array(own), arm.robot)[0]
-            for kind, own in zip(_PARTS, (self.viscous, self.coulomb), strict=True)
+            kind(self.joints).action(values * own, arm) for kind, own in self._parts
         )
-        dry = DryFriction(np.eye(len(coulomb)), -coulomb, coulomb)
-        return Action(damping=np.diag(viscous), dry_friction=dry)
+        return Action(damping=viscous.damping, dry_friction=coulomb.dry_friction)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return viscous and Coulomb friction of the joints that have any."""
-        said = []
-        for kind, own in zip(_PARTS, (self.viscous, self.coulomb), strict=True):
-            there = np.array(own) != 0.0
+        said: list[tuple[Effect, FloatArray]] = []
+        for kind, own in self._parts:
+            there = own != 0.0
             joints = tuple(joint for joint, has in zip(self.joints, there, strict=True) if has)
             if joints:
-                said.append((kind(joints), (values * np.array(own))[there]))
+                said.append((kind(joints), (values * own)[there]))
         return tuple(said)
+
+    @property
+    def _parts(self) -> tuple[tuple[type[Effect], FloatArray], ...]:
+        """Kinds of friction, and what each joint has of them, (n,)."""
+        levels = (np.array(own) for own in (self.viscous, self.coulomb))
+        return tuple(zip(_PARTS, levels, strict=True))
 
 
 @dataclass(frozen=True)

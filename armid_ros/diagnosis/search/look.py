@@ -201,7 +201,7 @@ def _joint_by_joint(
     resolution = np.concatenate([trial.resolution for trial in parts])
     whole = replace(parts[0], cross=cross, square=square, resolution=resolution)
     simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
-    simpler = simpler or first.candidate.effect.friction
+    simpler = simpler or first.candidate.effect.common
     if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
         return []
     return sorted(parts, key=lambda trial: (trial.candidate.key not in able, -worth(trial, here)))
@@ -292,7 +292,9 @@ def _examined(
     With a baseline it is the change that has to be significant and to matter: the values that a
     candidate had then are nuisance parameters. Candidates are compared jointly with such values of
     all of them, since each may have been there before whichever of them changed. One that is
-    larger than any motion makes a misfit has changed, however few recordings tell.
+    larger than any motion makes a misfit has changed, however few recordings tell. At another
+    speed a friction curve is wrong in all joints alike: what these have in common does not say
+    that anything has changed, unless one of them does by itself.
 
     """
     assert here.total is not None
@@ -322,23 +324,11 @@ def _examined(
     pairs = zip(compared, best, strict=True)
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
-    if here.tested is not None:  # what cannot be named says nothing
-        able = [one.candidate.key for one in compared if not _alike_in_joints(one)]
+    if here.tested is not None:  # what cannot be named, or is a misfit of all joints alike
+        able = [one.candidate.key for one in compared if not one.candidate.effect.common]
         here = replace(here, tested=here.tested.among(able, certain))
     there = [change for change in there if changed(change, here)]
     return result, sorted(there, key=lambda t: -worth(t, here)), closing, here
-
-
-def _alike_in_joints(trial: Trial) -> bool:
-    """
-    Return whether a cause is friction that all joints have in common.
-
-    At another speed a friction curve is wrong in all of them alike: that is a misfit, unless one
-    of them shows a change by itself.
-
-    """
-    effect = trial.candidate.effect
-    return effect.friction and len(effect.joints) > 1
 
 
 def _open_squares(here: Round) -> FloatArray:
