@@ -143,7 +143,7 @@ class DiagnosisResult(Shown):
         out.mkdir(parents=True, exist_ok=True)
         text = json.dumps(self.document(), indent=1)
         write_file(out / 'diagnosis.json', text)
-        save_model(out / 'model.yaml', self.arm, self._robot)
+        save_model(out / 'model.yaml', self.arm, self._robot, self.core.estimate)
         if self.residual is not None:
             write_file(out / TABLE_FILE, lookup_table(self.residual))
         self.report(out / 'report.html')

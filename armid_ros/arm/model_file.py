@@ -21,6 +21,7 @@ from typing import Any
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit
 from armid_ros.arm.model_check import checked_model, SCHEMA, wrong_unit
+from armid_ros.arm.words import in_words
 from armid_ros.effects import CATALOGUE, Effect, Kind
 from armid_ros.effects.tied import tied_kind
 from armid_ros.errors import ModelError
@@ -63,6 +64,7 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
         and not in a group.
 
     """
+    arm = in_words(arm)
     known: dict[tuple[str, str], float] = {}
     if estimate is not None:
         for name, std in zip(estimate.parameters, estimate.std, strict=True):

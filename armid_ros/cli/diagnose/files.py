@@ -80,10 +80,9 @@ def write_results(
 ) -> dict[str, Any]:
     """Fill a folder, numbers before pictures; return what diagnosis.json holds."""
     out.mkdir(parents=True, exist_ok=True)
-    estimate = None if result.explanation is None else result.explanation.fitted.estimate
     learned = extras.residual
     arm = result.arm if learned is None else learned.arm
-    save_model(out / 'model.yaml', arm, case.source, estimate, case.misfit)
+    save_model(out / 'model.yaml', arm, case.source, result.estimate, case.misfit)
     document = diagnosis_document(result)
     document['residual'] = None if learned is None else learned.document(TABLE_FILE)
     document['forward'] = [pair.document() for pair in extras.forward]

@@ -9,6 +9,7 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.arm.words import place_in, with_named
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import Effect, TorqueReading
@@ -109,39 +110,12 @@ class Patch:
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
     """Return the bounds of values, less what the arm has of the effect already, each (P,)."""
     lower, upper = effect.bounds()
-    there = _there(arm, effect)
+    there = place_in(arm, effect)
     if there is None:
         return lower, upper
     position, rows = there
     values = arm.values[position][rows]
     return lower - values, upper - values
-
-
-def with_named(arm: ArmModel, effect: Effect, values: FloatArray) -> ArmModel:
-    """Return an arm with an effect, whose values are added to those it has of it already."""
-    there = _there(arm, effect)
-    if there is None:
-        words = effect.named_as(values, arm)
-        if all(said.linear and _there(arm, said) for said, _ in words):
-            for said, theirs in words:
-                arm = with_named(arm, said, theirs)
-            return arm
-        return arm.with_effect(effect, values)
-    position, rows = there
-    changed = arm.values[position].copy()
-    changed[rows] += values
-    return replace(arm, values=(*arm.values[:position], changed, *arm.values[position + 1 :]))
-
-
-def _there(arm: ArmModel, effect: Effect) -> tuple[int, list[int]] | None:
-    """Return where an arm has the parameters of an effect already; None if it lacks any."""
-    wanted = [(p.name, p.joint) for p in effect.parameters(arm.robot)]
-    for position, own in enumerate(arm.effects):
-        if isinstance(effect, type(own)) and not own.shapes and not own.points:
-            names = [(p.name, p.joint) for p in own.parameters(arm.robot)]
-            if set(wanted) <= set(names):
-                return position, [names.index(name) for name in wanted]
-    return None
 
 
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:

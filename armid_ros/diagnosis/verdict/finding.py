@@ -16,9 +16,11 @@ from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.data.trajectory import at_rest, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.verdict.where import Where
-from armid_ros.estimate import ParameterName
+from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
+import numpy as np
+import scipy.linalg
 
 #: Smallest share of the gap that a sentence gives as a number.
 SAID = 0.01
@@ -246,6 +248,24 @@ class Diagnosis:
     doubt: str = ''
     suspected: tuple[Finding, ...] = ()
     blind: tuple[str, ...] = ()
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """Values of the fit, and those of the headline in the words of the catalogue."""
+        if self.explanation is None:
+            return None
+        fit = self.explanation.fitted.estimate
+        rows = [
+            row
+            for one in self.findings
+            for row in zip(one.parameters, one.values, one.std, strict=True)
+        ]
+        variance = np.array([std**2 for _, _, std in rows])
+        return Estimate(
+            (*fit.parameters, *(name for name, _, _ in rows)),
+            np.array([*fit.values, *(value for _, value, _ in rows)]),
+            scipy.linalg.block_diag(fit.covariance, np.diag(variance)),
+        )
 
     @property
     def not_checked(self) -> tuple[str, ...]:
