@@ -71,7 +71,7 @@ def test_a_shape_that_was_taken_is_no_cause_in_another_shape(bench):
 def test_what_is_to_be_explained_does_not_depend_on_what_the_model_lacks_in_every_motion(search):
     """The values of a discrepancy share standard parameters with offsets: a base has their sum."""
     evidence = search.evidence
-    discrepancy = Discrepancy.over(evidence.data, np.array([0.3, 0.3]))
+    discrepancy = Discrepancy.over(evidence.data, np.array([0.3, 0.3]), search.question.arm)
     arm, library = search.question.arm, search.settings.library
     beside = as_given(arm, evidence.data, 4, library, [discrepancy])
     rounds = [

@@ -29,8 +29,8 @@ def data(bench):
 
 
 @pytest.fixture
-def discrepancy(data):
-    return Discrepancy.over(data, np.array([0.3, 0.1]))
+def discrepancy(bench, data):
+    return Discrepancy.over(data, np.array([0.3, 0.1]), bench.arm)
 
 
 def told_of(found):

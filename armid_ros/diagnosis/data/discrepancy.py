@@ -7,18 +7,20 @@ Measured torque is that of a model, and a function of the state that the model l
 (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function belongs to the
 arm: it was there before and is there now, so that other motions, which visit other states, have
 another misfit without anything having changed. Here it is a function of position plus one of
-velocity in each joint, fitted to the recordings of both days jointly with whatever is tried.
+velocity plus friction in proportion to the load in each joint, fitted to the recordings of both
+days jointly with whatever is tried.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects import Action, Effect, Quantity
 from armid_ros.effects.base import Arm
+from armid_ros.effects.hysteresis import LoadDependentFriction
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -30,37 +32,42 @@ _POSITIONS = 4
 #: a joint is slow.
 _SPEEDS = (0.03, 0.25, 1.0)
 _KNOTS = _POSITIONS + 2 * len(_SPEEDS)
+#: Functions of a joint: of position, of velocity, and friction by load.
+_FUNCTIONS = 3
 
 
 @dataclass(frozen=True)
 class Discrepancy(Effect):
     """
-    Torque of each joint as a function of its position plus one of its velocity.
+    Torque of each joint as a function of its position, one of its velocity, and friction by load.
 
-    Both are linear between knots and constant beyond them. Values are torques at the knots.
+    Both functions are linear between knots and constant beyond them. Values are torques at the
+    knots, and friction at the usual load.
 
     Attributes
     ----------
     position, velocity : tuple of tuple of float
         Knots of each joint [rad or m, rad/s or m/s].
     size : tuple of float
-        Root mean square torque of each joint as a rule, to which both functions contribute alike
-        [N m].
+        Root mean square torque of each joint as a rule, to which all three contribute alike [N m].
+    load : tuple of float
+        Root mean square load of each joint: what the rigid body takes [N m].
 
     """
 
     position: tuple[tuple[float, ...], ...] = ()
     velocity: tuple[tuple[float, ...], ...] = ()
     size: tuple[float, ...] = ()
+    load: tuple[float, ...] = ()
 
     name = 'discrepancy'
-    summary = 'what the model leaves of any motion, over position and velocity'
-    quantities = tuple(Quantity(f'discrepancy_{k}', 'N m') for k in range(_KNOTS))
+    summary = 'what the model leaves of any motion, over position, velocity and load'
+    quantities = tuple(Quantity(f'discrepancy_{k}', 'N m') for k in range(_KNOTS + 1))
     learned = True
     smooth = True
 
     @classmethod
-    def over(cls, data: Sequence[Trajectory], size: FloatArray) -> Discrepancy:
+    def over(cls, data: Sequence[Trajectory], size: FloatArray, arm: Arm) -> Discrepancy:
         """
         Return a discrepancy of all joints whose knots are where data are.
 
@@ -70,35 +77,44 @@ class Discrepancy(Effect):
             The recordings of both days.
         size : ndarray, shape (n,)
             Root mean square torque as a rule [N m].
+        arm : Arm
+            Gives the load.
 
         """
         q = np.concatenate([part.at_rows.q for part in data])
         top = np.max([np.abs(part.at_rows.dq).max(axis=0) for part in data], axis=0)
+        load = np.concatenate([arm.load(part.at_rows) for part in data])
+        usual = np.sqrt(np.mean(load**2, axis=0))
         sides = np.array([*(-share for share in reversed(_SPEEDS)), *_SPEEDS])
         return cls(
             data[0].motion.joints,
             position=_rows(np.linspace(q.min(axis=0), q.max(axis=0), _POSITIONS, axis=1)),
             velocity=_rows(np.outer(top, sides)),
             size=tuple(size.tolist()),
+            load=tuple(np.where(usual > 0.0, usual, 1.0).tolist()),
         )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque of a unit at each knot, shape (N, n, P)."""
+        """Return the torque of a unit at each knot and at the usual load, shape (N, n, P)."""
         link = arm.link_motion(motion)
-        return joint_columns(self, motion, *self._shares(link.q, link.dq))
+        friction = LoadDependentFriction(self.joints).columns(motion, arm)
+        by_load = np.diagonal(friction, axis1=1, axis2=2) / np.array(self.load)
+        return joint_columns(self, motion, *self._shares(link.q, link.dq), by_load)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of both functions."""
-        at_knots = scatter(self, values, arm.robot)
+        """Return the torque of all functions."""
+        whole = scatter(self, values, arm.robot)
+        at_knots, by_load = whole[:-1], whole[-1] / np.array(self.load)
+        friction = LoadDependentFriction(self.joints).action(by_load, arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             return np.asarray(np.einsum('k...j,kj->...j', self._shares(q, dq), at_knots))
 
-        return Action(link_torque=torque)
+        return replace(friction, link_torque=torque)
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
         """Return the standard deviations of the prior, shape (P,)."""
-        return np.repeat(np.sqrt(0.5) * np.array(self.size), _KNOTS)
+        return np.repeat(np.array(self.size) / np.sqrt(_FUNCTIONS), len(self.quantities))
 
     def _shares(self, q: FloatArray, dq: FloatArray) -> FloatArray:
         """Return the share of each knot at states (..., n), shape (K, ..., n)."""
