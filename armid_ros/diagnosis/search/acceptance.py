@@ -39,10 +39,17 @@ def possible(trial: Trial, here: Round) -> bool:
 
 
 def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
-    """Return which values are within their bounds, or beyond them by noise at most, shape (p,)."""
-    kept = list(trial.candidate.kept)
+    """
+    Return which values are within their bounds, shape (p,).
+
+    One is beyond its bound by noise, or by what the law of the effect gets wrong: at the bound it
+    explains nearly as much.
+
+    """
+    kept, thresholds = list(trial.candidate.kept), here.settings.thresholds
     lower, upper = (bound[kept] for bound in room(trial.candidate.effect, here.work.arm))
-    slack = here.settings.thresholds.surely * trial.deviation
+    inexact = np.sqrt(thresholds.tie) * np.abs(trial.values)
+    slack = np.maximum(thresholds.surely * trial.deviation, inexact)
     return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
 
 
