@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
@@ -248,8 +249,15 @@ class ThermalFriction(Effect):
     shown_by = 'the same motion cold and after half an hour of work'
     look_at = 'how warm the gear was, and how long the arm had worked before'
     friction = True
-    quantities = (Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),)
+    quantities: ClassVar[tuple[Quantity, ...]] = (
+        Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),
+    )
     shapes = (Shape('warm_up_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
+
+    @classmethod
+    def as_change(cls) -> type[Effect]:
+        """Return friction that may have been another one from the beginning."""
+        return ThermalChange
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/ddFv = (1 - exp(-t / T)) dq [rad/s], shape (N, n, P)."""
@@ -267,6 +275,46 @@ class ThermalFriction(Effect):
     def _warm(self, t: FloatArray, arm: Arm) -> FloatArray:
         (constant,) = self.shape_over_joints(arm.robot)
         return np.asarray(-np.expm1(-np.asarray(t)[..., np.newaxis] / constant))
+
+
+@dataclass(frozen=True)
+class ThermalChange(ThermalFriction):
+    """
+    Viscous friction other than it was, from the beginning and while the joint warms up.
+
+    tau = (c + dFv (1 - exp(-t / T))) dq. A joint that starts colder has more friction at first,
+    and as much in the end. Said as thermal_friction and viscous_friction.
+
+    """
+
+    name = 'thermal_change'
+    quantities = (*ThermalFriction.quantities, replace(*ViscousFriction.quantities, lower=-np.inf))
+
+    @property
+    def said_as(self) -> str:
+        """Return the change while the joint warms up."""
+        return ThermalFriction.name
+
+    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
+        """Return dtau/ddFv and dtau/dc [rad/s], shape (N, n, P)."""
+        return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq, motion.dq)
+
+    def action(self, values: FloatArray, arm: Arm) -> Action:
+        """Return the torque."""
+        change, first = scatter(self, values, arm.robot)
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            return np.asarray((first + change * self._warm(t, arm)) * dq)
+
+        return Action(torque=torque)
+
+    def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
+        """Return both."""
+        change, first = values.reshape(-1, 2).T
+        return (
+            (ThermalFriction(self.joints, self.shape), change),
+            (ViscousFriction(self.joints), first),
+        )
 
 
 #: What has a factor in common where all of the friction changes.

@@ -143,7 +143,7 @@ class Explainer:
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         known = None if self.information is None else Identified(self.information)
         found = self._changes(evidence, misfit, known)
-        usual = settings.thresholds.predicted * evidence.as_good(settings)
+        usual = evidence.as_good(settings, settings.thresholds.predicted)
         before = evidence.chi2_per_row(found.reference.residual)
         if np.all(before <= usual + evidence.matters(settings)):
             found = found.with_nothing_named()
@@ -216,7 +216,7 @@ class Explainer:
         settings = self.settings
         self.tell(0.2, 'what has changed')
         data = [*self.prepared.data, *(() if known is None else known.data)]
-        discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit)
+        discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit, self.arm)
         question = self._since_then(data, known, [discrepancy])
         baseline = known if isinstance(known, Baseline) else None
         found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)

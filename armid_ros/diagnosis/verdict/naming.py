@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.trial import Step, Trial
+from armid_ros.diagnosis.search.trial import Named, Step, Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.effects import CATALOGUE, Effect
@@ -177,18 +177,21 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
                 ]
             )
             continue
-        parts = _translated(own.effect, values, covariance[span, span], arm)
+        parts = _translated(own, values, covariance[span, span], arm)
         result.append([part for part in parts if _determined(part)] or parts[:1])
     return result
 
 
 def _translated(
-    effect: Effect, values: FloatArray, covariance: FloatArray, arm: ArmModel
+    own: Named, values: FloatArray, covariance: FloatArray, arm: ArmModel
 ) -> list[_Said]:
     """Translate an effect into others of the catalogue, deviations by linear propagation."""
-    parts = []
-    known = np.isfinite(np.diag(covariance))
-    inside = np.where(np.outer(known, known), covariance, 0.0)
+    effect, kept, parts = own.effect, list(own.kept), []
+    inside = np.zeros((len(values), len(values)))
+    inside[np.ix_(kept, kept)] = covariance[: len(kept), : len(kept)]
+    known = np.isfinite(np.diag(inside))
+    inside = np.where(np.outer(known, known), inside, 0.0)
+    of_shape = np.sqrt(np.diag(covariance)[len(kept) :])
     step = 1e-4 * np.sqrt(np.maximum(np.diag(inside), 1e-18))
     for position, (word, numbers) in enumerate(effect.named_as(values, arm)):
         slopes = np.column_stack(
@@ -203,15 +206,20 @@ def _translated(
         )
         std = np.sqrt(np.diag(slopes @ inside @ slopes.T))
         std[np.any(np.abs(slopes[:, ~known]) > _ALONG, axis=1)] = np.nan
-        parts.append(_Said(word, word.parameters(arm.robot), numbers, std))
+        names = word.parameters(arm.robot)
+        if word.shape:
+            names += word.shape_parameters(arm.robot)
+            numbers, std = np.append(numbers, word.shape), np.append(std, of_shape)
+        parts.append(_Said(word, names, numbers, std))
     return parts
 
 
 def _determined(part: _Said) -> bool:
     """Return whether any value is three deviations from zero, and larger than is negligible."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
-    size = np.abs(part.values)
-    return bool(np.any((size > 3.0 * part.std) & (size > np.array(typical))))
+    count = len(part.values) - len(part.effect.shape)
+    size, std = np.abs(part.values[:count]), part.std[:count]
+    return bool(np.any((size > 3.0 * std) & (size > np.array(typical))))
 
 
 def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
