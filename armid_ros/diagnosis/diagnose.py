@@ -18,7 +18,7 @@ from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajectory
-from armid_ros.diagnosis.doubt import doubt_of, doubt_of_names
+from armid_ros.diagnosis.doubt import doubt_as_it_is, doubt_of, doubt_of_names
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
@@ -34,6 +34,7 @@ from armid_ros.diagnosis.verdict.attribution import attribute, Names
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
     blind_joints,
+    excess_of,
     harmed,
     held,
     hiding,
@@ -237,9 +238,13 @@ class _Asked:
     rng: np.random.Generator
     tell: Progress
 
-    def naming(self, found: Sequence[Finding]) -> _Asked:
-        """Return the same, doubted where what was named does not happen between two days."""
+    def doubting(
+        self, found: Sequence[Finding], as_it_is: Excess | None, floor_in_words: str
+    ) -> _Asked:
+        """Return the same, with a doubt of what was named, or of the model where nothing was."""
         doubt = self.doubt or (doubt_of_names(found) if self.before else '')
+        if not (doubt or found or as_it_is is None):
+            doubt = doubt_as_it_is(as_it_is.ratio, self.arm.robot, floor_in_words)
         return replace(self, doubt=doubt)
 
 
@@ -257,13 +262,13 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if unseen is not None and not names.shares.predicted:
         notes.append(_HARDLY_SHOWN)
     found = findings(explanation, names.shares, arm, asked.rng)
-    asked = asked.naming(found)
+    as_it_is = _as_it_is(asked, chosen, explanation)
+    asked = asked.doubting(found, as_it_is, chosen.floor_in_words)
     worse = _harmed(chosen, explanation, unseen, settings)
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
     left, resting = _excesses(asked, chosen, names, unseen)
     minor, suspected = _not_named(explanation, arm)
     matters = settings.material * evidence.torque_rms
-    refitted = frees_body(explanation.base, explanation.given)
     hides = None if measured else hiding(names.rest, settings)
     blind = blind_joints(evidence, arm.robot.joints, hides)
     word = decide(
@@ -272,18 +277,18 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         [*left, *resting],
         arm,
         NOISE if measured else chosen.floor_in_words,
-        _excess(arm, _sure(evidence, chosen), settings) if refitted else None,
+        as_it_is,
         minor,
         hides,
     )
-    more = _unpatched(found, worse) or [suspicion(one) for one in suspected]
+    remarks = _unpatched(found, worse) or [suspicion(one) for one in suspected]
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
     shown = unseen if names.shares.predicted else None
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *more, *_doubts(asked, chosen, word, blind)]),
+        summary=' '.join([word.summary, *remarks, *_doubts(asked, chosen, word, blind)]),
         findings=found,
         minor=minor,
         where=where_it_is(explanation, shown or evidence, settings) or places_held(arm, resting),
@@ -296,7 +301,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         data=tuple(evidence.data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
-        refitted=refitted,
+        refitted=as_it_is is not None,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
@@ -383,28 +388,23 @@ def _excesses(
     more = settings.thresholds.predicted
     usual = 1.0 if chosen.measured else more  # a misfit varies from motion to motion
     arm = rest.fitted.arm
-    left = [_excess(arm, _sure(evidence, chosen), settings, usual)]
+    left = [excess_of(arm, _sure(evidence, chosen), settings, usual)]
     parts = [evidence]
     if unseen is not None:
         where = 'recordings that were not used'
-        left.append(_excess(arm, _sure(unseen, chosen), settings, more, where))
+        left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
         parts.append(unseen)
     if settings.partner is not None:
         return left, []
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
 
 
-def _excess(
-    arm: ArmModel,
-    evidence: Evidence,
-    settings: DiagnosisSettings,
-    more: float = 1.0,
-    where: str = 'the recordings',
-) -> Excess:
-    """Return the loss that an arm leaves over so many times the limit up to which it is no gap."""
-    residual = evidence.residuals(arm)
-    ratio = evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
-    return Excess(ratio / more, f'in {where}')
+def _as_it_is(asked: _Asked, chosen: Chosen, explanation: Explanation) -> Excess | None:
+    """Return what the given model leaves; None if its rigid body is not fitted anew."""
+    if not frees_body(explanation.base, explanation.given):
+        return None
+    usual = 1.0 if chosen.measured else asked.settings.thresholds.predicted
+    return excess_of(asked.arm, _sure(explanation.evidence, chosen), asked.settings, usual)
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

@@ -12,12 +12,14 @@ from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.diagnosis.verdict.words import larger
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.robots import Robot
 import numpy as np
 
 _UNUSABLE = (
@@ -65,6 +67,17 @@ def doubt_of_names(findings: Sequence[Finding]) -> str:
     return (
         f'Links do not change between two days: unless that of {" and ".join(never[0].joints)} '
         'was exchanged or something was bolted to it, what is not in the catalogue acts like it.'
+    )
+
+
+def doubt_as_it_is(excess: FloatArray, robot: Robot, floor_in_words: str) -> str:
+    """Say that a model leaves more than a floor can be, by loss over limit, (n,), or nothing."""
+    worst = int(np.argmax(excess))
+    if excess[worst] <= 1.0:
+        return ''
+    return (
+        f'As it is, the error of {robot.joints[worst]} is {larger(np.sqrt(excess[worst]))} '
+        f'{floor_in_words} can be.'
     )
 
 

@@ -143,7 +143,7 @@ class Explainer:
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         known = None if self.information is None else Identified(self.information)
         found = self._changes(evidence, misfit, known)
-        usual = evidence.as_good(settings, settings.thresholds.predicted)
+        usual = settings.thresholds.predicted * evidence.as_good(settings)
         before = evidence.chi2_per_row(found.reference.residual)
         if np.all(before <= usual + evidence.matters(settings)):
             found = found.with_nothing_named()

@@ -118,6 +118,19 @@ def _worse(
     return np.asarray((surely | by_far) & gap)
 
 
+def excess_of(
+    arm: ArmModel,
+    evidence: Evidence,
+    settings: DiagnosisSettings,
+    more: float = 1.0,
+    where: str = 'the recordings',
+) -> Excess:
+    """Return the loss that an arm leaves over so many times the limit up to which it is no gap."""
+    residual = evidence.residuals(arm)
+    ratio = evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
+    return Excess(ratio / more, f'in {where}')
+
+
 def held(
     arm: ArmModel,
     evidence: Evidence,

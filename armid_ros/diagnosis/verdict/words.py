@@ -103,14 +103,14 @@ def decide(
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
-        f'the error of {joint} is {_larger(np.sqrt(worst.ratio.max()))} '
+        f'the error of {joint} is {larger(np.sqrt(worst.ratio.max()))} '
         f'{floor_in_words} can be {worst.where}'
     )
     if not findings:
         if open_gap:
             text = f'Something is missing: {rest}. {_unexplained(minor)}'
             return Verdict('unknown', text)
-        text = _consistent(floor_in_words, as_it_is, minor, arm.robot)
+        text = _consistent(floor_in_words, as_it_is, minor)
         hidden = [] if hides is None else [_could_hide(hides, minor, arm.robot)]
         return Verdict('consistent', ' '.join([text, *hidden]))
     said = _sentences(findings)
@@ -125,19 +125,15 @@ def decide(
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
 
 
-def _consistent(
-    floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding], robot: Robot
-) -> str:
+def _consistent(floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding]) -> str:
     """Say that a model explains the data, what is fitted anew for that, and what is too small."""
     small = [sentence(one) for one in minor[:1] if one.share >= SAID]
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         text = f'The model explains the recordings: what is left is {floor_in_words}'
         return f'{text}, or too small to matter. {small[0]}' if small else f'{text}.'
-    worst = int(np.argmax(as_it_is.ratio))
     text = (
         'The model explains the recordings once its rigid body and friction are fitted: what is '
-        f'left is {floor_in_words}{", or too small to matter" if small else ""}. As it is, the '
-        f'error of {robot.joints[worst]} is {_larger(np.sqrt(as_it_is.ratio[worst]))} that can be.'
+        f'left is {floor_in_words}{", or too small to matter" if small else ""}.'
     )
     return ' '.join([text, *small])
 
@@ -161,7 +157,7 @@ def _unexplained(minor: Sequence[Finding]) -> str:
     return f'Nothing in the catalogue closes it. {sentence(minor[0])}'
 
 
-def _larger(ratio: float) -> str:
+def larger(ratio: float) -> str:
     """Say how much larger an error is than another one."""
     if ratio < 1.05:
         return 'a little larger than'
