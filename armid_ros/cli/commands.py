@@ -26,7 +26,7 @@ class Listed(NamedTuple):
     Attributes
     ----------
     module : str
-        Below `armid_ros.cli`; imported when the command is called.
+        Below `armid_ros.cli.signatures`; imported when the command is called.
     summary : str
         First sentence of its help: listing the commands imports none of them.
 
@@ -39,19 +39,19 @@ class Listed(NamedTuple):
 #: The commands in the order of the work.
 COMMANDS = {
     'demo': Listed(
-        'demo.command',
+        'demo',
         'Excite, move, identify online and offline; then find what was hidden in the arm.',
     ),
     'convert': Listed('convert', 'Make a bag of a table or of a bag of ROS 1.'),
     'inspect': Listed('inspect', 'Look at a recording: a bag, or a table.'),
     'excite': Listed(
-        'excite.command',
+        'excite',
         'Design a trajectory that shows the parameters, inside all limits and free of collisions.',
     ),
     'simulate': Listed('record', 'Let a simulated arm follow a trajectory and record it.'),
     'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
-    'diagnose': Listed('diagnose.command', 'Find which effect a model lacks, and add it.'),
-    'elastic': Listed('elastic.command', 'Identify elastic joints.'),
+    'diagnose': Listed('diagnose', 'Find which effect a model lacks, and add it.'),
+    'elastic': Listed('elastic', 'Identify elastic joints.'),
     'exo': Listed('exo', 'Find what ties an exoskeleton to its wearer.'),
     'lunar': Listed(
         'lunar',
@@ -139,7 +139,7 @@ def _tell_notes(context: click.Context) -> None:
 @cache
 def _imported(name: str) -> click.Command:
     """Import a command; no option of it takes a number that is not finite."""
-    module = import_module(f'armid_ros.cli.{COMMANDS[name].module}')
+    module = import_module(f'armid_ros.cli.signatures.{COMMANDS[name].module}')
     command: click.Command = getattr(module, name)
     _refuse_infinite(command)
     return command

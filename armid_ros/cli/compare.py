@@ -17,19 +17,8 @@ from armid_ros.report.compare_report import compare_report, tell
 import click
 
 
-@click.command(epilog='Example: armid compare monday friday --out changes')
-@click.argument('before', metavar='A', type=click.Path(path_type=Path))
-@click.argument('after', metavar='B', type=click.Path(path_type=Path))
-@options.folder
-@click.option('--strict', is_flag=True, help='End with code 3 if one of them is unusable.')
-@options.as_json
 def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -> None:
-    """
-    Say what changed between two identifications of one robot.
-
-    A and B are folders that identify wrote, identification.json or model.yaml.
-
-    """
+    """Say what changed between two identifications of one robot."""
     options.hold(out, SCHEMA)
     first, second = read_parameters(before), read_parameters(after)
     comparison = run(first, second)

@@ -17,22 +17,6 @@ from armid_ros.robots import Robot
 import click
 
 
-@click.command(
-    epilog="Example: armid convert run.csv --robot ur10.urdf --effort 'tau{}' --out run"
-)
-@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    '--robot',
-    'robot_source',
-    metavar='R',
-    help='Shipped name or path of a URDF, whose joints the columns become; without it, joints '
-    'are called as the columns are.',
-)
-@click.option('--out', type=options.OutPath(path_type=Path), help='Bag to write; must not exist.')
-@click.option('--dry-run', is_flag=True, help='Show what would be read from where; write nothing.')
-@columns.options
-@options.reading
-@options.joints
 def convert(
     files: tuple[Path, ...],
     robot_source: str | None,
@@ -40,14 +24,7 @@ def convert(
     dry_run: bool,
     joints: str | None,
 ) -> None:
-    """
-    Make a bag of a table or of a bag of ROS 1.
-
-    Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
-    datasets. Columns that are not named are guessed, and shown. Several tables hold columns of the
-    same rows. Bags of ROS 1 and ROS 2 are copied, joints renamed.
-
-    """
+    """Make a bag of a table or of a bag of ROS 1."""
     if out is None and not dry_run:
         raise click.UsageError('--out says which bag to write; --dry-run writes none')
     robot = None

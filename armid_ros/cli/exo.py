@@ -19,7 +19,7 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.pair.driven_cycle import check_cycle
-from armid_ros.pair.exercises import exercise, EXERCISES
+from armid_ros.pair.exercises import exercise
 from armid_ros.pair.gait import Gait, read_gait
 from armid_ros.pair.gait_cycle import gait_cycle, weight
 from armid_ros.pair.leg_pair import (
@@ -97,39 +97,6 @@ class SimulationOptions:
                 write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
 
 
-@click.command(
-    epilog='Example: armid exo --out result; with a recording: armid exo run.mcap --out result'
-)
-@click.argument('bag', required=False, type=click.Path(path_type=Path))
-@options.folder
-@click.option(
-    '--topics',
-    default='/exo/joint_states,/human/joint_states',
-    show_default=True,
-    help='JointState topics of the machine and of its wearer.',
-)
-@click.option(
-    '--inertias',
-    type=click.Choice(['known', 'free']),
-    default='known',
-    show_default=True,
-    help="Whether the machine's inertias are those of its description, or estimated as well.",
-)
-@click.option('--gait', 'gait_file', type=click.Path(path_type=Path), help='CSV; level walking.')
-@click.option('--stiffness', type=float, help='Of simulated springs [N/m]; as assumed by default.')
-@click.option(
-    '--motion',
-    type=click.Choice(list(EXERCISES)),
-    default='step',
-    show_default=True,
-    help='What the simulated pair does on one foot.',
-)
-@click.option('--duration', default=10.0, show_default=True, help='Simulated recording [s].')
-@click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
-@click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
-@options.seed
-@options.reading
-@options.as_json
 @gathered(simulated=SimulationOptions)
 def exo(
     bag: Path | None,
@@ -140,12 +107,7 @@ def exo(
     seed: int,
     as_json: bool,
 ) -> None:
-    """
-    Find what ties an exoskeleton to its wearer.
-
-    Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
-
-    """
+    """Find what ties an exoskeleton to its wearer."""
     pair = leg_pair(simulated.stiffness)
     gait = read_gait(simulated.gait_file)
     names = topics.split(',')

@@ -30,28 +30,6 @@ import numpy as np
 _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 
 
-@click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
-@click.argument('bag', type=click.Path(path_type=Path))
-@click.option(
-    '--robot',
-    'robot_source',
-    metavar='R',
-    help='Shipped name, path of a URDF, or - for the one in the bag; limits and units are '
-    'checked with it, and an identification is tried.',
-)
-@click.option(
-    '--out',
-    type=options.OutPath(file_okay=False, path_type=Path),
-    help='Folder to put the page with all curves into.',
-)
-@options.force
-@columns.options
-@options.topic
-@options.gravity
-@options.joints
-@options.seed
-@options.reading
-@options.as_json
 def inspect(
     bag: Path,
     robot_source: str | None,
@@ -62,13 +40,7 @@ def inspect(
     seed: int,
     as_json: bool,
 ) -> None:
-    """
-    Look at a recording: a bag, or a table.
-
-    Topics, joints, rate, gaps, ranges, units that look wrong, whether the motion repeats, and with
-    a robot whether identify takes it. Without --out it is printed only.
-
-    """
+    """Look at a recording: a bag, or a table."""
     if out is not None:
         options.hold(out, SCHEMA, robot_source or '')
     robot = None

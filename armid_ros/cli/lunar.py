@@ -20,10 +20,6 @@ import click
 OUTPUTS = ('lunar.json', 'report.html')
 
 
-@click.command(epilog='Example: armid lunar --out result')
-@options.folder
-@options.seed
-@options.as_json
 def lunar(out: Path, seed: int, as_json: bool) -> None:
     """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
     options.hold(out, SCHEMA)

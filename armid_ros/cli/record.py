@@ -12,7 +12,6 @@ from armid_ros.cli import options
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import Effect, parse_effect
-from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.elastic.identification import write_runs
 from armid_ros.elastic.plant.record import record
 from armid_ros.elastic.plant.setup import (
@@ -31,7 +30,6 @@ from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
 from armid_ros.simulation import simulate as run
 from armid_ros.simulation.bodies import require_masses
-import click
 import numpy as np
 
 
@@ -95,39 +93,6 @@ class NoiseOptions:
         )
 
 
-@click.command(epilog='Example: armid simulate --robot humanoid_arm --gravity moon --out run')
-@options.robot
-@options.bag
-@click.option(
-    '--effect',
-    'texts',
-    multiple=True,
-    metavar='NAME:k=v',
-    help=f'Such as {EXAMPLES}. Every joint gets the values; for others in single joints give it '
-    'several times, as NAME@A:k=v and NAME@B:k=w.',
-)
-@click.option('--model', type=click.Path(path_type=Path), help='A model.yaml of armid identify.')
-@click.option(
-    '--trajectory', type=click.Path(path_type=Path), help='A YAML, CSV or bag of armid excite.'
-)
-@click.option('--rate', default=1000.0, show_default=True, help='Recorded samples per second.')
-@click.option(
-    '--loop-gain',
-    default=1.0,
-    show_default=True,
-    help='Share of the gains of the velocity loops that drive elastic joints.',
-)
-@click.option('--torque-noise', default=0.0, help='Standard deviation [N m].')
-@click.option('--position-noise', default=0.0, help='Standard deviation [rad].')
-@click.option('--velocity-noise', default=0.0, help='Standard deviation [rad/s].')
-@click.option(
-    '--acceleration-noise', default=0.0, help='Of accelerometers on links with springs [m/s^2].'
-)
-@click.option('--resolution', default=0.0, help='Step of the encoders [rad].')
-@options.gravity
-@options.joints
-@options.seed
-@options.reading
 @gathered(robot=RobotChoice, arm=ArmOptions, noise=NoiseOptions)
 def simulate(
     robot: RobotChoice,
@@ -139,13 +104,7 @@ def simulate(
     noise: NoiseOptions,
     seed: int,
 ) -> None:
-    """
-    Let a simulated arm follow a trajectory and record it.
-
-    Joints with joint_elasticity and rotor_inertia have motors with a motion of their own; such an
-    arm is recorded on both sides of its springs.
-
-    """
+    """Let a simulated arm follow a trajectory and record it."""
     rng = np.random.default_rng(seed)
     loaded = robot.load()
     model, drives = arm.model_and_drives(loaded)
@@ -206,10 +165,6 @@ def _both_sides(
     return len(measured.motor)
 
 
-@click.command(epilog='Example: armid recover crashed/crashed_0.mcap --out whole')
-@click.argument('file', type=click.Path(path_type=Path))
-@options.bag
-@options.reading
 def recover(file: Path, out: Path) -> None:
     """Make a recording whole whose writer was killed; the file itself is left as it is."""
     say(recover_bag(file, out, options.read_settings()).describe())

@@ -18,7 +18,6 @@ from armid_ros.errors import ArmidError, OutputError
 from armid_ros.robots import Robot
 from armid_ros.view import log_scene, make_scene, open_stream, rerun
 from armid_ros.view.scene import Scene
-import click
 
 
 @dataclass(frozen=True)
@@ -43,26 +42,6 @@ class OptionalRobot:
         return RobotChoice(source, self.gravity, self.joints).load(bags)
 
 
-@click.command(epilog='Example: armid view run.mcap --model found --out run.rrd')
-@click.argument('bag', required=False, type=click.Path(path_type=Path))
-@click.option(
-    '--model',
-    type=click.Path(path_type=Path),
-    help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
-    'and joints that the diagnosis names are coloured.',
-)
-@click.option(
-    '--robot', 'robot_source', metavar='R', help='As elsewhere; of the model by default.'
-)
-@click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
-@click.option('--mark', metavar='A,B,...', help='Joints to be coloured.')
-@click.option('--live', is_flag=True, help='Show joint_states as they come; no BAG.')
-@click.option('--namespace', default='', help='With --live: of the nodes, such as left_arm.')
-@columns.options
-@options.topic
-@options.gravity
-@options.joints
-@options.reading
 @gathered(robot=OptionalRobot)
 def view(
     bag: Path | None,
@@ -74,12 +53,7 @@ def view(
     namespace: str,
     topic: str | None,
 ) -> None:
-    """
-    Look at a recording in rerun: the moving arm, torques, and what a model does not explain.
-
-    With --live the arm is shown as it moves; the online identifier beside it has the predictions.
-
-    """
+    """Look at a recording in rerun: the moving arm, torques, and what a model does not explain."""
     if live == (bag is not None):
         raise ArmidError('armid view shows a BAG, or with --live what is on the topics: name one')
     if live:

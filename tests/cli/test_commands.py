@@ -10,11 +10,17 @@ import sys
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli.commands import COMMANDS, main
-from armid_ros.effects import CATALOGUE, make_effect
+from armid_ros.cli.excite.springs import COURSES
+from armid_ros.cli.signatures import choices
+from armid_ros.effects import CATALOGUE, make_effect, USUAL_EFFECTS
+from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.elastic.identification import Accelerometers, read_runs
-from armid_ros.excitation import load_excitation
+from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
+from armid_ros.identification.estimators.names import ESTIMATORS
+from armid_ros.pair.exercises import EXERCISES
 from armid_ros.recording import read_joint_trajectory, read_recording
-from armid_ros.robots import load_robot
+from armid_ros.recording.tables.settings import TIME_UNITS
+from armid_ros.robots import load_robot, two_link
 import click
 import numpy as np
 import pytest
@@ -37,15 +43,53 @@ def test_commands_are_listed_with_the_first_sentence_of_their_help():
     assert {name: entry.summary for name, entry in COMMANDS.items()} == said
 
 
-@pytest.mark.parametrize('option', ['--help', '--version'])
-def test_help_and_version_import_nothing_that_computes(option):
-    program = (
-        'import sys; from armid_ros.cli import main; '
-        f"main(['{option}'], standalone_mode=False); "
-        "sys.exit('numpy' in sys.modules)"
-    )
+#: What takes long to import, and the packages of armid_ros that import it.
+HEAVY = (
+    *('numpy', 'scipy', 'pinocchio', 'coal', 'matplotlib', 'rich', 'rosbags', 'rclpy', 'dask'),
+    *('armid_ros.arm', 'armid_ros.effects', 'armid_ros.recording', 'armid_ros.report'),
+)
+
+
+def test_help_and_version_import_nothing_that_computes():
+    """The whole tree of commands is built, with what completion and help take from it."""
+    program = f"""
+import sys
+from armid_ros.cli import main
+import click
+
+def build(group, context):
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        below = click.Context(command, info_name=name, parent=context)
+        command.get_help(below)
+        if isinstance(command, click.Group):
+            build(command, below)
+
+main(['--version'], standalone_mode=False)
+build(main, click.Context(main, info_name='armid'))
+sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
+"""
     result = subprocess.run([sys.executable, '-c', program], capture_output=True, check=False)
     assert result.returncode == 0, result.stderr.decode()
+
+
+@pytest.mark.parametrize(
+    ('shown', 'offered'),
+    [
+        (choices.USUAL_EFFECTS, USUAL_EFFECTS),
+        (choices.EFFECT_EXAMPLES, EXAMPLES),
+        (choices.ESTIMATORS, ESTIMATORS),
+        (choices.TIME_UNITS, tuple(TIME_UNITS)),
+        (choices.SPEED_CLASSES, tuple(SPEED_CLASSES)),
+        (choices.CRITERIA, CRITERIA),
+        (choices.TARGETS, TARGETS),
+        (choices.COURSES, tuple(COURSES)),
+        (choices.EXERCISES, tuple(EXERCISES)),
+        (choices.TWO_LINKS, two_link.ROBOT),
+    ],
+)
+def test_help_offers_what_the_packages_have(shown, offered):
+    assert shown == offered
 
 
 def test_robots_and_effects_are_listed_for_people_and_programs():

@@ -7,7 +7,7 @@ from pathlib import Path
 import shutil
 
 from armid_ros.arm import load_misfit, load_model, Misfit, save_model
-from armid_ros.cli.diagnose.command import Percent
+from armid_ros.cli.signatures.diagnose import Percent
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics

@@ -3,6 +3,7 @@
 """Options reach a command as settings objects, every one of them."""
 
 from dataclasses import dataclass, fields
+import inspect
 
 from armid_ros.cli import main
 from armid_ros.cli.groups import gathered
@@ -28,11 +29,12 @@ def commands(group, path=()):
             yield ' '.join((*path, name)), command
 
 
-GROUPED = {
-    name: command
+WORK = {
+    name: (command, command.callback.work())
     for name, command in commands(main)
-    if getattr(command.callback, 'gathered', None) is not None
+    if hasattr(command.callback, 'work')
 }
+GROUPED = [name for name, (_, work) in WORK.items() if hasattr(work, 'gathered')]
 
 
 def test_options_of_a_group_come_as_one_object_and_the_others_as_they_are():
@@ -52,8 +54,17 @@ def test_options_of_a_group_come_as_one_object_and_the_others_as_they_are():
 
 @pytest.mark.parametrize('name', GROUPED)
 def test_every_field_of_a_group_is_an_option_and_no_option_is_in_two(name):
-    command = GROUPED[name]
-    named = [field.name for kind in command.callback.gathered.values() for field in fields(kind)]
+    command, work = WORK[name]
+    named = [field.name for kind in work.gathered.values() for field in fields(kind)]
     options = {parameter.name for parameter in command.params if parameter.expose_value}
     assert len(named) == len(set(named))
     assert set(named) <= options
+
+
+@pytest.mark.parametrize('name', WORK)
+def test_what_does_a_command_takes_its_options_and_nothing_else(name):
+    command, work = WORK[name]
+    kinds = getattr(work, 'gathered', {})
+    taken = [p for p in inspect.signature(work).parameters if p not in kinds]
+    taken += [field.name for kind in kinds.values() for field in fields(kind)]
+    assert sorted(taken) == sorted(p.name for p in command.params if p.expose_value)

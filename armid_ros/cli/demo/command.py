@@ -46,18 +46,6 @@ SENSORS = Sensors(
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
 
-@click.command(epilog='Example: armid demo --gravity earth --out demo')
-@click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
-@click.option('--rate', default=200.0, show_default=True, help='Joint states per second.')
-@click.option(
-    '--hide',
-    default='',
-    metavar='E@joint',
-    help='What is hidden in the arm in the end, to be found; drawn, and told last, by default.',
-)
-@options.folder
-@options.seed
-@options.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find what was hidden in the arm."""
     from armid_ros.nodes.lockstep import replay_lockstep

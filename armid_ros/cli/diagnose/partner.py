@@ -16,28 +16,8 @@ from armid_ros.model.spring_ties import centroid_ties, Tie
 from armid_ros.pair.leg_pair import leg_ties
 from armid_ros.recording import read_recording, ReadSettings, recorded_together, Recording
 from armid_ros.robots import load_robot, Robot
-import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
-
-_OPTIONS = (
-    click.option(
-        '--partner',
-        metavar='R',
-        help='Shipped name, URDF or xacro of a machine or person recorded in the same bags, to '
-        'which the arm may be tied, such as the wearer of an exoskeleton.',
-    ),
-    click.option('--partner-topic', help="The partner's JointState topic, where several name it."),
-    click.option(
-        '--tie',
-        'ties',
-        multiple=True,
-        metavar='JOINT=JOINT',
-        help="Where they may be tied: a joint of the arm and one of the partner, whose links' "
-        'centroids the tie joins, or points of them, JOINT@X,Y,Z=JOINT@X,Y,Z [m]. By default '
-        'links of equal number.',
-    ),
-)
 
 
 @dataclass(frozen=True)
@@ -57,13 +37,6 @@ class PartnerOptions:
     partner: str | None
     partner_topic: str | None
     ties: tuple[str, ...]
-
-
-def options(command: _Command) -> _Command:
-    """Give a command the options --partner, --partner-topic and --tie."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command
 
 
 def open_partner(

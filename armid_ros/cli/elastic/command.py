@@ -134,39 +134,6 @@ class DriveOptions:
         return _Machine(robot, shipped, sensors, replace(shipped.parameters, gear=gear), loop)
 
 
-@click.command(epilog='Example: armid elastic run.mcap --steps steps.mcap --out result')
-@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
-@click.option(
-    '--steps',
-    multiple=True,
-    type=click.Path(path_type=Path),
-    metavar='BAG',
-    help='Step responses to tune the parameters to.',
-)
-@click.option('--demo', is_flag=True, help='Simulate the shipped arm first, and identify that.')
-@click.option(
-    '--experiments', default=48, show_default=True, help='Of 4 s each, that --demo simulates.'
-)
-@click.option(
-    '--robot', 'robot_source', default=ROBOT, show_default=True, metavar='R', help='The arm.'
-)
-@click.option(
-    '--start',
-    type=click.Choice(['found', 'before', 'after']),
-    help='What the tuning begins with: what was found by then, or a printed set. By default '
-    "the former, with --demo the set 'before', as in the source.",
-)
-@click.option('--accelerometers', metavar='R1,R2', help='Distances from their joints [m].')
-@click.option('--gear', metavar='N1,N2', help='Turns of the motors per turn of the joints.')
-@click.option('--kp', metavar='K1,K2', help='Of the velocity loop, at the joints [N m s/rad].')
-@click.option('--ki', metavar='K1,K2', help='Of the velocity loop, at the joints [N m/rad].')
-@click.option(
-    '--model', type=click.Path(path_type=Path), help='A model.yaml with inertias, of other arms.'
-)
-@options.folder
-@options.reading
-@options.seed
-@options.as_json
 @gathered(data=ElasticData, demo=DemoOptions, drives=DriveOptions)
 def elastic(
     data: ElasticData,
@@ -178,14 +145,7 @@ def elastic(
     seed: int,
     as_json: bool,
 ) -> None:
-    """
-    Identify elastic joints.
-
-    A pair of links that move in a horizontal plane is identified in three steps, resonances and
-    all. Other arms need encoders on both sides of their joints, and known inertias: their springs
-    are found joint by joint.
-
-    """
+    """Identify elastic joints."""
     begin = demo.start or ('before' if demo.demo else 'found')
     printed = None if begin == 'found' else two_link_set(begin).parameters
     robot = load_robot(robot_source)

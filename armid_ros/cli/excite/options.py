@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import options
@@ -17,32 +16,12 @@ from armid_ros.excitation import (
     find_floor,
     floor_obstacles,
     load_environment,
-    SPEED_CLASSES,
     whole_period,
 )
 from armid_ros.robots import collision_model, Robot
-import click
 
 #: Of the run-in and the run-out [s], and at most this share of the duration.
 _RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
-
-
-class Speeds(click.ParamType[tuple[str | float, ...]]):
-    """Speed classes, or shares of the velocity and acceleration limits, with commas."""
-
-    name = 'speeds'
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str | float, ...]:
-        """Read them."""
-        return tuple(self._one(part.strip()) for part in str(value).split(','))
-
-    def _one(self, text: str) -> str | float:
-        if text in SPEED_CLASSES:
-            return text
-        try:
-            return float(text)
-        except ValueError:
-            self.fail(f"'{text}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
 
 
 @dataclass(frozen=True)

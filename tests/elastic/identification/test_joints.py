@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.elastic.command import elastic
+from armid_ros.cli.signatures.elastic import elastic
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.elastic.identification import write_runs
 from armid_ros.elastic.identification.files import read_sides

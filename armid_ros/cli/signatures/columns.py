@@ -1,0 +1,96 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Options that say which columns of a table are what; of every command that takes recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from armid_ros.cli.signatures.choices import TIME_UNITS
+from armid_ros.errors import RecordingError
+import click
+
+#: Where the context keeps what they say.
+META = 'armid.columns'
+
+
+def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Keep a value where ``armid_ros.cli.columns.settings`` finds it."""
+    ctx.meta.setdefault(META, {})[parameter.name] = value
+    return value
+
+
+def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
+    return click.option(*names, **{'callback': _kept, 'expose_value': False, **facts})
+
+
+def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Keep pairs of names, each of which has to be one."""
+    return _kept(ctx, parameter, tuple(_rule(text) for text in value))
+
+
+_OPTIONS = (
+    _option('--time', metavar='C', help='Column of time of a table; guessed by default.'),
+    _option(
+        '--position',
+        metavar='C',
+        help="Columns of positions: 'q{}' where {} is a joint's name or number, 'q[1..7]', or "
+        'names with commas; guessed by default.',
+    ),
+    _option('--velocity', metavar='C', help="The same of velocities; 'none' leaves them out."),
+    _option('--effort', metavar='C', help='The same of torques, forces or currents.'),
+    _option('--time-unit', type=click.Choice(TIME_UNITS), help='Of the column of time.'),
+    _option('--rate', type=float, metavar='HZ', help='Rows per second, without that column.'),
+    _option('--degrees', is_flag=True, help='Positions and velocities are in degrees.'),
+    _option(
+        '--position-scale',
+        metavar='X,...',
+        help='Makes positions and velocities rad (or m): one number, or one a joint.',
+    ),
+    _option(
+        '--effort-scale',
+        '--current-gain',
+        metavar='X,...',
+        help='Makes efforts N m: torque constants [N m/A], gear ratios as 1798/7, signs.',
+    ),
+    _option('--zero', metavar='X,...', help="Added to the positions [rad or m], as '-pi/2'."),
+    _option(
+        '--gear',
+        metavar='X,...',
+        help='Columns are those of the motors, which turn X times for a turn of the joint.',
+    ),
+    _option(
+        '--coupling',
+        multiple=True,
+        metavar='I,J=X',
+        help='With --gear: motor I turns X times for a turn of joint J, too.',
+    ),
+    _option(
+        '--rename',
+        multiple=True,
+        callback=_rules,
+        metavar='OLD:NEW',
+        help='Beginning of joint names in the file, and in the description; of bags too.',
+    ),
+    _option('--episode', type=int, metavar='N', help='Of a LeRobot dataset.'),
+)
+
+
+def options(command: Any) -> Any:
+    """Give a command the options; ``armid_ros.cli.columns.settings`` has what they say."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
+
+
+def _rule(text: str) -> tuple[str, str]:
+    old, colon, new = text.partition(':')
+    if not colon:
+        first, equals, second = text.partition('=')
+        right = f'{first}:{second}' if equals else f'{text}:NEW'
+        raise RecordingError(
+            f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
+            f"option for each pair: --rename '{right}' --rename fer_:panda_"
+        )
+    return old, new

@@ -1,0 +1,57 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A machine and its wearer: what ties them, from the machine's torques and both's angles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armid_ros.cli.signatures import options
+from armid_ros.cli.signatures.choices import (
+    EXERCISES,
+)
+from armid_ros.cli.signatures.late import done_by
+import click
+
+
+@click.command(
+    epilog='Example: armid exo --out result; with a recording: armid exo run.mcap --out result'
+)
+@click.argument('bag', required=False, type=click.Path(path_type=Path))
+@options.folder
+@click.option(
+    '--topics',
+    default='/exo/joint_states,/human/joint_states',
+    show_default=True,
+    help='JointState topics of the machine and of its wearer.',
+)
+@click.option(
+    '--inertias',
+    type=click.Choice(['known', 'free']),
+    default='known',
+    show_default=True,
+    help="Whether the machine's inertias are those of its description, or estimated as well.",
+)
+@click.option('--gait', 'gait_file', type=click.Path(path_type=Path), help='CSV; level walking.')
+@click.option('--stiffness', type=float, help='Of simulated springs [N/m]; as assumed by default.')
+@click.option(
+    '--motion',
+    type=click.Choice(list(EXERCISES)),
+    default='step',
+    show_default=True,
+    help='What the simulated pair does on one foot.',
+)
+@click.option('--duration', default=10.0, show_default=True, help='Simulated recording [s].')
+@click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
+@click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
+@options.seed
+@options.reading
+@options.as_json
+@done_by('exo')
+def exo() -> None:
+    """
+    Find what ties an exoskeleton to its wearer.
+
+    Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
+
+    """

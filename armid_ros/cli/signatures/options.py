@@ -1,0 +1,101 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from armid_ros.cli.signatures.choices import USUAL_EFFECTS
+import click
+
+_Command = TypeVar('_Command', bound=Callable[..., Any])
+
+#: Where the context keeps what its commands share.
+FORCE, CRC, MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
+
+
+class OutPath(click.Path):
+    """A path to write to: an empty one, which would be the current folder, is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        if not str(value).strip():
+            self.fail('the path is empty; name a folder, or . for this one', param, ctx)
+        return super().convert(value, param, ctx)
+
+
+robot = click.option(
+    '--robot',
+    'robot_source',
+    required=True,
+    metavar='R',
+    help='Shipped name, path of a URDF or xacro ("arm.xacro tool:=true" with '
+    'arguments), or - for the /robot_description in the bag. '
+    'A xacro is a program, which can read any file: name only one that you trust.',
+)
+gravity = click.option(
+    '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
+)
+joints = click.option(
+    '--joints', default=None, metavar='A,B,...', help='Driven joints; all but grippers by default.'
+)
+effects = click.option(
+    '--effects',
+    default=','.join(USUAL_EFFECTS),
+    show_default=True,
+    metavar='E,...',
+    help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
+)
+_out = click.option(
+    '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
+)
+force = click.option(
+    '--force',
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({FORCE: value}),
+    help='Write over results of another kind or robot, and over files of others.',
+)
+_crc = click.option(
+    '--crc/--no-crc',
+    default=True,
+    show_default=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({CRC: value}),
+    help='Compare the checksums of bags, and leave out what is damaged.',
+)
+_memory = click.option(
+    '--memory-limit',
+    type=click.FloatRange(0.0, min_open=True),
+    metavar='MB',
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({MEMORY: value}),
+    help='That a bag may take [MB]; a quarter of the memory by default.',
+)
+bag = click.option(
+    '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
+)
+bags = click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
+validate = click.option(
+    '--validate',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag to predict and not to fit; may be given several times.',
+)
+topic = click.option('--topic', help='JointState topic, where a bag has several.')
+seed = click.option('--seed', default=0, show_default=True, help='Of every random number.')
+as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
+
+
+def folder(command: _Command) -> _Command:
+    """Add --out, a folder of results, and --force, to write over others."""
+    return _out(force(command))
+
+
+def reading(command: _Command) -> _Command:
+    """Add the options that say how bags are read."""
+    return _crc(_memory(command))
