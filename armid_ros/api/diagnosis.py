@@ -33,7 +33,7 @@ from armid_ros.identification import SignalSettings
 from armid_ros.identification.identified_from import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.recording import Recording, require_once
-from armid_ros.report.notation import with_interval
+from armid_ros.report.notation import value_of
 from armid_ros.residual import (
     learn_residual,
     lookup_table,
@@ -156,7 +156,7 @@ class DiagnosisResult(Shown):
             for parameter, value, std in zip(
                 finding.parameters, finding.values, finding.std, strict=True
             ):
-                said = with_interval(value, std, parameter.unit)
+                said = value_of(finding, parameter, value, std)
                 where = finding.place_of(parameter.joint) or 'whole arm'
                 rows.append((finding.name, where, parameter.name, said))
         below = [] if self.residual is None else list(self.residual.sentences())

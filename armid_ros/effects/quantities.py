@@ -25,6 +25,8 @@ _PRISMATIC_UNITS = {
 #: No arm has more than so many times what arms of 1 to 10 kg have, but where it weighs more.
 _BEYOND_TYPICAL = 10.0
 _TYPICAL_MASS = 10.0
+#: Multiple of a scale from which on the half width of its interval says nothing of it.
+_SCALE_KNOWN = 3.0
 #: Standard deviations by which a value surely differs from another.
 SURELY = 3.0
 
@@ -106,6 +108,30 @@ class Shape:
     default: float
     grid: tuple[float, ...]
     near: float | None = None
+
+    def determined(self, value: float, half_width: float) -> bool:
+        """
+        Return whether an interval of it says anything.
+
+        It does not where it leaves out nothing that is possible, or for a scale, which is not
+        negative, is wider than three times its value. A scale that may be nothing is compared with
+        the smallest that is looked for, any other shape with the range of those.
+
+        Parameters
+        ----------
+        value, half_width : float
+            The estimate, and half of its 95 % interval.
+
+        """
+        if not np.isfinite(value) or not np.isfinite(half_width):
+            return False
+        if value - half_width <= self.lower and value + half_width >= self.upper:
+            return False
+        if self.lower >= 0.0:
+            least = min((start for start in self.grid if start > 0.0), default=0.0)
+            return half_width <= _SCALE_KNOWN * max(value, least)
+        span = max(self.grid, default=0.0) - min(self.grid, default=0.0)
+        return span <= 0.0 or half_width <= span
 
 
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:

@@ -8,6 +8,8 @@ import math
 from pathlib import PurePath
 
 from armid_ros.diagnosis.verdict import words
+from armid_ros.diagnosis.verdict.finding import Finding
+from armid_ros.estimate import ParameterName
 from armid_ros.robots import Robot
 
 
@@ -50,6 +52,13 @@ def with_interval(value: float, std: float, unit: str) -> str:
         turn = 180.0 / math.pi
         text += f' ({_plus_minus(turn * value, turn * std, "°")})'
     return text
+
+
+def value_of(finding: Finding, parameter: ParameterName, value: float, std: float) -> str:
+    """Return a value of a cause with its 95 % interval, or that the data do not determine it."""
+    if words.vague(finding, parameter, value, std):
+        return 'not determined'
+    return with_interval(value, std, parameter.unit)
 
 
 def _plus_minus(value: float, std: float, unit: str) -> str:

@@ -22,6 +22,7 @@ from armid_ros.diagnosis.verdict.words import (
 )
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import ParameterName
+from armid_ros.report.sections.diagnosed import NamedParameters
 import numpy as np
 import pytest
 
@@ -281,3 +282,21 @@ def test_a_parameter_of_several_joints_is_called_by_its_name_once(bench):
     assert sentence(found) == (
         f'A viscous friction in shoulder, elbow {values} explains 90 % of the gap.'
     )
+
+
+@pytest.mark.parametrize(('time', 'std', 'told'), [(206.0, 12908.0, False), (206.0, 20.0, True)])
+def test_a_shape_that_the_data_do_not_determine_is_said_so_with_what_shows_it(
+    bench, time, std, told
+):
+    effect = CATALOGUE['thermal_friction'].on(bench.robot, ('elbow',))
+    names = (*effect.parameters(bench.robot), *effect.shape_parameters(bench.robot))
+    numbers = (names, (0.4, time), (0.05, std), 0.9, (0.8, 1.0), 0.0)
+    found = Finding('thermal_friction', ('elbow',), *numbers)
+    open_gap = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
+    summary = decide((found,), (), [open_gap], bench.arm, FLOOR).summary
+    assert ('warm up time 206' in summary) is told
+    way = f'do not determine its warm up time; what shows it is {effect.shown_by}.'
+    assert (way in summary) is not told
+    rows = NamedParameters((found,)).rows
+    assert ('not determined' in [row[-1] for row in rows]) is not told
+    assert '0.4' in rows[0][-1]

@@ -27,7 +27,7 @@ from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
-from armid_ros.report.notation import percent, probability, with_interval
+from armid_ros.report.notation import percent, probability, value_of
 from armid_ros.residual import require_libraries, TABLE_FILE
 from armid_ros.robots import Robot
 import click
@@ -256,7 +256,7 @@ def _rows(finding: Finding) -> list[dict[str, str]]:
             'effect': '' if number else finding.name.replace('_', ' '),
             'joint': finding.place_of(name.joint) or 'whole arm',
             'parameter': name.name.replace('_', ' '),
-            'value, 95 %': with_interval(value, std, name.unit),
+            'value, 95 %': value_of(finding, name, value, std),
         }
         for number, (name, value, std) in enumerate(values)
     ]

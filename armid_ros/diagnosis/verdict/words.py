@@ -13,6 +13,8 @@ from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
+from armid_ros.effects import CATALOGUE, Shape
+from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -212,9 +214,10 @@ def _sentences(findings: Sequence[Finding]) -> str:
     for group in by_cause(findings):
         if len(group) == 1:
             said.append(sentence(group[0]))
-            continue
-        subjects = _subjects(group)
-        said.append(f'{subjects} together explain {share_in_words(group[0])}.')
+        else:
+            subjects = _subjects(group)
+            said.append(f'{subjects} together explain {share_in_words(group[0])}.')
+        said += [text for one in group for text in _left_open(one)]
     return ' '.join(said)
 
 
@@ -285,12 +288,41 @@ def _values(finding: Finding) -> Iterator[str]:
 
     """
     before = ''
-    every = list(zip(finding.parameters, finding.values, finding.std, finding.had, strict=True))
+    rows = zip(finding.parameters, finding.values, finding.std, finding.had, strict=True)
+    every = [row for row in rows if not vague(finding, *row[:3])]
     not_zero = [row for row in every if excludes_zero(row[1], row[2])]
     for p, value, std, had in not_zero or every:
         name = '' if p.name == before else f'{p.name.replace("_", " ")} '
         yield f'{name}{_with_degrees(value, std, p.unit)}{added(had)}'
         before = p.name
+
+
+def vague(finding: Finding, parameter: ParameterName, value: float, std: float) -> bool:
+    """Return whether the data do not determine a value of a cause: its digits mean nothing."""
+    shape = _shape(finding, parameter)
+    if shape is None:
+        return not np.isfinite(std)
+    return not shape.determined(value, HALF_WIDTH * std)
+
+
+def _shape(finding: Finding, parameter: ParameterName) -> Shape | None:
+    """Return what the catalogue says of a shape; None for a quantity."""
+    kind = CATALOGUE.get(finding.name)
+    shapes = () if kind is None else kind.shapes
+    return next((shape for shape in shapes if shape.name == parameter.name), None)
+
+
+def _left_open(finding: Finding) -> list[str]:
+    """Return a sentence on the shapes of a cause that the data leave open, or none."""
+    rows = zip(finding.parameters, finding.values, finding.std, strict=True)
+    left = [row[0] for row in rows if _shape(finding, row[0]) and vague(finding, *row)]
+    if not left:
+        return []
+    names = ' and '.join(dict.fromkeys(p.name.replace('_', ' ') for p in left))
+    return [
+        f'These recordings do not determine its {names}; what shows it is '
+        f'{CATALOGUE[finding.name].shown_by}.'
+    ]
 
 
 def added(had: float) -> str:
@@ -375,8 +407,9 @@ def _tie(finding: Finding, joint: str, segment: str) -> str:
     shown = [
         f'{p.name.replace("_", " ")} {as_sure(value, std)} {p.unit}'
         for p, value, std in finding.values_of(joint)
+        if not vague(finding, p, value, std)
     ]
-    return f'{segment} ({", ".join(shown)})'
+    return f'{segment} ({", ".join(shown)})' if shown else segment
 
 
 def _others(finding: Finding) -> str:

@@ -16,7 +16,7 @@ from armid_ros.diagnosis.verdict.words import by_cause
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Series
-from armid_ros.report.notation import digits, percent, pretty, probability, with_interval
+from armid_ros.report.notation import digits, percent, pretty, probability, value_of
 from armid_ros.report.page import Section
 
 #: Joints that are shown.
@@ -91,7 +91,7 @@ class NamedParameters(Section):
                 finding.name.replace('_', ' '),
                 name.name.replace('_', ' '),
                 finding.place_of(name.joint) or 'whole arm',
-                with_interval(value, std, name.unit),
+                value_of(finding, name, value, std),
             )
             for finding in self.findings
             for name, value, std in zip(
@@ -176,9 +176,7 @@ class SmallPrint(Section):
             (
                 one.name.replace('_', ' '),
                 ', '.join(one.joints) or 'whole arm',
-                with_interval(one.values[0], one.std[0], one.parameters[0].unit)
-                if one.values
-                else '',
+                value_of(one, one.parameters[0], one.values[0], one.std[0]) if one.values else '',
                 percent(one.share),
                 probability(one.p),
             )

@@ -15,7 +15,7 @@ from armid_ros.report.notation import (
     digits,
     percent,
     torque_unit,
-    with_interval,
+    value_of,
 )
 from armid_ros.report.page import render, Section
 from armid_ros.residual import JointResidual, Residual
@@ -165,7 +165,7 @@ def _cause(finding: Finding) -> str:
     places = ', '.join(finding.place_of(joint) for joint in finding.joints)
     where = f' at {places}' if places else ', whole arm'
     values = [
-        f'{name.name.replace("_", " ")} {with_interval(value, std, name.unit)}{added(had)}'
+        f'{name.name.replace("_", " ")} {value_of(finding, name, value, std)}{added(had)}'
         for name, value, std, had in _values(finding)
     ]
     more = len(finding.values) - len(values)
