@@ -80,7 +80,8 @@ class Change:
     t, detected : float
         When it changed, to a quarter of a second, and when that was clear [s].
     size : Estimate
-        By how much the quantities of the candidate changed, as far as it was known then.
+        By how much the quantities of the candidate changed, as far as it was known then; of those
+        of which nothing was known the deviation is infinite.
 
     """
 
@@ -102,7 +103,7 @@ class Change:
         """Say what changed, by how much, and what else it may have been."""
         sizes = ', '.join(
             f'{p.name} by {value:+.3g} {p.unit} ({lower:.3g} to {upper:.3g})'
-            if lower < upper
+            if 0.0 < upper - lower < np.inf
             else f'{p.name} by an amount that is not known until it moves'
             for p, value, (lower, upper) in zip(
                 self.size.parameters, self.size.values, self.size.interval(), strict=True

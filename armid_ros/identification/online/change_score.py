@@ -33,6 +33,8 @@ from scipy.linalg import lapack
 
 #: Eigenvalues of an information below this share of the largest are nothing [-].
 _NOTHING = 1e-9
+#: A change of which the window leaves more than this share open is not told by it [-].
+_HIDDEN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +141,20 @@ class ScoreStatistics:
         )
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
-        """Return the estimate of some changes and its covariance in white noise."""
-        covariance = np.linalg.pinv(self.information[some, some], hermitian=True)
-        return np.asarray(covariance @ self.score[some]), np.asarray(covariance)
+        """
+        Return the estimate of some changes and its covariance in white noise.
+
+        The variance of a change of which the window shows nothing, or nothing by itself, is
+        infinite.
+
+        """
+        information = self.information[some, some]
+        covariance = np.linalg.pinv(information, hermitian=True)
+        values = np.asarray(covariance @ self.score[some])
+        told = np.einsum('pq,qp->p', covariance, information)  # 1, where all of it is seen
+        hidden = np.flatnonzero(told < 1.0 - _HIDDEN)
+        covariance[hidden, hidden] = np.inf
+        return values, np.asarray(covariance)
 
 
 def score_statistics(

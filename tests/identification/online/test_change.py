@@ -8,7 +8,11 @@ from dataclasses import replace
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
-from armid_ros.identification.online.change_score import Block, score_statistics
+from armid_ros.identification.online.change_score import (
+    Block,
+    score_statistics,
+    ScoreStatistics,
+)
 from armid_ros.identification.online.change_watch import ChangeWatch
 from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
@@ -257,9 +261,18 @@ def test_by_how_much_is_not_said_where_it_is_not_known():
         ParameterName('viscous_coefficient', 'elbow', 'N m s/rad'),
         ParameterName('coulomb_torque', 'elbow', 'N m'),
     )
-    size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([0.0, 1e-4]))
+    size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([np.inf, 1e-4]))
     candidate = ChangeCandidate('friction', 'elbow', parameters, np.eye(2), np.eye(2))
     assert str(Change(candidate, (), 1.0, 2.0, size)) == (
         'friction at elbow has changed: viscous_coefficient by an amount that is not known until '
         'it moves, coulomb_torque by +0.2 N m (0.18 to 0.22)'
     )
+
+
+def test_what_a_window_does_not_show_has_an_infinite_deviation():
+    """The first change is not seen at all; the last two are seen only in their sum."""
+    rows = np.array([[0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 1.0, 1.0]])
+    score = ScoreStatistics(rows.T @ rows, rows.T @ [2.0, 3.0], np.ones(4))
+    values, covariance = score.size(slice(None))
+    np.testing.assert_allclose(np.diag(covariance), [np.inf, 0.25, np.inf, np.inf])
+    assert values[1] == pytest.approx(1.0)
