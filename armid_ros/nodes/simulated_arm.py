@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-import time
 from typing import Any
 
 from armid_ros.arm import ArmModel
@@ -25,6 +24,7 @@ from armid_ros.nodes.parameters.arm import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
+from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.nodes.trajectory.messages import read_trajectory
 from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.run import whole_steps
@@ -45,11 +45,6 @@ EARLIEST = 60.0
 LONGEST = 3600.0
 #: A clock that goes on by more at once was set, and there is nothing to make up [ns].
 LONGEST_NS = 60 * 10**9
-#: Longest stretch of work before services are answered [s], and backlog that is given up.
-_BURST = 0.005
-_BACKLOG = 0.2
-#: Time behind the clock of the computer from which on it is said [s]; a start may take as long.
-_BEHIND = 0.5
 #: Timers cannot be much faster [s].
 _SHORTEST_PERIOD = 0.0005
 
@@ -121,8 +116,7 @@ class SimulatedArmNode(ArmidNode):
         if start_ns is None and not self._follows:
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
-        self._anchor = (time.monotonic(), 0.0)
-        self._given_up = 0.0
+        self.real_time = RealTime(self._elapsed, self.step)
         self._states = self.create_publisher(
             JointState,
             'joint_states',
@@ -156,7 +150,8 @@ class SimulatedArmNode(ArmidNode):
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', STREAM)
         if self._timer is not None:
             self.destroy_timer(self._timer)
-        self._timer, self._anchor = None, (time.monotonic(), self._elapsed())
+        self._timer = None
+        self.real_time.begin()
         if self._follows:
             self._timer = self.create_timer(1.0 / rate, self.follow)
         elif self._factor:
@@ -225,15 +220,7 @@ class SimulatedArmNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
-        begun, now = self._anchor, time.monotonic()
-        due = begun[1] + (now - begun[0]) * self._factor
-        period = self._stride * self._arm.plant.dt
-        while self._elapsed() + period <= due and time.monotonic() - now < _BURST:
-            self.step()
-        behind = (due - self._elapsed()) / self._factor
-        if behind > _BACKLOG:
-            self._given_up += behind
-            self._anchor = (time.monotonic(), self._elapsed())
+        self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
 
     def follow_reference(self, reference: Reference) -> None:
         """
@@ -256,15 +243,15 @@ class SimulatedArmNode(ArmidNode):
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how far the simulation is."""
         trouble = ''
-        if self._given_up > _BEHIND and self._clock_publisher is None:  # else nobody is misled
-            trouble = (
-                f'{self._given_up:.1f} s behind real time: lower its rate, or set a smaller '
-                'real_time_factor, with use_sim_time on the other nodes'
+        if self._clock_publisher is None:  # else nobody is misled
+            trouble = self.real_time.trouble(
+                'lower its rate, or set a smaller real_time_factor, with use_sim_time on the '
+                'other nodes'
             )
         return trouble, {
             'simulated_time': self._arm.state.t,
             'moving': int(self.moving),
-            'behind_real_time': self._given_up,
+            'behind_real_time': self.real_time.given_up,
         }
 
     def objection(self, values: Mapping[str, Any]) -> str:
@@ -284,9 +271,9 @@ class SimulatedArmNode(ArmidNode):
         if 'effects' in names:
             self._become(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
-            if self._given_up and self._clock_publisher is None:  # stamps are of now again
-                self._origin_ns = (self._origin_ns or 0) + round(self._given_up * 1e9)
-            self._given_up = 0.0
+            if self._clock_publisher is None:  # stamps are of now again
+                self._origin_ns = (self._origin_ns or 0) + round(self.real_time.given_up * 1e9)
+            self.real_time.given_up = 0.0
             self._keep_pace()
         described = sensors_of(self.value, self._arm.plant.robot.n_joints)
         known = {name: getattr(described, name) for name in names & SENSOR_PARAMETERS}

@@ -7,13 +7,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 import math
 from pathlib import Path
-import time
 from typing import Any
 
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.process import run
+from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.pair.gait import read_gait
 from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
 from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair
@@ -23,9 +23,6 @@ from rclpy.publisher import Publisher
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-#: Longest stretch of work before services are answered, and backlog that is given up [s].
-_BURST = 0.005
-_BACKLOG = 0.2
 ALL = 'all'
 
 
@@ -84,7 +81,7 @@ class SimulatedPairNode(ArmidNode):
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
         self._exo = self.create_publisher(JointState, 'exo/joint_states', SAMPLES)
         self._human = self.create_publisher(JointState, 'human/joint_states', SAMPLES)
-        self._anchor = (time.monotonic(), 0.0)
+        self.real_time = RealTime(lambda: float(self.pair.t), self.step)
         self.offer('~/reset', self.reset)
         factor = self.value('real_time_factor')
         if factor:
@@ -116,29 +113,26 @@ class SimulatedPairNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
-        factor, now = self.value('real_time_factor'), time.monotonic()
-        due = self._anchor[1] + (now - self._anchor[0]) * factor
-        while self.pair.t < due and not self.pair.fallen and time.monotonic() - now < _BURST:
-            self.step()
-        if (due - self.pair.t) / factor > _BACKLOG:
-            self._anchor = (time.monotonic(), self.pair.t)
+        if not self.pair.fallen:
+            self.real_time.catch_up(self.value('real_time_factor'), 1.0 / self.value('rate'))
 
     def reset(self) -> str:
         """Put both back to where they began; time goes on."""
         self._origin_ns = self.stamp_ns
         self.pair.reset()
-        self._anchor = (time.monotonic(), 0.0)
+        self.real_time.begin()
         return 'both are where they began'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say whether the pair still stands."""
+        """Say whether the pair still stands, and whether it keeps up with real time."""
         values = {
             'simulated_time': self.pair.t,
             'off_the_gait_deg': math.degrees(self.pair.deviation),
+            'behind_real_time': self.real_time.given_up,
         }
         if self.pair.fallen:
             return f'fell after {self.pair.t:.2f} s, as an open loop does: call ~/reset', values
-        return '', values
+        return self.real_time.trouble('start it with a lower rate'), values
 
     def _publish(
         self, publisher: Publisher, joints: tuple[str, ...], parts: Sequence[np.ndarray]

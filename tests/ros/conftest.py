@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import make_executor
+from armid_ros.nodes.running.real_time import RealTime
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
@@ -29,6 +30,11 @@ AnyNode = TypeVar('AnyNode', bound=Node)
 PATIENCE = 60.0
 #: A message published within this process is delivered at once; this is a thousand times more [s].
 QUIET = 0.02
+
+
+def busy(real_time: RealTime, monkeypatch: pytest.MonkeyPatch, seconds: float = 10.0) -> None:
+    """Let the computer have done something else for so long."""
+    monkeypatch.setattr(real_time, '_clock', lambda: time.monotonic() + seconds)
 
 
 class Bench:

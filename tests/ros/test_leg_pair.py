@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+import re
+
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.simulated_pair import SimulatedPairNode
 import pytest
 from sensor_msgs.msg import JointState
+
+from .conftest import busy
 
 START_NS = 1_000 * 10**9
 
@@ -60,6 +64,16 @@ def test_springs_are_found_from_the_topics(bench):
     values = {v.key: v.value for v in state.values}
     assert float(values['stiffness all [N/m]']) == pytest.approx(1e4, rel=0.02)
     assert state.level == state.OK
+
+
+def test_a_pair_that_falls_behind_real_time_says_so(bench, monkeypatch):
+    node = pair_node(bench, real_time_factor=1.0)
+    assert not node.condition()[0]
+    busy(node.real_time, monkeypatch)
+    node.catch_up()
+    said, values = node.condition()
+    assert re.fullmatch(r'\d+\.\d s behind real time: start it with a lower rate', said)
+    assert values['behind_real_time'] > 9.0
 
 
 def test_a_pair_that_fell_says_so_until_it_is_reset(bench):
