@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from armid_ros.effects import CATALOGUE, Quantity, Shape
-from armid_ros.effects.quantities import slide_unit
+from armid_ros.effects.quantities import written_units
 from armid_ros.errors import ModelError
 from armid_ros.files import finite, parsed_yaml, yaml_line
 from armid_ros.model.rigid_body import link_unit
@@ -88,7 +88,7 @@ def _rows(document: Mapping[str, Any], text: str) -> Iterator[_Row]:
         _require(entry, _NEEDED_OF_EFFECT, f"effect '{str(entry.get('name'))[:40]}'")
         kind = CATALOGUE.find(str(entry['name']))
         known: tuple[Quantity | Shape, ...] = (*kind.quantities, *kind.shapes)
-        units = {one.name: tuple(dict.fromkeys((one.unit, slide_unit(one.unit)))) for one in known}
+        units = {one.name: written_units(one.unit) for one in known}
         for part in ('parameters', 'shapes'):
             for place, row in enumerate(entry.get(part, ())):
                 yield _Row(('effects', k, part, place), row, units.get(_name(row), ()))

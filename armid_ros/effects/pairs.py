@@ -10,7 +10,7 @@ from itertools import combinations, pairwise, permutations
 
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.quantities import joint_unit, Quantity
+from armid_ros.effects.quantities import pair_unit, Quantity
 from armid_ros.effects.readings import TorqueReading
 from armid_ros.effects.smooth import Gradient, smooth_direction, SmoothColumns
 from armid_ros.errors import ModelError
@@ -66,6 +66,14 @@ class _Pairs(Effect):
     def owners(self) -> tuple[str, ...]:
         """First joint of every pair."""
         return self.joints[::2]
+
+    def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
+        """Name the parameters, pair by pair, with the unit that they have between the two."""
+        return tuple(
+            ParameterName(q.name, first, pair_unit(q.unit, first, second, robot))
+            for first, second in zip(self.joints[::2], self.joints[1::2], strict=True)
+            for q in self.quantities
+        )
 
     def pairs(self, joints: tuple[str, ...]) -> list[tuple[int, int]]:
         """Return the columns of every pair among the joints of a motion or robot."""
@@ -245,7 +253,9 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
         (quantity,) = self.quantities
         return tuple(
             ParameterName(
-                f'{quantity.name}_from_{source}', reader, joint_unit(quantity.unit, reader, robot)
+                f'{quantity.name}_from_{source}',
+                reader,
+                pair_unit(quantity.unit, reader, source, robot),
             )
             for reader, source in zip(self.joints[::2], self.joints[1::2], strict=True)
         )

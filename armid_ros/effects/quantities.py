@@ -22,6 +22,16 @@ _PRISMATIC_UNITS = {
     '1/rev': '1/(2 pi m)',
 }
 
+#: Units of two joints that turn, and what they are where the first slides and the second turns, or
+#: the other way round.
+_MIXED_UNITS = {
+    'kg m^2': ('kg m', 'kg m'),
+    'N m s/rad': ('N s/rad', 'N s/rad'),
+    'N m': ('N, N m', 'N m, N'),
+    'N m/rad': ('N/rad', 'N/rad'),
+    '': ('1/m', 'm'),
+}
+
 #: No arm has more than so many times what arms of 1 to 10 kg have, but where it weighs more.
 _BEYOND_TYPICAL = 10.0
 _TYPICAL_MASS = 10.0
@@ -143,3 +153,23 @@ def joint_unit(unit: str, joint: str, robot: Robot) -> str:
 def slide_unit(unit: str) -> str:
     """Return what a unit of a revolute joint is on a prismatic one."""
     return _PRISMATIC_UNITS.get(unit, unit)
+
+
+def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
+    """
+    Return a unit as it is between two joints, one of which may slide.
+
+    A stiffness makes of the turn of one a force of the other, and of its way a torque: both are
+    N/rad. Dry friction is a force of the one and a torque of the other. A share of a torque in the
+    reading of a force is 1/m.
+
+    """
+    slides = [bool(robot.prismatic[robot.joints.index(joint)]) for joint in (first, second)]
+    if slides[0] == slides[1]:
+        return joint_unit(unit, first, robot)
+    return _MIXED_UNITS[unit][slides[1]]
+
+
+def written_units(unit: str) -> tuple[str, ...]:
+    """Return all that a unit can be on joints that turn or slide, or between two of them."""
+    return tuple(dict.fromkeys((unit, slide_unit(unit), *_MIXED_UNITS.get(unit, ()))))

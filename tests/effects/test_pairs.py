@@ -1,0 +1,53 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What ties a joint that slides to one that turns has the unit that it has between the two."""
+
+from armid_ros.arm import ArmModel, load_model, save_model
+from armid_ros.effects import make_effect
+from armid_ros.robots import robot_from_urdf
+import numpy as np
+import pytest
+
+LINK = (
+    '<link name="{}"><inertial><mass value="2"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" '
+    'iyz="0" izz="0.1"/></inertial></link>'
+)
+JOINT = (
+    '<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" velocity="1" effort="50"/></joint>'
+)
+
+
+@pytest.fixture
+def scara():
+    """Return a lift with two joints that turn on it."""
+    links = ''.join(LINK.format(name) for name in ('stage', 'upper', 'lower'))
+    joints = (
+        JOINT.format('lift', 'prismatic', 'floor', 'stage')
+        + JOINT.format('shoulder', 'revolute', 'stage', 'upper')
+        + JOINT.format('elbow', 'revolute', 'upper', 'lower')
+    )
+    return robot_from_urdf(f'<robot name="scara"><link name="floor"/>{links}{joints}</robot>')
+
+
+@pytest.mark.parametrize(
+    ('effect', 'units'),
+    [
+        ('joint_coupling@lift+shoulder', ['N/rad']),
+        ('joint_coupling@shoulder+lift', ['N/rad']),
+        ('joint_coupling@shoulder+elbow', ['N m/rad']),
+        ('torque_crosstalk@lift+shoulder', ['1/m']),
+        ('torque_crosstalk@shoulder+lift', ['m']),
+        ('torque_crosstalk@shoulder+elbow', ['']),
+        ('coupled_joint_friction@lift+shoulder', ['kg m', 'N s/rad', 'N, N m']),
+        ('coupled_joint_friction@shoulder+lift', ['kg m', 'N s/rad', 'N m, N']),
+    ],
+)
+def test_each_pair_has_its_own_unit_in_a_file_as_well(scara, tmp_path, effect, units):
+    made = make_effect(effect, scara)
+    assert [name.unit for name in made.parameters(scara)] == units
+    (tmp_path / 'scara.urdf').write_text(scara.urdf)
+    arm = ArmModel(scara).with_effect(made, np.full(len(units), 0.1))
+    save_model(tmp_path / 'model.yaml', arm, str(tmp_path / 'scara.urdf'))
+    (again,) = load_model(tmp_path / 'model.yaml').effects
+    assert again == made
