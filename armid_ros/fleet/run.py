@@ -352,6 +352,7 @@ def _without_failed(
         return (replace(arm, hit=arm.hit + 1) if hit else arm), []
     groups: list[Group] = []
     failed: list[Refused] = []
+    hit = False
     for group, future in zip(arm.groups, futures, strict=True):
         if future.status != 'error':
             groups.append(group)
@@ -359,9 +360,12 @@ def _without_failed(
             groups.extend((bag,) for bag in group)
         elif isinstance(future.exception(), KilledWorker) and _read(client, group, job):
             groups.append(group)
+            hit = True
         else:
             failed.append(Refused(group[0], _said(future.exception()), failed=True))
-    return replace(arm, groups=tuple(groups), refused=(*arm.refused, *failed)), failed
+    hits = arm.hit + (hit and arm.hit < _HIT)
+    left = replace(arm, groups=tuple(groups), refused=(*arm.refused, *failed), hit=hits)
+    return left, failed
 
 
 def _read(client: Client, group: Group, job: Future) -> bool:
