@@ -51,3 +51,20 @@ def test_an_offset_is_a_constant_and_in_proportion_to_nothing():
     (found,) = locate(bench.arm, evidence, residual, evidence.chi2_per_row(residual))
     assert found.joint == bench.robot.joints[1]
     assert found.signature == 'in a constant (100 % of its power)'
+    assert (found.mean, found.mean_share) == (pytest.approx(1.2), pytest.approx(1.0))
+
+
+def test_a_line_that_misses_zero_is_in_proportion_to_nothing_and_its_mean_is_known():
+    bench = Bench(URDF)
+    data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
+    residual = [np.zeros_like(part.torque) for part in data]
+    for part, left in zip(data, residual, strict=True):
+        left[:, 1] = 5.0 + 3.0 * part.at_rows.q[:, 1]
+    noise = tuple(np.full(2, 0.1) for _ in data)
+    evidence = Evidence.over_noise(data, noise)
+    (found,) = locate(bench.arm, evidence, residual, evidence.chi2_per_row(residual))
+    told = np.concatenate([p.informative[:, 1] for p in data])
+    every = np.concatenate([left[:, 1] for left in residual])[told]
+    assert found.mean == pytest.approx(every.mean())
+    assert found.mean_share == pytest.approx(every.mean() ** 2 / np.mean(every**2))
+    assert 'in proportion' not in found.signature

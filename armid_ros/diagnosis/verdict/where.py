@@ -63,6 +63,10 @@ class Where:
         All quantities, the largest share first.
     unit : str
         Of the residual.
+    mean : float
+        Of the residual, which every quantity shows alike [N m or N].
+    mean_share : float
+        Share of the residual's power that it holds.
 
     """
 
@@ -71,6 +75,8 @@ class Where:
     signature: str
     axes: tuple[Axis, ...]
     unit: str
+    mean: float = 0.0
+    mean_share: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -162,7 +168,10 @@ def locate(
         axes.sort(key=lambda axis: -axis.share)
         name = arm.robot.joints[joint]
         share = float(gap[joint] / total)
-        result.append(Where(name, share, _in_words(axes), tuple(axes), torque))
+        own = stacked[use, joint]
+        mean = float(own.mean()) if len(own) else 0.0
+        constant = mean**2 / max(float(np.mean(own**2)), 1e-300) if len(own) else 0.0
+        result.append(Where(name, share, _in_words(axes), tuple(axes), torque, mean, constant))
     return tuple(result)
 
 
@@ -205,7 +214,10 @@ def _in_words(axes: Sequence[Axis]) -> str:
     if np.sum((best.means - best.means.mean()) ** 2) < _CURVED * size:
         return f'in a constant ({share})'
     if np.sum((best.means - straight) ** 2) < _CURVED * size:
-        return f'in proportion to {best.name} ({share})'
+        slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
+        through_zero = np.sum((best.means - slope * best.centres) ** 2) < _CURVED * size
+        how = 'in proportion to' if through_zero else 'along a straight line over'
+        return f'{how} {best.name} ({share})'
     if best.name == 'velocity' and _jumps(best):
         return f'a jump with the direction of motion ({share})'
     return f'over {best.name}, most at {best.centres[peak]:.3g} {best.unit} ({share})'

@@ -21,6 +21,8 @@ from armid_ros.report.page import Section
 
 #: Joints that are shown.
 _MOST = 3
+#: Share of the power of a residual from which on its mean is said to be taken off.
+_MEAN_SAID = 0.005
 
 
 @dataclass(frozen=True)
@@ -122,14 +124,25 @@ class EvidenceSection(Section):
         """Return the worst joints."""
         return self.places[:_MOST]
 
+    def taken_off(self, place: Where) -> str:
+        """Say which mean the curves are without; empty where it is next to nothing."""
+        if not place.axes or place.mean_share < _MEAN_SAID:
+            return ''
+        return (
+            f'The mean of the residual, {digits(place.mean)} {place.unit} or '
+            f'{percent(place.mean_share)} of its power, is taken off; shares are of the rest.'
+        )
+
     def charts(self, place: Where) -> list[tuple[str, Chart]]:
-        """Return a caption and a chart per quantity."""
+        """Return a caption and a chart per quantity; the mean, common to all, is taken off."""
+        varies = max(1.0 - place.mean_share, 1e-9)
         return [
             (
-                f'{axis.name}: {100.0 * axis.share:.0f} % of the power',
+                f'{axis.name}: {percent(max(axis.share - place.mean_share, 0.0) / varies)} of the '
+                'power',
                 Chart(
                     axis.centres,
-                    [Series('mean residual', axis.means, 'before', 'trend')],
+                    [Series('mean residual', axis.means - place.mean, 'before', 'trend')],
                     f'{axis.name} [{axis.unit}]',
                     f'residual [{place.unit}]',
                     height=170,
