@@ -4,11 +4,13 @@
 
 from dataclasses import replace
 import re
+from types import SimpleNamespace
 
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.motion import Motion
 from armid_ros.report.diagnosis_report import (
     DiagnosedRecordings,
     diagnosis_report,
@@ -17,7 +19,8 @@ from armid_ros.report.diagnosis_report import (
 )
 from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
-from armid_ros.report.sections.diagnosed import Shares
+from armid_ros.report.sections.diagnosed import EvidenceSection, Shares
+from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.gap import GapOverlay
 from armid_ros.report.sections.story import Story
 from armid_ros.report.sources import short_names, with_names
@@ -278,3 +281,42 @@ def test_the_page_says_from_which_size_each_effect_would_show(html):
     assert 'Shows from' in section
     assert 'Not detectable with this motion in' in section
     assert '<td class="name">torque ripple</td>' in section
+
+
+def test_curves_of_where_it_lives_are_without_the_mean_which_is_said(found):
+    place = replace(found.where[0], mean=2.0, mean_share=0.9)
+    section = EvidenceSection([place])
+    assert section.taken_off(place).startswith('The mean of the residual, 2.0 N m or 90 % of its')
+    for axis, (caption, chart) in zip(place.axes, section.charts(place), strict=True):
+        np.testing.assert_allclose(chart.series[0].y, axis.means - 2.0)
+        share = 100.0 * max(axis.share - 0.9, 0.0) / 0.1
+        assert f'{share:.0f} %' in caption or share < 2.0
+    assert section.taken_off(replace(place, mean_share=0.0)) == ''
+
+
+@pytest.mark.parametrize(
+    ('before', 'after', 'worst'), [(5.0, 1.0, 'shoulder'), (1.0, 2.0, 'elbow')]
+)
+def test_the_curve_of_the_forward_validation_is_of_the_joint_that_is_said(
+    found, before, after, worst
+):
+    """The joint that one of both models is off most, not that of the patched model alone."""
+    t = np.linspace(0.0, 1.0, 5)
+    q = np.zeros((5, 2))
+    motion = Motion(found.arm.robot.joints, t, q, q, q)
+
+    def score(errors):
+        return SimpleNamespace(
+            position_error=np.array(errors),
+            torque_error=np.ones(2),
+            units=('rad', 'rad'),
+            simulated=q + errors,
+            motion=motion,
+            source='run',
+            worst='',
+        )
+
+    pair = SimpleNamespace(before=score([before, 0.1]), after=score([0.1, after]))
+    ((_, _, joint, chart),) = Forward(found.arm.robot, [pair]).drawn
+    assert joint == worst
+    assert chart.ylabel.startswith(f'{worst}: ')

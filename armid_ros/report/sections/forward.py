@@ -41,9 +41,12 @@ class Forward(Section):
     labels: tuple[str, str] = ('description', 'identified')
 
     @property
-    def drawn(self) -> list[tuple[ForwardValidation, BarChart, Chart]]:
-        """Return the recording, errors of its joints, and the error of the worst over time."""
-        return [(pair, self._bars(pair), self._chart(pair)) for pair in self.pairs]
+    def drawn(self) -> list[tuple[ForwardValidation, BarChart, str, Chart]]:
+        """Return the recording, errors of its joints, and which is the worst, with its error."""
+        return [
+            (pair, self._bars(pair), self.robot.joints[_worst(pair)], self._chart(pair))
+            for pair in self.pairs
+        ]
 
     def _bars(self, pair: ForwardValidation) -> BarChart:
         roles: list[tuple[Role, str, ForwardScore]] = [('after', self.labels[1], pair.after)]
@@ -65,7 +68,7 @@ class Forward(Section):
         return BarChart(rows, 'mrad', [(role, label) for role, label, _ in roles], True)
 
     def _chart(self, pair: ForwardValidation) -> Chart:
-        joint = int(pair.after.position_error.argmax())
+        joint = _worst(pair)
         motion = pair.after.motion
         errors: list[tuple[str, Role, ForwardScore]] = [(self.labels[1], 'after', pair.after)]
         if pair.before is not None:
@@ -83,3 +86,9 @@ class Forward(Section):
             height=190,
             symmetric=True,
         )
+
+
+def _worst(pair: ForwardValidation) -> int:
+    """Return the joint that one of the models is off most, whichever that is."""
+    scores = [score for score in (pair.before, pair.after) if score is not None]
+    return int(max(scores, key=lambda score: score.position_error.max()).position_error.argmax())
