@@ -6,7 +6,7 @@
   const root = document.documentElement;
   const roles = ['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint',
     'ink', 'soft', 'line', 'grid', 'paper'];
-  const widths = {measured: 3, faint: 1.3, trend: 2};
+  const widths = {measured: 4, faint: 1.3, trend: 2};
   const font = '12px system-ui, sans-serif';
   const charts = new Map();  // figure -> {plot, spec}
   let colour = {};
@@ -29,7 +29,8 @@
     return {stroke, fill: null};
   }
 
-  function seriesOf(entry) {
+  // A model that fits is dashed, so that what was measured shows beneath it.
+  function seriesOf(entry, measured) {
     const paint = () => colour[entry.role];
     const series = {
       label: entry.label, stroke: paint, width: widths[entry.role] || 1.3,
@@ -45,6 +46,8 @@
       Object.assign(series, {paths: sticks, width: 2});
     } else if (entry.kind === 'steps') {
       series.paths = uPlot.paths.stepped({align: 1});
+    } else if (measured && entry.role === 'after') {
+      Object.assign(series, {dash: [6, 5], width: 1.6});
     }
     return series;
   }
@@ -229,6 +232,7 @@
     const data = [spec.x];
     const series = [{label: spec.xlabel || 'at', value: (u, value) => brief(value)}];
     const bands = [];
+    const measured = spec.series.some((entry) => entry.role === 'measured');
     for (const entry of spec.series) {
       if (entry.kind === 'band') {
         const edge = {label: entry.label, stroke: () => 'transparent', points: {show: false}};
@@ -236,7 +240,7 @@
         data.push(entry.upper, entry.y);
         bands.push({series: [series.length - 2, series.length - 1], fill: () => clear(entry.role, 25)});
       } else {
-        series.push(seriesOf(entry));
+        series.push(seriesOf(entry, measured));
         data.push(entry.y);
       }
     }
