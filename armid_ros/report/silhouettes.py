@@ -20,6 +20,8 @@ _WIDTH, _HEIGHT, _MARGIN = 190.0, 230.0, 0.03
 _ROUND = 16
 #: An arm without bodies is drawn as its joints, connected by bars this thick [m].
 _BAR = 0.02
+#: What is smaller stands for a link without a body and cannot be seen [m].
+_POINT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
     solids = []
     for body in collision.geometry.geometryObjects:
         points, radius = _surface(body.geometry)
-        if len(points):
+        if len(points) and (radius > _POINT or np.ptp(points, axis=0).max() > _POINT):
             placed = points @ body.placement.rotation.T + body.placement.translation
             solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
     if any(solid.joint > 0 for solid in solids):

@@ -4,13 +4,22 @@
 
 from dataclasses import replace
 import json
+from pathlib import Path
 import re
 
-from armid_ros.excitation import DesignProblem, DesignSettings, evaluate, Obstacle
+from armid_ros.excitation import (
+    DesignProblem,
+    DesignSettings,
+    evaluate,
+    Floor,
+    floor_obstacles,
+    Obstacle,
+    with_obstacles,
+)
 from armid_ros.report.excitation_report import excitation_report
 from armid_ros.report.sections.plan import PlannedClearance
 from armid_ros.report.silhouettes import draw_silhouettes
-from armid_ros.robots import collision_model, robot_from_urdf
+from armid_ros.robots import collision_model, load_robot, robot_from_urdf
 import numpy as np
 import pytest
 
@@ -119,3 +128,14 @@ def test_browser_draws_every_chart_and_pose(browser, charts_drawn, html, width):
         '[...document.querySelectorAll("#poses polygon")].map(p => p.getBBox().height)'
     )
     assert len(sizes) >= 6 * 7 and min(sizes) > 1.0
+
+
+def test_an_arm_without_bodies_is_drawn_though_its_links_are_points_for_the_floor():
+    """A link without a body is held against the floor by the place of its joint."""
+    robot = load_robot(Path(__file__).parents[2] / 'examples' / 'arm.urdf')
+    collision = collision_model(robot)
+    floor = Floor(0.0, np.array([0.0, 0.0, 1.0]), 'given')
+    whole = with_obstacles(collision, floor_obstacles(collision, floor, 0.01))
+    poses = np.zeros((1, robot.n_joints))
+    drawn = draw_silhouettes(whole, poses, ['now'], poses)
+    assert sum(share >= 0 for _, share in drawn.bodies) == 2 * robot.n_joints
