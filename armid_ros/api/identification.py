@@ -234,7 +234,9 @@ class IdentificationResult(Shown):
         described = self.core.base.values(self.description.theta)
         return [
             JointErrors(self.arm.robot, training, self.validation),
-            ParameterSection(self.estimate, described, self.core.unidentified),
+            ParameterSection(
+                self.estimate, described, self.core.unidentified, self.arm.robot.links
+            ),
         ]
 
     @property

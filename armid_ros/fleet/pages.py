@@ -15,11 +15,13 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import quote
 
+from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import BagFile, folder_of
 from armid_ros.fleet.changes import HistoryChange
 from armid_ros.fleet.scatter import ParameterHistory
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
+from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, with_interval
 from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.fleet import (
@@ -280,7 +282,7 @@ def _title(name: str, joint: str) -> str:
         return f'log residual, {joint}'
     if name.isidentifier() and '_' in name:
         return f'{name.replace("_", " ")}, {joint}'
-    return name
+    return full_label(ParameterName(name, joint, ''))
 
 
 def _anchor(arm: str, url: str) -> str:

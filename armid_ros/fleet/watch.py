@@ -20,6 +20,7 @@ import json
 from typing import Any
 
 from armid_ros.errors import FleetError
+from armid_ros.estimate import ParameterName
 from armid_ros.fleet.changes import HistoryChange, judge, Judged, named, unlike_siblings, wear
 from armid_ros.fleet.identify import kind_arm
 from armid_ros.fleet.kinds import document
@@ -27,6 +28,7 @@ from armid_ros.fleet.results import table_of
 from armid_ros.fleet.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.fleet.store import Store
 from armid_ros.motion import FloatArray
+from armid_ros.report.families import full_label
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -290,7 +292,7 @@ def _what(series: ParameterHistory) -> str:
         return f'residual torque of {series.joint}'
     if series.name.isidentifier() and '_' in series.name:
         return f'{series.name.replace("_", " ")} of {series.joint}'
-    return f'inertial parameter {series.name}'
+    return full_label(ParameterName(series.name, series.joint, ''))
 
 
 def _beside_the_body(store: Store) -> frozenset[str]:

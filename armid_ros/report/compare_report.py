@@ -186,8 +186,6 @@ def _sentence(change: ParameterChange) -> str:
     verb = 'rose' if change.difference > 0.0 else 'fell'
     unit = pretty(change.parameter.unit)
     label = full_label(change.parameter)
-    if change.parameter.rigid:
-        label = f'Inertial parameter {label} of {change.parameter.joint}'
     label = label[0].upper() + label[1:]
     share = ''
     ends = [_end(change.before, change.before_std), _end(change.after, change.after_std)]

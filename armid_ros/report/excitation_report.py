@@ -26,7 +26,7 @@ from armid_ros.excitation import (
 from armid_ros.excitation.fitness import FIT, UNFIT
 from armid_ros.excitation.geometry.heights import vertical
 from armid_ros.motion import FloatArray
-from armid_ros.report.families import full_label
+from armid_ros.report.families import effects_in_words, full_label
 from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -125,7 +125,7 @@ def excitation_report(
     whole = with_obstacles(collision, obstacles)
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     sections: list[Section] = [
-        _verdict(design, shares, checked, collision.notes),
+        _verdict(design, arm.robot.links, shares, checked, collision.notes),
         Asked(_asked(design, arm, robot, obstacles, after, run)),
         ArmPoses(
             draw_silhouettes(
@@ -136,7 +136,7 @@ def excitation_report(
             ),
             ', '.join(obstacle.name for obstacle in obstacles),
         ),
-        Foreseen(design),
+        Foreseen(design, arm.robot.links),
         PlannedMotion(limits, motion, shares),
         PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
         Harmonics(excitation.trajectory),
@@ -150,12 +150,18 @@ def excitation_report(
 
 
 def _verdict(
-    design: Design, shares: Mapping[str, FloatArray], checked: Fitness, notes: Sequence[str]
+    design: Design,
+    links: Sequence[str],
+    shares: Mapping[str, FloatArray],
+    checked: Fitness,
+    notes: Sequence[str],
 ) -> VerdictSection:
     """Say how much is seen, what is known worst, and that nothing is hit."""
     information, settings = design.information, design.settings
     std, names = information.std, information.parameters
-    unseen = [full_label(name) for name, s in zip(names, std, strict=True) if not np.isfinite(s)]
+    unseen = [
+        full_label(name, links) for name, s in zip(names, std, strict=True) if not np.isfinite(s)
+    ]
     seen = len(names) - len(unseen)
     sentences = [f'The run tells {seen} of {len(names)} parameters apart.']
     if not unseen:
@@ -165,7 +171,8 @@ def _verdict(
         ]
         worst = int(np.argmax(std / information.scale))
         sentences.append(
-            f'Known worst will be {full_label(names[worst])}: ± {digits(float(std[worst]))} '
+            f'Known worst will be {full_label(names[worst], links)}: '
+            f'± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
     sentences.insert(0, _kept(shares, design.limits, checked))
@@ -234,7 +241,7 @@ def _asked(
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),
         ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
-        ('Effects', ', '.join(effect.name for effect in arm.effects) or 'none'),
+        ('Effects', effects_in_words(arm.effects)),
         ('To be seen', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
         ('Speed', _speed(settings)),

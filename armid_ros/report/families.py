@@ -4,8 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import re
+
+from armid_ros.effects import Effect
 from armid_ros.estimate import ParameterName
 from armid_ros.report.notation import pretty
+
+#: A parameter of a rigid body, and the number of its link.
+_SYMBOL = re.compile(r'\b(m[xyz]?|I[xyz]{2})(\d+)\b')
 
 
 def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str], list[int]]:
@@ -36,9 +43,65 @@ def short_label(name: ParameterName) -> str:
     return leader if leader == name.name else f'{leader} *'
 
 
-def full_label(name: ParameterName) -> str:
-    """Return a short label that says the kind as well: 'Izz1', 'Coulomb torque of elbow'."""
+def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
+    """
+    Return what a parameter is and of which link or joint, in words.
+
+    Parameters
+    ----------
+    name : ParameterName
+        Of a link, then with its number, or of an effect.
+    links : sequence of str
+        Names of the links in the order of their numbers; without them a link is that of its joint.
+
+    Returns
+    -------
+    str
+        'moment of inertia about z of forearm', with '(grouped)' where it is the first of several
+        that no motion tells apart; or 'Coulomb torque of elbow'.
+
+    """
     if name.rigid:
-        return name.name.split(' ')[0]
+        label = rigid_label(name, links)
+        return f'{label} (grouped)' if grouping(name) else label
     kind = name.name.replace('_', ' ').replace('coulomb', 'Coulomb')
     return f'{kind} of {name.joint}' if name.joint else kind
+
+
+def rigid_label(name: ParameterName, links: Sequence[str] = ()) -> str:
+    """Return the same of the first parameter of a group alone."""
+    found = _SYMBOL.match(name.name)
+    if found is None:
+        return name.name
+    symbol, number = found[1], int(found[2])
+    known = 0 < number <= len(links)
+    link = links[number - 1] if known else f'the link of {name.joint}'
+    return f'{_in_words(symbol)} of {link}'
+
+
+def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
+    """Return the sum that a group of parameters is, links by their names; '' for one alone."""
+    if ' ' not in name.name:
+        return ''
+
+    def named(found: re.Match[str]) -> str:
+        number = int(found[2])
+        return f'{found[1]} of {links[number - 1]}' if 0 < number <= len(links) else found[0]
+
+    return _SYMBOL.sub(named, name.name)
+
+
+def _in_words(symbol: str) -> str:
+    """Return what a symbol of a rigid body stands for: 'product of inertia xy' for Ixy."""
+    if symbol == 'm':
+        return 'mass'
+    if symbol[0] == 'm':
+        return f'first moment along {symbol[1]}'
+    axes = symbol[1:]
+    same = axes[0] == axes[1]
+    return f'moment of inertia about {axes[0]}' if same else f'product of inertia {axes}'
+
+
+def effects_in_words(effects: Sequence[Effect]) -> str:
+    """Return what effects are called, or that there are none."""
+    return ', '.join(effect.name.replace('_', ' ') for effect in effects) or 'none'

@@ -13,6 +13,7 @@ from armid_ros.identification import grade as graded
 from armid_ros.identification.estimators.names import IN_WORDS
 from armid_ros.identification.estimators.side_by_side import MethodScore
 from armid_ros.recording import Recording
+from armid_ros.report.families import effects_in_words
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
@@ -128,15 +129,14 @@ def identification_report(
         *_forward(result, verification),
         Residuals(arm.robot, shown, role),
         ParameterSection(
-            result.estimate, result.base.values(description.theta), result.unidentified
+            result.estimate,
+            result.base.values(description.theta),
+            result.unidentified,
+            arm.robot.links,
         ),
         *_physical(result, assessment.exports),
-        Correlations(result.estimate),
-        ExcitationSection(
-            result.condition_number,
-            result.base.rank,
-            directions(result.estimate, torque_scale(result)),
-        ),
+        Correlations(result.estimate, arm.robot.links),
+        _excitation(result),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
         *([Methods(assessment.methods)] if assessment.methods else []),
@@ -163,6 +163,13 @@ def _forward(result: Identification, verification: Verification | None) -> list[
     return [Forward(result.arm.robot, verification.forward)]
 
 
+def _excitation(result: Identification) -> Section:
+    worst = directions(result.estimate, torque_scale(result))
+    return ExcitationSection(
+        result.condition_number, result.base.rank, worst, result.arm.robot.links
+    )
+
+
 def _physical(result: Identification, exports: Mapping[str, Sequence[str]]) -> list[Section]:
     return [] if result.physical is None else [PhysicalSection(result.physical, exports)]
 
@@ -183,7 +190,7 @@ def _asked(
         ('Robot', robot),
         ('Joints', ', '.join(result.arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
-        ('Effects', ', '.join(effect.name for effect in result.arm.effects) or 'none'),
+        ('Effects', effects_in_words(result.arm.effects)),
         ('Method', IN_WORDS[result.settings.method]),
         (
             'Filter',

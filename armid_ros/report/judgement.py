@@ -236,7 +236,8 @@ def _excitation_findings(result: Identification) -> list[Caution]:
     findings = []
     estimate = result.estimate
     known = excludes_zero(estimate.values, estimate.std)
-    lost = [full_label(estimate.parameters[k]) for k in np.flatnonzero(~known)]
+    links = result.arm.robot.links
+    lost = [full_label(estimate.parameters[k], links) for k in np.flatnonzero(~known)]
     if lost:
         findings.append(
             Caution(

@@ -3,9 +3,10 @@
 """Parameters that share an axis have one unit, which a heading says once."""
 
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.report.families import parameter_families
+from armid_ros.report.families import full_label, grouping, parameter_families
 from armid_ros.report.sections.parameters import ParameterSection
 import numpy as np
+import pytest
 
 NAMES = (
     ParameterName('m2', 'lift', 'kg'),
@@ -27,3 +28,32 @@ def test_a_heading_has_its_unit_once():
     text = ParameterSection(estimate, np.ones(3)).html()
     assert '<summary>Viscous coefficient [N s/m]: 1</summary>' in text
     assert '[N s/m] [' not in text
+
+
+@pytest.mark.parametrize(
+    ('name', 'label'),
+    [
+        ('m2', 'mass of forearm'),
+        ('mx1', 'first moment along x of upper arm'),
+        ('Izz2', 'moment of inertia about z of forearm'),
+        ('Ixy2', 'product of inertia xy of forearm'),
+        ('Iyy1 + 0.25 (m2 + mz2)', 'moment of inertia about y of upper arm (grouped)'),
+    ],
+)
+def test_a_parameter_of_a_link_is_said_in_words(name, label):
+    links = ('upper arm', 'forearm')
+    assert full_label(ParameterName(name, 'elbow', ''), links) == label
+    without = label.replace('upper arm', 'the link of elbow')
+    assert full_label(ParameterName(name, 'elbow', '')) == without.replace(
+        'forearm', 'the link of elbow'
+    )
+
+
+def test_a_group_is_a_sum_over_named_links():
+    name = ParameterName('Iyy1 - 0.25 (m2 + mz2)', 'shoulder', 'kg m^2')
+    links = ('upper arm', 'forearm')
+    assert grouping(name, links) == 'Iyy of upper arm - 0.25 (m of forearm + mz of forearm)'
+    assert grouping(ParameterName('m2', 'elbow', 'kg'), links) == ''
+    estimate = Estimate((name,), np.ones(1), 0.01 * np.eye(1))
+    page = ParameterSection(estimate, np.ones(1), links=links).html()
+    assert 'moment of inertia about y of upper arm<br><small>Iyy of upper arm' in page

@@ -109,7 +109,7 @@ class EncoderNoise(Section):
         order = np.argsort(-np.abs(check.relative_bias))[:_WORST]
         return [
             (
-                full_label(check.instrumental.parameters[k]),
+                full_label(check.instrumental.parameters[k], self.robot.links),
                 f'{check.bias[k]:.2g} {pretty(check.instrumental.parameters[k].unit)}',
                 f'{check.bias_std[k]:.1g}',
                 f'{check.relative_bias[k]:+.2f}',

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from armid_ros.identification.assess.comparison import Comparison, ParameterChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
-from armid_ros.report.families import parameter_families
+from armid_ros.report.families import grouping, parameter_families, rigid_label
 from armid_ros.report.notation import measured
 from armid_ros.report.page import Section
 
@@ -33,7 +33,12 @@ class ChangeRow:
     def label(self) -> str:
         """Return the parameter, or its joint where the heading says the kind."""
         name = self.change.parameter
-        return name.name if name.rigid else name.joint or name.name
+        return rigid_label(name) if name.rigid else name.joint or name.name
+
+    @property
+    def of(self) -> str:
+        """Return the sum that a group of parameters is; empty for one alone."""
+        return grouping(self.change.parameter) if self.change.parameter.rigid else ''
 
     @property
     def texts(self) -> tuple[str, str, str]:

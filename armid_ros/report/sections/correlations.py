@@ -34,6 +34,8 @@ class Correlations(Section):
     ----------
     estimate : Estimate
         P parameters with covariance.
+    links : sequence of str
+        Names of the links, in the order of their numbers.
 
     """
 
@@ -42,6 +44,7 @@ class Correlations(Section):
     strong: ClassVar[float] = STRONG
 
     estimate: Estimate
+    links: Sequence[str] = ()
 
     @property
     def families(self) -> list[tuple[str, float]]:
@@ -55,7 +58,7 @@ class Correlations(Section):
         """Labels in the order of the picture."""
         names = self.estimate.parameters
         kinds = parameter_families(names).values()
-        return [full_label(names[k]) for members in kinds for k in members]
+        return [full_label(names[k], self.links) for members in kinds for k in members]
 
     @property
     def picture(self) -> str:

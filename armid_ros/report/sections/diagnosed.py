@@ -143,7 +143,7 @@ class EvidenceSection(Section):
                 Chart(
                     axis.centres,
                     [Series('mean residual', axis.means - place.mean, 'before', 'trend')],
-                    f'{axis.name} [{axis.unit}]',
+                    f'{axis.name} [{pretty(axis.unit)}]',
                     f'residual [{place.unit}]',
                     height=170,
                     symmetric=True,

@@ -30,6 +30,8 @@ class ExcitationSection(Section):
         Number of parameters that this motion tells apart.
     directions : sequence of Direction
         Worst known first.
+    links : sequence of str
+        Names of the links, in the order of their numbers.
 
     """
 
@@ -39,6 +41,7 @@ class ExcitationSection(Section):
     condition_number: float
     rank: int
     directions: Sequence[Direction]
+    links: Sequence[str] = ()
 
     @property
     def worst(self) -> list[tuple[str, float]]:
@@ -46,7 +49,8 @@ class ExcitationSection(Section):
         return [
             (
                 ', '.join(
-                    f'{full_label(name)} {100.0 * share:.0f} %' for name, share in direction.parts
+                    f'{full_label(name, self.links)} {100.0 * share:.0f} %'
+                    for name, share in direction.parts
                 ),
                 direction.uncertainty,
             )

@@ -11,7 +11,7 @@ from typing import ClassVar
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
 from armid_ros.motion import FloatArray
-from armid_ros.report.families import full_label, parameter_families
+from armid_ros.report.families import full_label, grouping, parameter_families, rigid_label
 from armid_ros.report.notation import digits, measured, pretty
 from armid_ros.report.page import Section
 import numpy as np
@@ -26,6 +26,8 @@ class ParameterRow:
     ----------
     name, joint, unit : str
         Which.
+    of : str
+        The sum that a group of parameters is; empty for one alone.
     rigid : bool
         Whether it belongs to a link, and not to an effect.
     value, reach, described : float
@@ -41,6 +43,7 @@ class ParameterRow:
     value: float
     reach: float
     described: float
+    of: str = ''
 
     @property
     def known(self) -> bool:
@@ -96,6 +99,8 @@ class ParameterSection(Section):
         Values of the description; zero for effects it does not know.
     unidentified : sequence of Unidentified
         What the data do not tell.
+    links : sequence of str
+        Names of the links, in the order of their numbers.
 
     """
 
@@ -105,6 +110,7 @@ class ParameterSection(Section):
     estimate: Estimate
     described: FloatArray
     unidentified: Sequence[Unidentified] = ()
+    links: Sequence[str] = ()
 
     @property
     def lost(self) -> dict[str, list[str]]:
@@ -112,7 +118,7 @@ class ParameterSection(Section):
         found: dict[str, list[str]] = {}
         for one in self.unidentified:
             if one.parameter not in self.estimate.parameters:
-                found.setdefault(one.reason, []).append(full_label(one.parameter))
+                found.setdefault(one.reason, []).append(full_label(one.parameter, self.links))
         return found
 
     @property
@@ -124,13 +130,14 @@ class ParameterSection(Section):
         for (title, unit), members in parameter_families(names).items():
             rows = [
                 ParameterRow(
-                    names[k].name,
+                    rigid_label(names[k], self.links) if names[k].rigid else names[k].name,
                     names[k].joint,
                     pretty(names[k].unit),
                     names[k].rigid,
                     float(values[k]),
                     float(reach[k]),
                     float(self.described[k]),
+                    grouping(names[k], self.links) if names[k].rigid else '',
                 )
                 for k in members
             ]

@@ -11,7 +11,7 @@ from typing import ClassVar
 from armid_ros.excitation import Design, FourierTrajectory, Limits
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.charts import Chart, Level, Series
-from armid_ros.report.families import parameter_families
+from armid_ros.report.families import grouping, parameter_families, rigid_label
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 from armid_ros.report.silhouettes import Silhouettes
@@ -126,6 +126,10 @@ class PlannedClearance(Section):
         )
 
 
+#: Name, sum, joint, value of the description, deviation, relative, length of the bar [%].
+_Row = tuple[str, str, str, str, str, str, float]
+
+
 @dataclass(frozen=True)
 class Foreseen(Section):
     """
@@ -135,6 +139,8 @@ class Foreseen(Section):
     ----------
     design : Design
         The run and its information.
+    links : sequence of str
+        Names of the links, in the order of their numbers.
 
     """
 
@@ -142,9 +148,12 @@ class Foreseen(Section):
     template: ClassVar[str] = 'foreseen.html'
 
     design: Design
+    links: Sequence[str] = ()
 
     @property
-    def families(self) -> list[tuple[str, str, bool, list[tuple[str, str, str, str, str, float]]]]:
+    def families(
+        self,
+    ) -> list[tuple[str, str, bool, list[_Row]]]:
         """Heading, unit, whether rigid, and the rows of each kind, known best first."""
         names = self.design.information.parameters
         return [
@@ -157,8 +166,8 @@ class Foreseen(Section):
             for (title, unit), members in parameter_families(names).items()
         ]
 
-    def _rows(self, members: Sequence[int]) -> list[tuple[str, str, str, str, str, float]]:
-        """Name, joint, value of the description, deviation, relative, length of the bar [%]."""
+    def _rows(self, members: Sequence[int]) -> list[_Row]:
+        """Return the rows of a kind."""
         information, described = self.design.information, self.design.described
         size = information.std / information.scale
         longest = max((size[k] for k in members if np.isfinite(size[k])), default=1.0)
@@ -169,7 +178,8 @@ class Foreseen(Section):
             relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
             rows.append(
                 (
-                    name.name,
+                    rigid_label(name, self.links) if name.rigid else name.name,
+                    grouping(name, self.links) if name.rigid else '',
                     name.joint,
                     f'{value:.3g}' if known else 'not known',
                     digits(float(std)) if seen else 'not seen',
