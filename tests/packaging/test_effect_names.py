@@ -17,6 +17,8 @@ LEFT = {
     'inspection/inspect.py': 1,
     'simulation/springs.py': 3,
     'elastic/plant/setup.py': 3,
+    # what help shows without importing effects; a test holds it against the catalogue
+    'cli/signatures/choices.py': 5,
     # fields of springs.json that are called as an effect is
     'elastic/identification/output.py': 3,
     # a key of diagnosis.json that is called as an effect is
