@@ -12,6 +12,8 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
+#: A parameter of a body: its symbol, in the name of a load or as a difference.
+_OF_BODY = re.compile(r'(?:payload_)?(m[xyz]?|I[xyz]{2})(_difference)?')
 _RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 
 
@@ -36,9 +38,29 @@ class ParameterName:
     unit: str
 
     @property
+    def words(self) -> str:
+        """What it is in words, without its joint: 'viscous coefficient', 'difference of mass'."""
+        found = _OF_BODY.fullmatch(self.name)
+        if found is None:
+            return self.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+        what = symbol_in_words(found[1])
+        return f'difference of {what}' if found[2] else what
+
+    @property
     def rigid(self) -> bool:
         """Whether it is a mass, moment or inertia of a link, or a grouping led by one."""
         return _RIGID.match(self.name) is not None
+
+
+def symbol_in_words(symbol: str) -> str:
+    """Return what a symbol of a rigid body stands for: 'product of inertia xy' for Ixy."""
+    if symbol == 'm':
+        return 'mass'
+    if symbol[0] == 'm':
+        return f'first moment along {symbol[1]}'
+    axes = symbol[1:]
+    same = axes[0] == axes[1]
+    return f'moment of inertia about {axes[0]}' if same else f'product of inertia {axes}'
 
 
 @dataclass(frozen=True)

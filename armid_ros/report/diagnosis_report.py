@@ -29,7 +29,7 @@ from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.frame import NextSteps, Origin, VerdictSection
 from armid_ros.report.sections.gap import GapBars, GapOverlay
 from armid_ros.report.sections.residual_map import ResidualMap
-from armid_ros.report.sections.story import Story
+from armid_ros.report.sections.story import share_of, Story
 from armid_ros.report.sources import short_names, with_names
 from armid_ros.residual import Residual
 
@@ -158,7 +158,7 @@ def diagnosis_report(
         sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
     quality = [_quality(r, role, names) for role, every in read.items() for r in every]
     sections.append(DataQuality(quality, at_fault=_at_fault(diagnosis, data, names)))
-    if diagnosis.findings:
+    if diagnosis.findings and not diagnosis.harmful:
         sections.append(PatchSection(diagnosis.findings, patch))
     sections.append(Origin(provenance or Provenance()))
     subtitle = (
@@ -207,11 +207,11 @@ def _story(
     if patched:
         sections += [Shares(diagnosis), NamedParameters(diagnosis.findings)]
     sections += [
-        GapBars(robot, diagnosis.gap, diagnosis.baseline, patched),
+        GapBars(robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
         GapOverlay(robot, diagnosis.gap, patched, names),
     ]
     if diagnosis.where:
-        sections.append(EvidenceSection(diagnosis.where))
+        sections.append(EvidenceSection(diagnosis.where, share_of(diagnosis)))
     return sections
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import re
 
 from armid_ros.effects import Effect
-from armid_ros.estimate import ParameterName
+from armid_ros.estimate import ParameterName, symbol_in_words
 from armid_ros.report.notation import pretty
 
 #: A parameter of a rigid body, and the number of its link.
@@ -64,8 +64,7 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     if name.rigid:
         label = rigid_label(name, links)
         return f'{label} (grouped)' if grouping(name) else label
-    kind = name.name.replace('_', ' ').replace('coulomb', 'Coulomb')
-    return f'{kind} of {name.joint}' if name.joint else kind
+    return f'{name.words} of {name.joint}' if name.joint else name.words
 
 
 def rigid_label(name: ParameterName, links: Sequence[str] = ()) -> str:
@@ -76,7 +75,7 @@ def rigid_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     symbol, number = found[1], int(found[2])
     known = 0 < number <= len(links)
     link = links[number - 1] if known else f'the link of {name.joint}'
-    return f'{_in_words(symbol)} of {link}'
+    return f'{symbol_in_words(symbol)} of {link}'
 
 
 def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
@@ -89,17 +88,6 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
         return f'{found[1]} of {links[number - 1]}' if 0 < number <= len(links) else found[0]
 
     return _SYMBOL.sub(named, name.name)
-
-
-def _in_words(symbol: str) -> str:
-    """Return what a symbol of a rigid body stands for: 'product of inertia xy' for Ixy."""
-    if symbol == 'm':
-        return 'mass'
-    if symbol[0] == 'm':
-        return f'first moment along {symbol[1]}'
-    axes = symbol[1:]
-    same = axes[0] == axes[1]
-    return f'moment of inertia about {axes[0]}' if same else f'product of inertia {axes}'
 
 
 def effects_in_words(effects: Sequence[Effect]) -> str:

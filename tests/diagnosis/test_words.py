@@ -48,7 +48,8 @@ def test_what_is_there_and_too_small_to_matter_is_said(bench, floor):
     closed = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
     small = Finding('stribeck_friction', ('elbow',), (), (), (), 0.45, (0.4, 0.5), 0.0)
     summary = decide((), (), [closed], bench.arm, floor, None, [small]).summary
-    assert 'too small to matter. A stribeck friction in elbow explains 45 %' in summary
+    text = 'too small to matter. A stribeck friction in elbow explains 45 % of what is left.'
+    assert text in summary
     nothing = replace(small, share=0.001)
     assert 'stribeck' not in decide((), (), [closed], bench.arm, floor, None, [nothing]).summary
 

@@ -19,7 +19,7 @@ from armid_ros.report.diagnosis_report import (
 )
 from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
-from armid_ros.report.sections.diagnosed import EvidenceSection, Shares
+from armid_ros.report.sections.diagnosed import EvidenceSection, NamedParameters, Shares
 from armid_ros.report.sections.forward import Forward
 from armid_ros.report.sections.gap import GapOverlay
 from armid_ros.report.sections.story import Story
@@ -159,9 +159,35 @@ def test_what_was_added_to_the_model_is_said(found, recordings, html):
     assert 'model.yaml is the model with quadratic friction' in html
     assert 'The model stays as it was given.' not in html
     worse = replace(found, harmful=True)
-    assert 'The model stays as it was given.' in diagnosis_report(
-        worse, DiagnosedRecordings(recordings), robot='two_links'
-    )
+    page = diagnosis_report(worse, DiagnosedRecordings(recordings), robot='two_links')
+    assert 'The model stays as it was given.' in page
+    assert 'which the model was not given' in page
+    assert '>Patch</h2>' in html and '>Patch</h2>' not in page
+
+
+def test_what_is_suspected_and_not_checked_is_said_in_short(found):
+    nothing = replace(found, verdict='consistent', findings=(), where=(), left=())
+    rows = dict(Story(replace(nothing, suspected=found.findings, blind=('elbow',))).rows)
+    assert rows['Where'] == ['No joint that was checked has a gap.', 'Not checked: elbow.']
+    assert rows['Which'][0] == 'Nothing is named.'
+    assert rows['Which'][1].startswith('Suspected: quadratic friction of elbow')
+    assert dict(Story(nothing).rows)['Where'] == ['No joint has a gap.']
+
+
+def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found):
+    effect = CATALOGUE['link_inertia'].on(found.arm.robot, ('elbow',))
+    names = effect.parameters(found.arm.robot)
+    values = tuple(0.5 if name.unit == 'kg m^2' else 0.0 for name in names)
+    numbers = {'values': values, 'std': (0.01,) * len(names), 'added_to': ()}
+    link = replace(found.findings[0], name='link_inertia', parameters=names, **numbers)
+    rows = NamedParameters((link,)).rows
+    assert [row[1] for row in rows][:2] == [
+        'difference of mass',
+        'difference of first moment along x',
+    ]
+    (cause,) = dict(Story(replace(found, findings=(link,))).rows)['Which']
+    assert 'difference of moment of inertia about x 0.500' in cause
+    assert 'mass' not in cause
 
 
 def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):

@@ -28,6 +28,8 @@ Word = Literal[
 _SEVERAL = 3
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
+#: What a share is of, where something is named and where nothing is.
+_GAP, _LEFT = 'the gap', 'what is left'
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def decide(
 
 def _consistent(floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding]) -> str:
     """Say that a model explains the data, what is fitted anew for that, and what is too small."""
-    small = [sentence(one) for one in minor[:1] if one.share >= SAID]
+    small = [sentence(one, _LEFT) for one in minor[:1] if one.share >= SAID]
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         text = f'The model explains the recordings: what is left is {floor_in_words}'
         return f'{text}, or too small to matter. {small[0]}' if small else f'{text}.'
@@ -166,20 +168,20 @@ def larger(ratio: float) -> str:
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
-def sentence(finding: Finding) -> str:
-    """Say in a sentence what a cause is and how much it explains."""
-    return f'{_subject(finding)} explains {share_in_words(finding)}.'
+def sentence(finding: Finding, of: str = _GAP) -> str:
+    """Say in a sentence what a cause is and how much it explains, of the gap or what is left."""
+    return f'{_subject(finding)} explains {share_in_words(finding, of=of)}.'
 
 
 def suspicion(finding: Finding) -> str:
     """Say what a cause would explain that the recordings do not tell from their own spread."""
     return (
-        f'{_subject(finding)} would explain {share_in_words(finding)}: these recordings hardly '
-        'tell it from what those of one day differ by.'
+        f'{_subject(finding)} would explain {share_in_words(finding, of=_LEFT)}: these '
+        'recordings hardly tell it from what those of one day differ by.'
     )
 
 
-def share_in_words(finding: Finding, interval: bool = False) -> str:
+def share_in_words(finding: Finding, interval: bool = False, of: str = _GAP) -> str:
     """
     Return the share of the gap that a cause takes, and the joint that needs it though it is small.
 
@@ -189,9 +191,11 @@ def share_in_words(finding: Finding, interval: bool = False) -> str:
         The cause.
     interval : bool
         Whether with its 95 % interval.
+    of : str
+        What it is a share of: no gap is open where nothing is named.
 
     """
-    text = f'{percent(finding.share)} of the gap'
+    text = f'{percent(finding.share)} of {of}'
     if interval:
         low, high = (percent(end) for end in finding.share_interval)
         text += f' ({low} to {high})'
@@ -292,7 +296,7 @@ def _values(finding: Finding) -> Iterator[str]:
     every = [row for row in rows if not vague(finding, *row[:3])]
     not_zero = [row for row in every if excludes_zero(row[1], row[2])]
     for p, value, std, had in not_zero or every:
-        name = '' if p.name == before else f'{p.name.replace("_", " ")} '
+        name = '' if p.name == before else f'{p.words} '
         yield f'{name}{_with_degrees(value, std, p.unit)}{added(had)}'
         before = p.name
 
@@ -318,7 +322,7 @@ def _left_open(finding: Finding) -> list[str]:
     left = [row[0] for row in rows if _shape(finding, row[0]) and vague(finding, *row)]
     if not left:
         return []
-    names = ' and '.join(dict.fromkeys(p.name.replace('_', ' ') for p in left))
+    names = ' and '.join(dict.fromkeys(p.words for p in left))
     return [
         f'These recordings do not determine its {names}; what shows it is '
         f'{CATALOGUE[finding.name].shown_by}.'
@@ -405,7 +409,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
 
 def _tie(finding: Finding, joint: str, segment: str) -> str:
     shown = [
-        f'{p.name.replace("_", " ")} {as_sure(value, std)} {p.unit}'
+        f'{p.words} {as_sure(value, std)} {p.unit}'
         for p, value, std in finding.values_of(joint)
         if not vague(finding, p, value, std)
     ]

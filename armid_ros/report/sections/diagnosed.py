@@ -91,7 +91,7 @@ class NamedParameters(Section):
         return [
             (
                 finding.name.replace('_', ' '),
-                name.name.replace('_', ' '),
+                name.words,
                 finding.place_of(name.joint) or 'whole arm',
                 value_of(finding, name, value, std),
             )
@@ -111,6 +111,8 @@ class EvidenceSection(Section):
     ----------
     places : sequence of Where
         Joints, the worst first.
+    share_of : str
+        What their shares are of.
 
     """
 
@@ -118,6 +120,7 @@ class EvidenceSection(Section):
     template: ClassVar[str] = 'evidence.html'
 
     places: Sequence[Where]
+    share_of: str = 'the gap'
 
     @property
     def shown(self) -> Sequence[Where]:

@@ -33,6 +33,8 @@ class GapBars(Section):
         What the floor is, in words.
     patched : bool
         Whether anything was added to the model.
+    harmful : bool
+        Whether it was not kept, as it makes the model worse in some joint.
 
     """
 
@@ -43,6 +45,7 @@ class GapBars(Section):
     gap: Gap
     floor: str
     patched: bool
+    harmful: bool = False
 
     @property
     def bars(self) -> BarChart:

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.words import added, share_in_words
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import (
     digits,
@@ -96,16 +97,20 @@ class Story(Section):
 
     def _where(self) -> list[str]:
         places = self.diagnosis.where
+        whole = share_of(self.diagnosis)
         lines = [
-            f'{place.joint}: {percent(place.share_of_gap)} of the gap, {place.signature}'
+            f'{place.joint}: {percent(place.share_of_gap)} of {whole}, {place.signature}'
             for place in places[:_JOINTS]
         ]
         if len(places) > _JOINTS:
             rest = sum(place.share_of_gap for place in places[_JOINTS:])
             others = ', '.join(place.joint for place in places[_JOINTS:])
             lines.append(f'{others}: {percent(rest)}')
+        unseen = self.diagnosis.not_checked
         if lines or self.diagnosis.verdict == 'consistent':
-            return [*self._in_fitted_alone(), *lines] or ['No joint has a gap.']
+            none = 'No joint that was checked has a gap.' if unseen else 'No joint has a gap.'
+            found = [*self._in_fitted_alone(), *lines] or [none]
+            return [*found, f'Not checked: {", ".join(unseen)}.'] if unseen else found
         return ['No joint is far above the floor.']
 
     def _in_fitted_alone(self) -> list[str]:
@@ -122,7 +127,10 @@ class Story(Section):
         ]
 
     def _which(self) -> list[str]:
-        causes = [_cause(finding) for finding in self.diagnosis.findings] or ['Nothing is named.']
+        causes = [_cause(finding) for finding in self.diagnosis.findings] or [
+            'Nothing is named.',
+            *(_suspected(one) for one in self.diagnosis.suspected),
+        ]
         return causes + [_likeness(one) for one in self._maps if one.law is not None]
 
     def _patch(self) -> list[str]:
@@ -165,7 +173,7 @@ def _cause(finding: Finding) -> str:
     places = ', '.join(finding.place_of(joint) for joint in finding.joints)
     where = f' at {places}' if places else ', whole arm'
     values = [
-        f'{name.name.replace("_", " ")} {value_of(finding, name, value, std)}{added(had)}'
+        f'{name.words} {value_of(finding, name, value, std)}{added(had)}'
         for name, value, std, had in _values(finding)
     ]
     more = len(finding.values) - len(values)
@@ -175,6 +183,17 @@ def _cause(finding: Finding) -> str:
     doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
     name, share = finding.name.replace('_', ' '), share_in_words(finding, interval=True)
     return f'{name}{where}{numbers}; explains {share}{doubt}'
+
+
+def _suspected(finding: Finding) -> str:
+    """Return a cause that these recordings hardly tell."""
+    where = ', '.join(finding.joints) or 'the whole arm'
+    return f'Suspected: {finding.name.replace("_", " ")} of {where}; more recordings tell.'
+
+
+def share_of(diagnosis: Diagnosis) -> str:
+    """Return what the shares of joints are of: where something is named, of what it explains."""
+    return 'what is explained' if diagnosis.findings else 'the gap'
 
 
 def _likeness(one: JointResidual) -> str:
@@ -189,5 +208,7 @@ def _taken(one: JointResidual) -> str:
 
 
 def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
+    """Return the first values, those whose interval leaves out zero before all others."""
     rows = list(zip(finding.parameters, finding.values, finding.std, finding.had, strict=True))
-    return rows[:_VALUES]
+    told = [row for row in rows if excludes_zero(row[1], row[2])]
+    return (told or rows)[:_VALUES]
