@@ -150,7 +150,7 @@ def diagnosis_report(
         _verdict(diagnosis, names, extras.worse),
         *_story(diagnosis, names, extras.residual),
         *([] if extras.residual is None else [ResidualMap(extras.residual)]),
-        NextSteps([*extras.steps(diagnosis), *_of_maps(extras.residual)]),
+        NextSteps([*map(_printed, extras.steps(diagnosis)), *_of_maps(extras.residual)]),
         *_small_print(diagnosis, settings),
     ]
     if extras.forward:
@@ -192,8 +192,13 @@ def _verdict(
             f'Driven by the recorded torques, the patched model is farther off than the model '
             f'before in {", ".join(worse)}: see forward validation.'
         )
-    summary = with_names(diagnosis.summary, names).replace('+-', '±')
+    summary = _printed(with_names(diagnosis.summary, names))
     return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
+
+
+def _printed(text: str) -> str:
+    """Return a sentence of the terminal as it is printed."""
+    return text.replace('+-', '±')
 
 
 def _story(

@@ -7,6 +7,7 @@ import re
 from types import SimpleNamespace
 
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+from armid_ros.diagnosis.verdict.finding import Rival
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -21,7 +22,7 @@ from armid_ros.report.notation import DASH, digits, percent, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sections.diagnosed import EvidenceSection, NamedParameters, Shares
 from armid_ros.report.sections.forward import Forward
-from armid_ros.report.sections.gap import GapOverlay
+from armid_ros.report.sections.gap import GapBars, GapOverlay
 from armid_ros.report.sections.story import Story
 from armid_ros.report.sources import short_names, with_names
 import numpy as np
@@ -346,3 +347,29 @@ def test_the_curve_of_the_forward_validation_is_of_the_joint_that_is_said(
     ((_, _, joint, chart),) = Forward(found.arm.robot, [pair]).drawn
     assert joint == worst
     assert chart.ylabel.startswith(f'{worst}: ')
+
+
+def test_a_joint_of_which_no_row_counts_has_no_error_of_zero(found):
+    gap = found.gap
+    none = {
+        name: np.where([True, False], 0.0, getattr(gap, name))
+        for name in ('before', 'after', 'floor')
+    }
+    bars = GapBars(found.arm.robot, replace(gap, **none), 'noise', True).bars.rows
+    assert [bar.text for bar in bars[0][1]] == ['not judged']
+    assert len(bars[1][1]) == 3
+
+
+def test_a_rival_of_the_same_name_is_told_by_its_joint(found):
+    (finding,) = found.findings
+    rival = Rival(finding.name, ('shoulder',))
+    (cause,) = dict(Story(replace(found, findings=(replace(finding, rivals=(rival,)),))).rows)[
+        'Which'
+    ]
+    assert cause.endswith('the data do not distinguish it from one of shoulder')
+
+
+def test_steps_have_the_sign_that_the_sentence_has(found, recordings):
+    extras = Extras(no_run='the load is 0.3 +- 0.1 kg')
+    page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='r', extras=extras)
+    assert 'The load is 0.3 ± 0.1 kg.' in page

@@ -123,7 +123,7 @@ def decide(
     doubtful = [finding for finding in findings if finding.rivals]
     if doubtful:
         first = doubtful[0]
-        others = _others(first)
+        others = others_in_words(first)
         one = 'it' if len(findings) == 1 else f'the {first.name.replace("_", " ")}'
         return Verdict('ambiguous', f'{said} These data cannot tell {one} from {others}.')
     return Verdict('named', f'{said} The rest is {floor_in_words}.')
@@ -416,7 +416,7 @@ def _tie(finding: Finding, joint: str, segment: str) -> str:
     return f'{segment} ({", ".join(shown)})' if shown else segment
 
 
-def _others(finding: Finding) -> str:
+def others_in_words(finding: Finding) -> str:
     """Return the rivals of a name in words, with their joints if any rival has other joints."""
     elsewhere = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
     words = []

@@ -60,6 +60,9 @@ class GapBars(Section):
         rows = []
         for joint, name in enumerate(self.robot.joints):
             unit = torque_unit(self.robot, joint)
+            if not any(errors[joint] for _, _, errors in roles):  # at rest: no row counts
+                rows.append((name, [Bar(0.0, 'floor', 'not judged')]))
+                continue
             least = max(float(self.gap.floor[joint]), 1e-12)
             bars = [
                 Bar(float(errors[joint]) / least, role, f'{digits(float(errors[joint]))} {unit}')

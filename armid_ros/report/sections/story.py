@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.words import added, share_in_words
+from armid_ros.diagnosis.verdict.words import added, others_in_words, share_in_words
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import (
@@ -179,7 +179,7 @@ def _cause(finding: Finding) -> str:
     more = len(finding.values) - len(values)
     listed = ', '.join([*values, f'{more} more'] if more else values)
     numbers = f': {listed}' if listed else ''
-    rivals = ', '.join(name.replace('_', ' ') for name in finding.ambiguous_with)
+    rivals = others_in_words(finding)
     doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
     name, share = finding.name.replace('_', ' '), share_in_words(finding, interval=True)
     return f'{name}{where}{numbers}; explains {share}{doubt}'
