@@ -100,6 +100,18 @@ class FleetFitOptions:
     resume: bool
 
 
+@contextmanager
+def _place_of_results() -> Iterator[None]:
+    """Say of a place of results that fails that it may be --out."""
+    from armid_ros.fleet.store import StoreError
+
+    try:
+        yield
+    except StoreError as error:
+        raise FleetError(f'{error}; is --out a folder that can be read and written?') from error
+
+
+@_place_of_results()
 @gathered(robots=RobotOptions, cluster=ClusterOptions, fit=FleetFitOptions)
 def identify(
     globs: tuple[str, ...],
@@ -205,6 +217,7 @@ def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> No
     say(f'{out}: bags, parameters, arms, refused (Parquet), fleet.json')
 
 
+@_place_of_results()
 def watch(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
     from armid_ros.fleet.pages import write_pages
@@ -234,6 +247,7 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
     say(f'{out}: index.html, pages/, watch/ (Parquet), alarms.jsonl')
 
 
+@_place_of_results()
 def diagnose(
     out: str,
     scheduler: str | None,
@@ -277,6 +291,7 @@ def diagnose(
     say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')
 
 
+@_place_of_results()
 def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
     """Make the reports of bags of an arm, and link them on its page."""
     from armid_ros.fleet.bag_reports import asked_bags, write_reports

@@ -65,7 +65,8 @@ def build(group, context):
         if isinstance(command, click.Group):
             build(command, below)
 
-main(['--version'], standalone_mode=False)
+for arguments in (['--version'], ['fleet', 'watch', '--help']):
+    main(arguments, standalone_mode=False)
 build(main, click.Context(main, info_name='armid'))
 sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
 """

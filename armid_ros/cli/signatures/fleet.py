@@ -51,14 +51,7 @@ class _Fleet(click.Group):
             raise FleetError(
                 f'armid fleet needs {", ".join(missing)}: pip install "armid_ros[fleet]"'
             )
-        from armid_ros.fleet.store import StoreError
-
-        try:
-            return super().invoke(ctx)
-        except StoreError as error:
-            raise FleetError(
-                f'{error}; is --out a folder that can be read and written?'
-            ) from error
+        return super().invoke(ctx)
 
 
 @click.group(
