@@ -35,6 +35,7 @@ from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
     blind_joints,
     excess_of,
+    for_a_second,
     harmed,
     held,
     hiding,
@@ -358,7 +359,7 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
 def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence | None) -> Evidence:
     """Return the data in which the worst of what is left shows, of which the sentence speaks."""
     worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
-    return evidence if unseen is None or worst == 0 else unseen
+    return evidence if unseen is None or worst % 2 == 0 else unseen
 
 
 def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
@@ -387,13 +388,14 @@ def _excesses(
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
     usual = 1.0 if chosen.measured else more  # a misfit varies from motion to motion
-    arm = rest.fitted.arm
+    arm, before = rest.fitted.arm, asked.before
     left = [excess_of(arm, _sure(evidence, chosen), settings, usual)]
-    parts = [evidence]
+    parts, where = [evidence], 'recordings that were not used'
     if unseen is not None:
-        where = 'recordings that were not used'
         left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
         parts.append(unseen)
+    if before is not None:
+        left += [for_a_second(arm, part, before, settings) for part in parts]
     if settings.partner is not None:
         return left, []
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]

@@ -38,6 +38,10 @@ _SLIGHTLY = 0.05
 #: Multiple of dry friction by which a joint at rest may be held: twice that of motion until it
 #: breaks away, and once that of the model, whose direction is arbitrary at rest.
 _HELD = 3.0
+#: A person who leans on an arm, or a contact in passing, lasts as long [s].
+_SECOND = 1.0
+#: Share of the rows of such a time that have to say something.
+_TELLING = 0.25
 #: Words for a joint that is held, for a table, and for the end of a sentence.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 _BESIDE = (
@@ -164,6 +168,40 @@ def held(
         then = standing(given, Evidence(before.data, unit, unit), before.residual, surely)
         excess = excess / np.maximum(settings.thresholds.same_fit * then, 1.0)
     return Excess(excess, _BESIDE)
+
+
+def for_a_second(
+    arm: ArmModel, evidence: Evidence, before: Baseline, settings: DiagnosisSettings
+) -> Excess:
+    """
+    Return the most that any second leaves over the most that it may.
+
+    What comes and goes is little of a whole recording. Squares may be larger on motions that were
+    not used, and by as much again in the worst second of such a motion.
+
+    """
+    most = settings.thresholds.other_motion * settings.thresholds.predicted
+    then = _worst_second(before.data, before.residual, (before.misfit,) * len(before.data))
+    now = _worst_second(evidence.data, evidence.residuals(arm), evidence.sigma)
+    limit = np.where(then > 0.0, most * then, np.inf) + evidence.matters(settings)
+    return Excess(now / limit, 'for a second')
+
+
+def _worst_second(
+    data: Sequence[Trajectory], residual: Sequence[FloatArray], sigma: Sequence[FloatArray]
+) -> FloatArray:
+    """Return the largest mean square over the unit of any second, of each joint, (n,)."""
+    worst = np.zeros(residual[0].shape[1])
+    for part, own, unit in zip(data, residual, sigma, strict=True):
+        rows = max(round(_SECOND / float(part.t[1] - part.t[0])), 1)
+        told = part.informative.astype(float)
+        share, squares = (
+            uniform_filter1d(x, rows, axis=0, mode='constant')
+            for x in (told, told * (own / unit) ** 2)
+        )
+        means = np.where(share > _TELLING, squares / np.maximum(share, _TELLING), 0.0)
+        worst = np.maximum(worst, means.max(axis=0))
+    return worst
 
 
 def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
