@@ -31,8 +31,9 @@ class Thresholds:
         Deviations by which a name has to be ahead of another one to exclude it.
     tie : float
         Twice the share of the same by which it has to be ahead as well; share of a simpler cause,
-        in squares, that what contains it leaves at most, and of a cause in all recordings that one
-        of them has to show to tell when it changed.
+        in squares, that what contains it leaves at most, that a cause may lose at the bound of a
+        value, and of a cause in all recordings that one of them has to show to tell when it
+        changed.
     far : float
         Lead over its own share that excludes another one however few blocks show it, and that
         a link, which never changes, or a load of one that is not at the end of the arm has to have
@@ -41,8 +42,8 @@ class Thresholds:
         Power of a cause over that of the model's own misfit, summed over joints, below which it is
         small print where recordings do not tell a change from another motion's misfit.
     of_state : float
-        Share of a misfit, root mean square, that is a function of position and velocity: 0.4 to
-        0.8 in half of the joints of 14 arms.
+        Share of a misfit, root mean square, that is a function of position, velocity and load:
+        without load 0.4 to 0.8 in half of the joints of 14 arms.
     unlikely : float
         Probability of as large a change where nothing has changed, over all candidates that are
         looked at, up to which one has: of 1113 candidates of 38 arms to which nothing happened
@@ -71,7 +72,8 @@ class Thresholds:
         measure so well: of a thousand healthy arms one is `unknown`.
     predicted : float
         Factor by which squares may be larger on motions that were not used: values that other data
-        gave are not exact there, and a misfit is another one.
+        gave are not exact there, and a misfit is another one. By as much again in the worst second
+        of such a motion: of 38 healthy arms two leave more than 4 times the worst second before.
     open_share : float
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
         there, however little that is of the gap of the arm; and of the whole gap that a cause

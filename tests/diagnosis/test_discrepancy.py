@@ -13,7 +13,7 @@ from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification import identify
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.model import BaseParameters
+from armid_ros.model import BaseParameters, inverse_dynamics
 import numpy as np
 import pytest
 
@@ -93,6 +93,21 @@ def test_what_the_model_lacks_on_both_days_is_no_change(bench, curve, before, to
 
     days = [bench.recordings(lacking, seed=seed) for seed in (1, 2, 3, 4)]
     first, second = [day[before] for day in days[:2]], [day[today] for day in days[2:]]
+    rng = np.random.default_rng(0)
+    arm = identify(bench.arm, first, rng=rng).arm
+    found = diagnose(arm, second, baseline=first, rng=rng)
+    assert not found.findings, found.summary
+
+
+def test_friction_by_load_on_both_days_is_no_change(bench):
+    """Slow motion carries weight, and fast motion the accelerations of the links as well."""
+
+    def by_load(motion, tau):
+        load = inverse_dynamics(bench.robot, motion)
+        return 0.1 * np.abs(load) * np.sign(motion.dq)
+
+    days = [bench.recordings(by_load, seed=seed) for seed in (1, 2, 3, 4)]
+    first, second = [day[2] for day in days[:2]], [day[0] for day in days[2:]]
     rng = np.random.default_rng(0)
     arm = identify(bench.arm, first, rng=rng).arm
     found = diagnose(arm, second, baseline=first, rng=rng)
