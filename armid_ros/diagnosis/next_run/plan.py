@@ -84,17 +84,18 @@ class NextRun:
         """Return what to do and what it would show, in words, the least separated pair first."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
         parts = [
-            f'it should tell {one.name} from {one.rival} by {_many(one.z)} standard deviations'
+            f'{one.name} from {one.rival} by {_many(one.z)} standard deviations'
             for one in separated[:_SAID]
         ]
         if len(separated) > _SAID:
-            parts.append(f'and {len(separated) - _SAID} more pairs of names by more')
+            parts.append(f'{len(separated) - _SAID} more pairs of names by more')
         again = ''
         if self.load is not None:
             again = f', then again with {self.load.mass:g} kg fixed to {self.load.frame}'
         return (
             f'Run {EXPERIMENT_FILE} ({self.template}, {self.excitation.duration:.0f} s){again}, '
-            f'and diagnose all recordings together: {"; ".join(parts).replace("_", " ")}.'
+            'and diagnose all recordings together: it should tell '
+            f'{", ".join(parts).replace("_", " ")}.'
         )
 
     def document(self) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def next_steps(
             f'than the model before in {", ".join(worse)}. Record more motions of '
             f'{", ".join(worse)}, and diagnose all recordings together.'
         )
-    elif verdict in ('named', 'consistent'):
+    elif verdict in ('named', 'consistent') and not diagnosis.suspected:
         anew = diagnosis.doubt or diagnosis.harmful
         steps.append(_ANEW if anew else _use(diagnosis, model))
     if diagnosis.not_visible:
@@ -116,6 +116,8 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
             continue
         where = ', '.join(one.joints) or 'the whole arm'
         name = one.name.replace('_', ' ')
+        if one.name == finding.name and one is not own:
+            name = f'that of {where}'
         head = f'Look at {where}' if one is own else f'If it is {name}, look at {where}'
         place = _centre(finding) if one is own else ''
         steps.append(f'{head}: {what}{place}.')
