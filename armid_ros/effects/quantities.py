@@ -165,7 +165,7 @@ def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
 
     """
     slides = [bool(robot.prismatic[robot.joints.index(joint)]) for joint in (first, second)]
-    if slides[0] == slides[1]:
+    if slides[0] == slides[1] or unit not in _MIXED_UNITS:
         return joint_unit(unit, first, robot)
     return _MIXED_UNITS[unit][slides[1]]
 
