@@ -285,17 +285,16 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     remarks = _unpatched(found, worse) or [suspicion(one) for one in suspected]
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
-    shown = unseen if names.shares.predicted else None
+    shown, open_in = unseen if names.shares.predicted else None, _shows(left, evidence, unseen)
+    places = where_it_is(explanation, (shown or evidence) if found else open_in, settings)
     asked.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
         summary=' '.join([word.summary, *remarks, *_doubts(asked, chosen, word, blind)]),
         findings=found,
         minor=minor,
-        where=where_it_is(explanation, shown or evidence, settings) or places_held(arm, resting),
-        left=where_left(
-            explanation, explanation.fitted.arm, _shows(left, evidence, unseen), settings
-        ),
+        where=places or places_held(arm, resting),
+        left=where_left(explanation, explanation.fitted.arm, open_in, settings),
         gap=measure_gap(explanation, shown),
         explanation=explanation.forgetting(),
         arm=plain_arm(explanation.fitted.arm) if found and not worse else asked.given,
