@@ -84,13 +84,12 @@ def test_no_value_is_less_than_nothing_by_rounding(bench):
     assert 'encoder offset 0.0000 +- 0.0014 rad' in sentence(small)
 
 
-def test_a_model_that_has_to_be_fitted_says_where_it_is_off_and_by_how_much(bench):
+def test_a_model_that_has_to_be_fitted_says_so(bench):
     excess = np.full(bench.robot.n_joints, 0.8)
     excess[-1] = 4.0
     verdict = said(bench.arm, Excess(excess, 'in the recordings'))
     assert verdict.word == 'consistent'
     assert 'once its rigid body and friction are fitted' in verdict.summary
-    assert f'the error of {bench.robot.joints[-1]} is 2.0 times as large' in verdict.summary
 
 
 def test_what_does_not_repeat_has_to_matter(bench):
