@@ -20,7 +20,7 @@ from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives
-from armid_ros.identification.assess.mistakes import find_mistake, Mistake
+from armid_ros.identification.assess.mistakes import Mistake, suspected_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.identify import Fit, Identification, Score
@@ -90,10 +90,11 @@ def grade(
     """
     blind = _blind(result, description, validation, [*recordings, *held_out])
     seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
+    mistakes, suspicions = _mistakes(result, description, seeing)
     faults = [
         *(_Reason('unusable', text) for texts in blind.values() for text in texts),
         *_time_bases([*recordings, *held_out], result),
-        *_of_recordings(result, description, validation, seeing),
+        *(mistakes or _units(result, description, validation, seeing)),
         *_dead(result, description, validation, [*recordings, *held_out]),
         *_elsewhere(result, description, validation, [*recordings, *held_out]),
     ]
@@ -103,6 +104,7 @@ def grade(
         *_resting(result, validation),
         *_clocks([*recordings, *held_out]),
         *_velocities([*recordings, *held_out]),
+        *suspicions,
     ]
     ordered = _worst_first(reasons)
     return Grade(
@@ -121,16 +123,13 @@ def by_error(error: float) -> Word:
     return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'
 
 
-def _of_recordings(
+def _units(
     result: Identification,
     description: ArmModel,
     validation: Mapping[str, Sequence[Fit]],
     recordings: Sequence[Recording],
 ) -> list[_Reason]:
-    """Say what recordings show to be wrong; limits of drives tell where the body does not."""
-    mistakes = list(_mistakes(result, description, recordings))
-    if mistakes:
-        return mistakes
+    """Say whose torque is in another unit, as limits of drives tell where the body does not."""
     motions = [fit.motion for fit in _fits(result, validation)]
     units = units_beyond_drives(description.robot, recordings, motions)
     return [_Reason('poor', text) for text in units]
@@ -138,14 +137,16 @@ def _of_recordings(
 
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
-) -> Iterator[_Reason]:
+) -> tuple[list[_Reason], list[_Reason]]:
+    """Return what recordings show to be wrong, and what links explain as well, which is a note."""
     robot = description.body
     alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     for recording in recordings:
-        mistake = find_mistake(robot, recording, result.used)
+        mistake = suspected_mistake(robot, recording, result.used)
         if mistake is not None:
-            kind = mistake.hypotheses[0].kind
+            kind = (mistake.links, *mistake.hypotheses[0].kind)
             alike.setdefault(kind, []).append((recording.source, mistake))
+    mistakes, suspicions = [], []
     for found in alike.values():
         worst = max((mistake for _, mistake in found), key=lambda m: float(m.before.joints.max()))
         where = ', '.join(dict.fromkeys(source for source, _ in found))
@@ -154,7 +155,11 @@ def _mistakes(
             text = f'in {where}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
-        yield _Reason('unusable' if certain else 'poor', text)
+        if worst.links:
+            suspicions.append(_Reason('good', text))
+        else:
+            mistakes.append(_Reason('unusable' if certain else 'poor', text))
+    return mistakes, suspicions
 
 
 def _blind(

@@ -18,11 +18,12 @@ from itertools import combinations
 from typing import ClassVar, Literal
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
+from armid_ros.identification.assess.known_gravity import known_gravity
 from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.rows.checks import effort_unit, TORQUE_UNITS
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import GRAVITIES, Robot
+from armid_ros.robots import Robot
 import numpy as np
 
 Quantity = Literal['position', 'torque', 'position and torque']
@@ -34,8 +35,6 @@ TURNS = (-135, -90, -45, 45, 90, 135, 180)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
-#: Free values that are within this of an axis [degrees] are written as that axis.
-_AXIS = 15.0
 
 
 class Hypothesis(ABC):
@@ -46,10 +45,14 @@ class Hypothesis(ABC):
     ----------
     values : int
         Numbers that are chosen to fit the data.
+    of_masses : bool
+        Whether masses that are all off by one factor do the same: `material` says from where on
+        they cannot be.
 
     """
 
     values: ClassVar[int] = 1
+    of_masses: ClassVar[bool] = False
 
     @property
     def disputable(self) -> bool:
@@ -257,6 +260,7 @@ class OtherGravity(Hypothesis):
     """Gravity is not the vector of the description; torque is linear in it, so data give it."""
 
     values: ClassVar[int] = 3
+    of_masses: ClassVar[bool] = True
 
     vector: tuple[float, float, float] = (np.nan, np.nan, np.nan)
 
@@ -270,11 +274,19 @@ class OtherGravity(Hypothesis):
         return OtherGravity((float(values[0]), float(values[1]), float(values[2])))
 
     def material(self, robot: Robot, limits: GradeLimits) -> bool:
-        """Whether it is too far from the description to be wrong masses, and may be a planet's."""
+        """
+        Whether it is too far from the description to be wrong masses, and may be a planet's.
+
+        Masses make all weight larger or smaller, and turn it nowhere.
+
+        """
         told, found = robot.gravity, np.array(self.vector)
-        size = max(float(np.linalg.norm(told)), 1.0)
-        off = float(np.linalg.norm(found - told)) > limits.gravity_change * size
-        return off and float(np.linalg.norm(found)) < _STRONGEST
+        size, length = (float(np.linalg.norm(vector)) for vector in (told, found))
+        if not limits.gravity_change * max(size, 1.0) < np.linalg.norm(found - told):
+            return False
+        weighs = length / size if size > 0.0 else np.inf
+        turned = np.linalg.norm(found / length - told / max(size, 1e-9)) > limits.gravity_change
+        return length < _STRONGEST and bool(turned or _beyond_masses(weighs, limits))
 
     def sentence(self, robot: Robot) -> str:
         """Say the direction and the option that puts it right."""
@@ -290,6 +302,8 @@ class OtherGravity(Hypothesis):
 @dataclass(frozen=True)
 class OtherUnit(Hypothesis):
     """Efforts are a factor from N m, the same in all joints: currents, a gear ratio, a unit."""
+
+    of_masses: ClassVar[bool] = True
 
     factor: float = np.nan
 
@@ -309,7 +323,7 @@ class OtherUnit(Hypothesis):
 
     def material(self, robot: Robot, limits: GradeLimits) -> bool:
         """Whether it is too far from one for masses to be what is wrong."""
-        return not 1.0 / limits.torque_factor < self.factor < limits.torque_factor
+        return _beyond_masses(self.factor, limits)
 
     def sentence(self, robot: Robot) -> str:
         """Say the unit, or else the factor."""
@@ -399,37 +413,9 @@ def _of_joint(robot: Robot, joint: int) -> Iterator[Hypothesis]:
         yield ZeroOff(joint, degrees)
 
 
-def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
-    """
-    Write a gravity vector that was found as a person would.
-
-    Parameters
-    ----------
-    vector : ndarray, shape (3,)
-        As it was found [m/s^2].
-    told : ndarray, shape (3,)
-        As described; its magnitude is kept where the estimated one is close.
-
-    Returns
-    -------
-    direction : ndarray, shape (3,)
-        Unit vector; that of an axis where it is near.
-    option : str
-        What to give to --gravity.
-
-    """
-    size = float(np.linalg.norm(vector))
-    direction = vector / size
-    axis = np.round(direction)
-    if np.linalg.norm(axis) == 1.0 and direction @ axis > np.cos(np.deg2rad(_AXIS)):
-        direction = axis + 0.0
-    sizes = [float(np.linalg.norm(told)), *(-value[2] for value in GRAVITIES.values())]
-    near = min(sizes, key=lambda known: abs(np.log(size / max(known, 1e-9))))
-    size = near if 0.75 < size / max(near, 1e-9) < 1.33 else size
-    for name, value in GRAVITIES.items():
-        if np.allclose(size * direction, value, atol=1e-6):
-            return direction, name
-    return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
+def _beyond_masses(factor: float, limits: GradeLimits) -> bool:
+    """Whether masses are not off by a factor, all of them."""
+    return not 1.0 / limits.torque_factor < factor < limits.torque_factor
 
 
 def _scaled(motion: Motion, joint: int | slice, quantity: Quantity, factor: float) -> Motion:

@@ -4,8 +4,9 @@
 Which mistake a recording shows, if any.
 
 Hypotheses are tried one by one, where the arm as described predicts the recording badly enough
-for one of them to matter; where none is believed and the prediction fails, once more with a body
-that is fitted too.
+for one of them to matter. Links that are off as those of descriptions are may be the cause too,
+and are the commoner one: a mistake is believed if it explains what no such body does. Where none
+is believed and the prediction fails, hypotheses are tried once more with such a body alone.
 
 """
 
@@ -30,7 +31,7 @@ from armid_ros.identification.assess.hypotheses import (
 )
 from armid_ros.identification.assess.prediction_error import (
     described_error,
-    fitted_error,
+    nearest_error,
     PredictionError,
 )
 from armid_ros.identification.rows.signals import (
@@ -66,6 +67,8 @@ class Mistake:
         As recorded, and with the mistake put right.
     fitted : bool
         Whether the body had to be fitted to see it.
+    links : bool
+        Whether links that are off as those of a description may be explain as much.
 
     """
 
@@ -73,6 +76,7 @@ class Mistake:
     before: PredictionError
     after: PredictionError
     fitted: bool
+    links: bool = False
 
     @property
     def joint(self) -> int:
@@ -86,6 +90,12 @@ class Mistake:
             100.0 * min(float(error.joints[self.joint]), 9.99)
             for error in (self.before, self.after)
         )
+        if self.links:
+            return (
+                f'the arm as described predicts the torque of {robot.joints[self.joint]} to '
+                f'{before:.0f} %; links that are off as those of a description may be explain '
+                f'that, and this would do so too: {said}'
+            )
         arm = 'fitted' if self.fitted else 'described'
         return (
             f'{said} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
@@ -109,9 +119,15 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     Returns
     -------
     Mistake or None
-        None where the data are best as they are.
+        None where the data are best as they are, or the links may be what is wrong.
 
     """
+    found = suspected_mistake(robot, recording, used)
+    return None if found is None or found.links else found
+
+
+def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
+    """Return what `find_mistake` does, or else what links that are off explain as well."""
     slow = slow_motions(recording, used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
@@ -120,13 +136,13 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     if faults is not None:
         without = tuple(slow_motions(recording.select(faults.sound), used))
         tried.append(Faulty(faults.first, faults.count, without))
-    found = _best(robot, tried, _described(robot, slow), fitted=False)
-    if found is not None:
+    found = _best(robot, tried, _described(robot, slow), _nearest(robot, slow))
+    if found is not None and not found.links:
         return found
-    if any(_predicts(judge(robot, slow)) for judge in (_described, _fitted)):
-        return None
+    if any(_predicts(judge(robot, slow)) for judge in (_described, _nearest)):
+        return found
     changes = [one for one in tried if not isinstance(one, InUnit | OtherGravity | OtherUnit)]
-    return _best(robot, changes, _fitted(robot, slow), fitted=True)
+    return _best(robot, changes, _nearest(robot, slow)) or found
 
 
 def effort_factor(
@@ -163,22 +179,27 @@ def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
     return judge
 
 
-def _fitted(robot: Robot, slow: Sequence[Motion]) -> Judge:
+def _nearest(robot: Robot, slow: Sequence[Motion]) -> Judge:
     def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
         motion = _thinned(one.stretches(slow), _ROWS_FITTED)
-        return None if motion is None else (fitted_error(robot, motion), one)
+        return None if motion is None else (nearest_error(robot, motion), one)
 
     return judge
 
 
 def _best(
-    robot: Robot, tried: Sequence[Hypothesis], judge: Judge, *, fitted: bool
+    robot: Robot, tried: Sequence[Hypothesis], judge: Judge, near: Judge | None = None
 ) -> Mistake | None:
-    """Return the hypothesis that gains most, if that is enough for what it is free to choose."""
+    """
+    Return the hypothesis that gains most, if that is enough for what it is free to choose.
+
+    Beside a judge by the body as described, another one by bodies near it says which are of links.
+
+    """
     as_recorded = judge(AsRecorded())
     if as_recorded is None:
         return None
-    before = as_recorded[0]
+    before, fitted = as_recorded[0], near is None
     nothing = None if fitted else judge(WithoutBody())
     rival = before if nothing is None else before.least(nothing[0])
     price = LIMITS.gain if not fitted else LIMITS.gain**LIMITS.free_body
@@ -196,6 +217,10 @@ def _best(
     ]
     if not believed:
         return None
+    sure = believed
+    if near is not None:
+        sure = [row for row in believed if _beyond_bodies(row.hypothesis, near)]
+        believed = sure or believed
     first = max(believed, key=lambda row: row.surplus)
     as_good = {
         type(row.hypothesis): row.hypothesis
@@ -203,7 +228,24 @@ def _best(
         if type(row.hypothesis) is not type(first.hypothesis)
         and row.gain * LIMITS.gain**0.5 > first.gain
     }
-    return Mistake((first.hypothesis, *as_good.values()), before, first.after, fitted)
+    likely = (first.hypothesis, *as_good.values())
+    return Mistake(likely, before, first.after, fitted, links=not sure)
+
+
+def _beyond_bodies(one: Hypothesis, near: Judge) -> bool:
+    """
+    Whether a change of the data explains what no body that the description may mean does.
+
+    Where the centre of a wrist lies near its axis, a few millimetres turn its weight by as much as
+    a wrong zero. Of a factor of all masses `Hypothesis.material` has said that it is none.
+
+    """
+    if one.of_masses:
+        return True
+    as_recorded, put_right = near(AsRecorded()), near(one)
+    if as_recorded is None or put_right is None:
+        return True
+    return as_recorded[0].gain(put_right[0]) >= LIMITS.gain**one.values
 
 
 class _Row(NamedTuple):

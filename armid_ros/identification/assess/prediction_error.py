@@ -1,18 +1,21 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-How well an arm predicts a recording that it is fitted to elsewhere.
+How well an arm predicts a recording.
 
-Friction, offset and drive inertia of every joint are fitted, the body is that of the description
-or held softly to it. Blocks of the recording take turns at being fitted and being predicted.
+Friction, offset and drive inertia of every joint are fitted. The body is that of the description,
+and blocks of the recording take turns at being fitted and being predicted; or it is the best of
+those that the description may mean.
 
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.effects.load import described_spread
+from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
+from armid_ros.identification.fitting.triangle import within
 from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -30,7 +33,7 @@ _SLOW = 0.05
 @dataclass(frozen=True)
 class PredictionError:
     """
-    Prediction error of the torque in blocks that were not fitted.
+    Prediction error of the torque.
 
     Attributes
     ----------
@@ -40,12 +43,15 @@ class PredictionError:
         Root mean square torque of each joint [N m or N].
     shared : ndarray, shape (k,)
         Values that all joints share, fitted to all blocks.
+    off : float
+        Sum of squares of what the body is off by from that of the description, in deviations.
 
     """
 
     joints: FloatArray
     torque: FloatArray
     shared: FloatArray
+    off: float = 0.0
 
     def whole(self, robot: Robot) -> float:
         """Return the error of all slides or of all other joints together, whichever is more."""
@@ -61,12 +67,13 @@ class PredictionError:
         """
         Return the factor by which errors are larger than others, of all joints together.
 
-        It is the likelihood ratio of two models with unknown noise, per sample. Errors below the
+        It is the likelihood ratio of two models with unknown noise, per sample, times that of
+        their bodies by the description, per independent value of a recording. Errors below the
         floor and above the torque itself count as that much.
 
         """
         ratio = self._counted() / better._counted()
-        return float(np.prod(ratio))
+        return float(np.prod(ratio) * np.exp((self.off - better.off) / (2.0 * FREEDOM)))
 
     def least(self, other: PredictionError) -> PredictionError:
         """Return the smaller error of every joint."""
@@ -110,23 +117,36 @@ def described_error(motion: Motion, fixed: FloatArray, columns: FloatArray) -> P
     return _error(left, scale, _shared_values(own, rest, shared, everything))
 
 
-def fitted_error(robot: Robot, motion: Motion) -> PredictionError:
-    """Predict with a body that is fitted too; what the blocks do not tell stays as described."""
+def nearest_error(robot: Robot, motion: Motion) -> PredictionError:
+    """
+    Return what the likeliest of the bodies that a description may mean leaves of all blocks.
+
+    Parameters of a description are off by a uniform density as wide as they may be, errors are
+    those of a good identification, and a recording has few independent values of them. Friction
+    and the inertia of a drive are not below zero: they explain no torque of the opposite sign.
+
+    """
     assert motion.tau is not None
-    n = motion.n_joints
-    scale = _scale(motion.tau)
-    columns = np.zeros((len(motion), n, len(robot.rigid_parameters) + _OWN * n))
-    columns[:, :, : -_OWN * n] = regressor(robot, motion)
-    rest = (motion.tau - columns[:, :, : -_OWN * n] @ robot.rigid_parameters) / scale
+    count, n = motion.q.shape
+    scale, weight = _scale(motion.tau), _weight(motion)
+    body = regressor(robot, motion)
+    rest = (motion.tau - body @ robot.rigid_parameters) / scale * weight
+    deviation = described_spread(robot).ravel() / np.sqrt(3.0)
+    own = np.zeros((count, n, n, _OWN))
     for joint in range(n):
-        start = columns.shape[2] - _OWN * (n - joint)
-        columns[:, joint, start : start + _OWN] = _own_columns(motion, joint)
-    weight = _weight(motion)
-    rest *= weight
-    columns *= (weight / scale)[:, :, np.newaxis]
-    size = np.sqrt(np.mean(np.sum(columns**2, axis=1), axis=0))
-    columns /= np.where(size > 0.0, size, 1.0)
-    return _error(left_of_blocks(columns, rest), scale, np.empty(0))
+        own[:, joint, joint] = _own_columns(motion, joint)
+    by_body = body * deviation * np.sqrt(FREEDOM / count) / scale[:, np.newaxis]
+    columns = np.concatenate([by_body, own.reshape(count, n, -1)], axis=2)
+    stacked = (columns * weight[:, :, np.newaxis]).reshape(-1, columns.shape[2])
+    normal = stacked.T @ stacked + LIMITS.floor**2 * np.eye(stacked.shape[1])
+    least = np.full(stacked.shape[1], -np.inf)
+    least[len(deviation) :].reshape(n, _OWN)[:, 1:] = 0.0
+    free = np.asarray(np.linalg.solve(normal, stacked.T @ rest.ravel()))
+    factor = np.asarray(np.linalg.cholesky(normal).T)
+    values = within(free, factor, (least, np.full(len(free), np.inf)))
+    found = _error(rest - (stacked @ values).reshape(rest.shape), scale, np.empty(0))
+    off = float(np.sum(values[: len(deviation)] ** 2)) * FREEDOM / count
+    return replace(found, off=off)
 
 
 def left_of_blocks(columns: FloatArray, rest: FloatArray) -> FloatArray:

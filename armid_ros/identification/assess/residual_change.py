@@ -14,15 +14,11 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
+from armid_ros.identification.assess.grade_limits import FREEDOM
 from armid_ros.identification.known_fit import KnownFit
 import numpy as np
 from scipy.stats import f
 
-#: Independent values of a residual in one recording. Of ten simulated arms that have lived and to
-#: which nothing happened, with other motions each day, the logarithm of the ratio of two residuals
-#: of a joint has a deviation of 0.35 with one recording a day and 0.19 with three; 8 make 0.38 and
-#: 0.21. One of the twenty pairs is said to differ.
-FREEDOM = 8
 #: Share of its torque below which the residual of a joint is of filters, and not of an arm [%].
 LEAST_ERROR = 0.1
 

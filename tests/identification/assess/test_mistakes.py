@@ -8,13 +8,15 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification.assess import mistakes
 from armid_ros.identification.assess.faulty_samples import faulty_samples
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     hypotheses,
     InUnit,
-    known_gravity,
+    OtherGravity,
     OtherUnit,
 )
-from armid_ros.identification.assess.mistakes import find_mistake
+from armid_ros.identification.assess.known_gravity import known_gravity
+from armid_ros.identification.assess.mistakes import find_mistake, suspected_mistake
 from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
@@ -215,6 +217,42 @@ def test_a_zero_that_is_off(robot, sound, joint, degrees):
     off = replace(sound, q=with_column(sound.q, joint, lambda q: q + np.deg2rad(degrees)))
     said = mistake_in(robot, off)
     assert f'the zero of {robot.joints[joint]} seems to be off by about {degrees:.0f} ' in said
+
+
+def with_last_centre(robot, aside):
+    """Return a robot whose last link has its centre so far beside its own axis, along y [m]."""
+    links = robot.rigid_parameters.reshape(-1, 10).copy()
+    links[-1, 1:4] = links[-1, 0] * np.array([0.0, aside, 0.02])
+    return robot.with_inertias(links.ravel())
+
+
+def test_a_centre_of_a_wrist_a_few_millimetres_off_is_no_wrong_zero(robot):
+    """Its weight points elsewhere by a third of a turn; the description has it near the axis."""
+    described, real = (with_last_centre(robot, aside) for aside in (-0.004, 0.012))
+    recording = recording_of(real, 1, friction=0.1)
+    assert mistake_in(described, recording) == ''
+    used = conditioning([recording], SignalSettings())
+    found = suspected_mistake(described, recording, used)
+    assert found.links
+    said = found.sentence(described)
+    assert 'links that are off as those of a description may be explain that' in said
+    assert f'the zero of {robot.joints[-1]} seems to be off' in said
+
+
+@pytest.mark.parametrize(
+    ('vector', 'believed'),
+    [
+        ((0.0, 0.0, -14.3), False),
+        ((0.0, 0.0, -6.0), False),
+        ((0.0, 0.0, -1.62), True),
+        ((0.0, 0.0, -3.71), True),
+        ((0.0, 3.4, -9.2), True),
+        ((0.0, 5.0, -13.4), True),
+        ((0.0, 0.0, 9.81), True),
+    ],
+)
+def test_weight_half_as_much_again_is_of_masses_and_not_of_gravity(robot, vector, believed):
+    assert OtherGravity(vector).material(robot, LIMITS) is believed
 
 
 @pytest.mark.parametrize('pair', [(0, 1), (1, 2), (2, 3), (0, 3)])
@@ -421,6 +459,6 @@ def test_no_body_is_fitted_to_data_that_the_description_predicts(robot, sound, m
     def fit(*_):
         raise AssertionError('a body is fitted')
 
-    monkeypatch.setattr(mistakes, 'fitted_error', fit)
+    monkeypatch.setattr(mistakes, 'nearest_error', fit)
     assert mistake_in(robot, sound.select(slice(0, 500))) == ''
     assert mistake_in(robot, sound) == ''
