@@ -21,6 +21,7 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 
 #: Half of the readings of a joint at so many times the limit of its drive are in another unit: the
 #: smallest factor of one is a hundred, of which this is half in the logarithm, and no drive gives
@@ -123,9 +124,32 @@ def factors_apart(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Mot
 
 
 def _since(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]) -> FloatArray:
-    """Return the factors of torques on the model's, over those of a baseline, (n,)."""
-    factors, then = _factors(arm, motions), _factors(arm, before)
-    return np.asarray(factors / np.where(then > 0.0, then, 1.0))
+    """
+    Return the factors of torques on the model's, over those of a baseline, (n,).
+
+    Zero where one is not clear, or the model does not know the torque of the baseline.
+
+    """
+    factors = _factors(arm, motions)
+    if not before:
+        return factors
+    then = _factors(arm, before)
+    known = (then > 0.0) & _knows(arm, before, then)
+    return np.asarray(np.where(known, factors / np.where(known, then, 1.0), 0.0))
+
+
+def _knows(arm: ArmModel, before: Sequence[Motion], then: FloatArray) -> npt.NDArray[np.bool_]:
+    """
+    Tell of which joints a model is off by less than the torque of a baseline itself, (n,).
+
+    Rows at rest count: friction holds a joint with any torque up to that of its motion, and no
+    more. A motion that does not determine a model shows its errors there.
+
+    """
+    moves, expected, measured = _torques(arm, before)
+    off = np.mean(np.square(measured - then * expected), axis=0)
+    size = np.mean(np.square(measured), axis=0, where=moves)
+    return np.asarray(off < size)
 
 
 def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:
@@ -133,14 +157,21 @@ def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:
     factors = np.zeros(arm.robot.n_joints)
     if not motions:
         return factors
-    speed = np.abs(np.concatenate([motion.dq for motion in motions]))
-    expected = np.concatenate([arm.torque(motion) for motion in motions])
-    measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+    moves, expected, measured = _torques(arm, motions)
     for joint in range(len(factors)):
-        moves = speed[:, joint] >= _SLOW * speed[:, joint].max()
-        x, y = (torque[moves, joint] for torque in (expected, measured))
+        x, y = (torque[moves[:, joint], joint] for torque in (expected, measured))
         x, y = x - x.mean(), y - y.mean()
         size = float(np.sqrt((x @ x) * (y @ y)))
         if size > 0.0 and x @ y > _FOLLOWS * size:
             factors[joint] = (x @ y) / (x @ x)
     return factors
+
+
+def _torques(
+    arm: ArmModel, motions: Sequence[Motion]
+) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+    """Return where joints move, the torque of the model and the measured one, each (N, n)."""
+    speed = np.abs(np.concatenate([motion.dq for motion in motions]))
+    expected = np.concatenate([arm.torque(motion) for motion in motions])
+    measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+    return speed >= _SLOW * speed.max(axis=0), expected, measured

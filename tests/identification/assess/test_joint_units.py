@@ -14,6 +14,8 @@ from armid_ros.identification.assess.joint_units import (
     units_beyond_drives,
 )
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
+from armid_ros.model import regressor
+from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -78,6 +80,40 @@ def test_currents_are_in_no_one_unit(arm, run):
     for factor in (1.0, 1e3):
         tau = factor * run.tau
         assert factors_apart(arm, filtered(replace(run, tau=tau)), filtered(run)) == ''
+
+
+def moved(motion, joints, pose):
+    """Return a motion of some joints, with the others at rest."""
+    still = ~np.isin(np.arange(motion.n_joints), joints)
+    q, dq, ddq = (x.copy() for x in (motion.q, motion.dq, motion.ddq))
+    q[:, still], dq[:, still], ddq[:, still] = pose[still], 0.0, 0.0
+    return replace(motion, q=q, dq=dq, ddq=ddq)
+
+
+def test_a_model_that_a_baseline_does_not_determine_tells_no_factor(arm):
+    """
+    Moved one after the other, joints do not show what each makes of the torque of another.
+
+    The model is right in its first joint where that moves, and off by many times its torque
+    where the second does; a torque that follows it all the same is one five-hundredth of it.
+
+    """
+    robot, pose = arm.robot, np.full(6, 0.3)
+    steps = Motion(
+        robot.joints, np.arange(2.0), np.tile(pose, (2, 1)), np.zeros((2, 6)), np.eye(6)[:2]
+    )
+    body = regressor(robot, steps)[:, :, 14:20]
+    coupling = np.linalg.lstsq(
+        np.array([body[0, 0], body[1, 1], body[1, 0]]), np.array([0.0, 0.0, 5.0]), rcond=None
+    )[0]
+    links = robot.rigid_parameters.copy()
+    links[14:20] += coupling
+    model = replace(arm, robot=robot.with_inertias(links))
+    motion = multisine(robot.joints, 10.0, 100.0, seed=3)
+    alone = [recorded(arm, moved(motion, joints, pose)) for joints in ([0], [1, 2, 3, 4, 5])]
+    now = filtered(times(recorded(model, motion), 1.0 / 500.0, (0,)))
+    assert factors_apart(model, now, [part for one in alone for part in filtered(one)]) == ''
+    assert 'in shoulder_pitch' in factors_apart(model, now)
 
 
 def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
