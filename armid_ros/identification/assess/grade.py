@@ -138,7 +138,12 @@ def _units(
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> tuple[list[_Reason], list[_Reason]]:
-    """Return what recordings show to be wrong, and what links explain as well, which is a note."""
+    """
+    Return what recordings show to be wrong, and what links explain as well, which is a note.
+
+    Zeros and names are those of a day: what one recording of several suggests is of its motion.
+
+    """
     robot = description.body
     alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     for recording in recordings:
@@ -155,9 +160,9 @@ def _mistakes(
             text = f'in {where}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
-        if worst.links:
+        if worst.links and len(found) == len(recordings):
             suspicions.append(_Reason('good', text))
-        else:
+        elif not worst.links:
             mistakes.append(_Reason('unusable' if certain else 'poor', text))
     return mistakes, suspicions
 

@@ -31,7 +31,7 @@ Quantity = Literal['position', 'torque', 'position and torque']
 #: Times that torque may be late by [s]; the best is refined.
 DELAYS = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
-TURNS = (-135, -90, -45, 45, 90, 135, 180)
+TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8

@@ -340,3 +340,21 @@ def test_a_wrist_with_a_coupling_is_good_with_it_and_unusable_without(real_data,
     (folder := tmp_path / 'coupled').mkdir()
     effects = (*FRICTION, 'coupled_joint_friction')
     assert of_machine('tx40', real_data, folder, effects).word == 'good'
+
+
+def test_a_note_of_links_is_of_all_recordings_and_changes_no_grade(structure):
+    """A last link whose centre is a few millimetres from where it is described."""
+    links = np.tile(structure.robot.rigid_parameters, (2, 1)).reshape(2, -1, 10)
+    mass = links[0, -1, 0]
+    links[:, -1, 1:4] = mass * np.array([[0.0, -0.004, 0.02], [0.0, 0.012, 0.02]])
+    described, real = (
+        replace(structure, robot=structure.robot.with_inertias(own.ravel())) for own in links
+    )
+    motions = [
+        multisine(real.robot.joints, 20.0, RATE, seed=seed, base_hz=0.12) for seed in (1, 2)
+    ]
+    sound = [recorded(real, motion, torque_noise=1e-3) for motion in motions]
+    found, _ = graded(described, sound)
+    assert found.word == 'good'
+    assert found.faults == ()
+    assert 'links that are off as those of a description may be' in found.reasons[-1]
