@@ -19,9 +19,16 @@ from armid_ros.identification.estimators.refine import refined
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques
 from armid_ros.identification.fitting.excited import excited
 from armid_ros.identification.fitting.halves import halves_error, HalvesError
+from armid_ros.identification.fitting.held import base_spread, determined
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
 from armid_ros.identification.fitting.least_squares import Method
-from armid_ros.identification.fitting.nonlinear import fit_values, FittedValues, through, torques
+from armid_ros.identification.fitting.nonlinear import (
+    fit_values,
+    FittedValues,
+    through,
+    torques,
+    ungrouped,
+)
 from armid_ros.identification.fitting.quasi_static import free_directions, with_uncertain_inertia
 from armid_ros.identification.fitting.scatter import scatter
 from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
@@ -297,11 +304,9 @@ def identify(
         fit, said = with_uncertain_inertia(whole, fit, recordings, used)
         notes += said
     else:
-        fit = fit_values(arm, base, problem, recordings, used, settings.least_squares)
+        fit = _fitted(arm, base, problem, recordings, used, settings)
         if _hidden(arm, theory):
-            theory, fit = _with_what_shows_now(
-                theory, fit, recordings, used, settings.least_squares, rng
-            )
+            theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     fit, said = refined(settings.method, arm, fit, recordings, used, rng)
     notes += said + _remarks(fit, theory)
     certificate = None
@@ -321,11 +326,41 @@ def identify(
         used=used,
         settings=settings,
         notes=notes + _unsettled(fit),
-        halves=halves_error(fit.problem, fit.solution.weights, fit.base.values(whole.theta)),
+        halves=_halves(whole, fit, settings),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )
+
+
+def _fitted(
+    arm: ArmModel,
+    base: BaseParameters,
+    problem: Sequence[Regression],
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    settings: IdentificationSettings,
+) -> FittedValues:
+    """Fit by least squares what data determine better than the description does."""
+    method, told, free = settings.least_squares, base, None
+    if _holds(settings):
+        told, problem = determined(arm, base, problem, method)
+        free = None if told.rank == base.rank else ungrouped(arm, base)
+    return fit_values(arm, told, problem, recordings, used, method, free)
+
+
+def _holds(settings: IdentificationSettings) -> bool:
+    """Whether the description stays where it is surer; a fit among bodies weighs it by itself."""
+    return settings.physical is None and settings.method == settings.least_squares
+
+
+def _halves(
+    description: ArmModel, fit: FittedValues, settings: IdentificationSettings
+) -> HalvesError:
+    """Let halves predict each other, with the description weighed as the fit weighs it."""
+    spread = base_spread(description, fit.base) if _holds(settings) else None
+    described = fit.base.values(description.theta)
+    return halves_error(fit.problem, fit.solution.weights, described, spread)
 
 
 def _require_samples(
@@ -355,7 +390,7 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     if fit.base.rank < theory.rank:
         said += (
             f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
-            'the others are grouped',
+            'the others are grouped, or stay as described',
         )
     if fit.solution.outliers:
         said += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
@@ -391,7 +426,7 @@ def _with_what_shows_now(
     fit: FittedValues,
     recordings: Sequence[Recording],
     used: Conditioning,
-    method: Method,
+    settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
     """
@@ -404,4 +439,4 @@ def _with_what_shows_now(
     if now.rank <= theory.rank:
         return theory, fit
     columns = regressions(fit.arm, now.independent, recordings, used)
-    return now, fit_values(fit.arm, *excited(now, columns), recordings, used, method)
+    return now, _fitted(fit.arm, *excited(now, columns), recordings, used, settings)

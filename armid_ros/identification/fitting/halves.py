@@ -41,7 +41,10 @@ class HalvesError:
 
 
 def halves_error(
-    problem: Sequence[Regression], weights: FloatArray, described: FloatArray
+    problem: Sequence[Regression],
+    weights: FloatArray,
+    described: FloatArray,
+    spread: FloatArray | None = None,
 ) -> HalvesError:
     """
     Fit the first half and predict the second, and the other way round.
@@ -54,6 +57,8 @@ def halves_error(
         What the fit multiplied the rows of every joint by: the inverse of their residual.
     described : ndarray, shape (r,)
         Values of the description, where those stay that a half does not tell.
+    spread : ndarray, shape (r,), optional
+        What they may be off by; as much as the torque there is if nothing is said.
 
     Returns
     -------
@@ -67,11 +72,12 @@ def halves_error(
     target = np.concatenate([part.target for part in problem])[::step]
     told = np.concatenate([part.informative for part in problem])[::step]
     rest, weight = target - columns @ described, weights[::step]
+    most = np.full(len(described), np.inf) if spread is None else spread
     middle = len(tau) // 2
     halves = slice(0, middle), slice(middle, None)
     left = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
-        change = _fit(columns[fitted], rest[fitted], tau[fitted], weight[fitted])
+        change = _fit(columns[fitted], rest[fitted], tau[fitted], weight[fitted], most)
         left[predicted] = rest[predicted] - columns[predicted] @ change
     error, length = (np.linalg.norm(told * rows, axis=0) for rows in (left, tau))
     whole = float(np.linalg.norm(length))
@@ -81,9 +87,15 @@ def halves_error(
     )
 
 
-def _fit(columns: FloatArray, rest: FloatArray, tau: FloatArray, weight: FloatArray) -> FloatArray:
+def _fit(
+    columns: FloatArray,
+    rest: FloatArray,
+    tau: FloatArray,
+    weight: FloatArray,
+    most: FloatArray,
+) -> FloatArray:
     """
-    Fit changes of the description, each of which may make as much torque as there is.
+    Fit changes of the description, each as large as it may be off by, or as the torque there is.
 
     That is a Bayesian estimate in units of the residual; without it, what a half does not tell at
     all would be any number. Where next to nothing is left, the residual is no unit, and what a
@@ -96,5 +108,5 @@ def _fit(columns: FloatArray, rest: FloatArray, tau: FloatArray, weight: FloatAr
     torque = np.sqrt(np.mean((tau * weight) ** 2))
     stacked = stacked / size
     normal = stacked.T @ stacked
-    normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2
+    normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2 + (most * size) ** -2.0
     return np.asarray(informative_solution(normal, stacked.T @ (rest * weight).ravel()) / size)
