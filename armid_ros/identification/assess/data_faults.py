@@ -28,6 +28,7 @@ from armid_ros.identification.assess.hypotheses import (
 )
 from armid_ros.identification.assess.joint_units import (
     factors_apart,
+    knows,
     units_beside_model,
     units_beyond_drives,
 )
@@ -229,9 +230,13 @@ def _since(
     """
     Return by what factor torques have changed since a baseline; None where nothing tells.
 
-    Both are compared with the model, whose masses are what it has wrong on both days.
+    Both are compared with the model, whose masses are what it has wrong on both days. One that
+    knows the torque of no joint of the baseline tells nothing.
 
     """
+    motions = slow_motions_of(before, used)
+    if not motions or not np.any(knows(arm, motions)):
+        return None
     now, then = (effort_factor(arm.body, some, used) for some in (recordings, before))
     return None if now is None or then is None else now / then
 

@@ -10,6 +10,7 @@ from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.data_faults import check_data, Stretch
 from armid_ros.identification.assess.joint_units import (
     factors_apart,
+    knows,
     units_beside_model,
     units_beyond_drives,
 )
@@ -112,7 +113,9 @@ def test_a_model_that_a_baseline_does_not_determine_tells_no_factor(arm):
     motion = multisine(robot.joints, 10.0, 100.0, seed=3)
     alone = [recorded(arm, moved(motion, joints, pose)) for joints in ([0], [1, 2, 3, 4, 5])]
     now = filtered(times(recorded(model, motion), 1.0 / 500.0, (0,)))
-    assert factors_apart(model, now, [part for one in alone for part in filtered(one)]) == ''
+    before = [part for one in alone for part in filtered(one)]
+    assert factors_apart(model, now, before) == ''
+    assert not knows(model, before)[0] and knows(arm, before)[0]
     assert 'in shoulder_pitch' in factors_apart(model, now)
 
 
