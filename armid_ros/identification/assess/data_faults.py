@@ -234,11 +234,11 @@ def _since(
     knows the torque of no joint of the baseline tells nothing.
 
     """
-    motions = slow_motions_of(before, used)
-    if not motions or not np.any(knows(arm, motions)):
-        return None
     now, then = (effort_factor(arm.body, some, used) for some in (recordings, before))
-    return None if now is None or then is None else now / then
+    if now is None or then is None:
+        return None
+    known = knows(ArmModel(arm.body), slow_motions_of(before, used), then)
+    return now / then if np.any(known) else None
 
 
 def _fault(mistake: Hypothesis, robot: Robot, since: float | None) -> str:

@@ -134,24 +134,25 @@ def _since(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]) -
     if not before:
         return factors
     then = _factors(arm, before)
-    known = knows(arm, before)
+    known = (then > 0.0) & knows(arm, before, then)
     return np.asarray(np.where(known, factors / np.where(known, then, 1.0), 0.0))
 
 
-def knows(arm: ArmModel, before: Sequence[Motion]) -> npt.NDArray[np.bool_]:
+def knows(
+    arm: ArmModel, before: Sequence[Motion], factors: FloatArray | float = 1.0
+) -> npt.NDArray[np.bool_]:
     """
     Tell of which joints a model is off by less than the torque of a baseline itself, (n,).
 
-    A factor between the two is allowed for. Rows at rest count: friction holds a joint with any
+    Factors between the two are allowed for. Rows at rest count: friction holds a joint with any
     torque up to that of its motion, and no more. A motion that does not determine a model shows
     its errors there.
 
     """
-    then = _factors(arm, before)
     moves, expected, measured = _torques(arm, before)
-    off = np.mean(np.square(measured - then * expected), axis=0)
+    off = np.mean(np.square(measured - factors * expected), axis=0)
     size = np.mean(np.square(measured), axis=0, where=moves)
-    return np.asarray((then > 0.0) & (off < size))
+    return np.asarray(off < size)
 
 
 def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:
