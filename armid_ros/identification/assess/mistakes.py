@@ -213,7 +213,9 @@ def _best(
     believed = [
         row
         for row in rows
-        if row.surplus >= 1.0 and 100.0 * row.after.whole(robot) < LIMITS.unusable
+        if row.surplus >= 1.0
+        and 100.0 * row.after.whole(robot) < LIMITS.unusable
+        and before.of_data(row.after) >= 1.0  # not only a body that is nearer
     ]
     if not believed:
         return None

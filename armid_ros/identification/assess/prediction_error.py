@@ -72,8 +72,11 @@ class PredictionError:
         floor and above the torque itself count as that much.
 
         """
-        ratio = self._counted() / better._counted()
-        return float(np.prod(ratio) * np.exp((self.off - better.off) / (2.0 * FREEDOM)))
+        return self.of_data(better) * float(np.exp((self.off - better.off) / (2.0 * FREEDOM)))
+
+    def of_data(self, better: PredictionError) -> float:
+        """Return that factor without the likelihood of the bodies."""
+        return float(np.prod(self._counted() / better._counted()))
 
     def least(self, other: PredictionError) -> PredictionError:
         """Return the smaller error of every joint."""
