@@ -394,7 +394,7 @@ def _excesses(
         left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
         parts.append(unseen)
     if before is not None:
-        left += [for_a_second(arm, part, before, settings) for part in parts]
+        left += [for_a_second(arm, part, before, asked.arm, settings) for part in parts]
     if settings.partner is not None:
         return left, []
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]

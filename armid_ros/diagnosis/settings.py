@@ -32,8 +32,8 @@ class Thresholds:
     tie : float
         Twice the share of the same by which it has to be ahead as well; share of a simpler cause,
         in squares, that what contains it leaves at most, that a cause may lose at the bound of a
-        value, and of a cause in all recordings that one of them has to show to tell when it
-        changed.
+        value, of what names make in a second that they may leave, and of a cause in all recordings
+        that one of them has to show to tell when it changed.
     far : float
         Lead over its own share that excludes another one however few blocks show it, and that
         a link, which never changes, or a load of one that is not at the end of the arm has to have

@@ -171,20 +171,28 @@ def held(
 
 
 def for_a_second(
-    arm: ArmModel, evidence: Evidence, before: Baseline, settings: DiagnosisSettings
+    arm: ArmModel,
+    evidence: Evidence,
+    before: Baseline,
+    given: ArmModel,
+    settings: DiagnosisSettings,
 ) -> Excess:
     """
     Return the most that any second leaves over the most that it may.
 
     What comes and goes is little of a whole recording. Squares may be larger on motions that were
-    not used, and by as much again in the worst second of such a motion.
+    not used, and by as much again in the worst second of such a motion. What a model has more than
+    the given one is not exact to less than a share (`tie`) of its squares.
 
     """
-    most = settings.thresholds.other_motion * settings.thresholds.predicted
+    thresholds, left = settings.thresholds, evidence.residuals(arm)
+    most = thresholds.other_motion * thresholds.predicted
     then = _worst_second(before.data, before.residual, (before.misfit,) * len(before.data))
-    now = _worst_second(evidence.data, evidence.residuals(arm), evidence.sigma)
+    now = _worst_second(evidence.data, left, evidence.sigma)
+    pairs = zip(evidence.residuals(given), left, strict=True)
+    made = _worst_second(evidence.data, [had - has for had, has in pairs], evidence.sigma)
     limit = np.where(then > 0.0, most * then, np.inf) + evidence.matters(settings)
-    return Excess(now / limit, 'for a second')
+    return Excess(now / (limit + thresholds.tie * made), 'for a second')
 
 
 def _worst_second(
