@@ -7,20 +7,20 @@ Measured torque is that of a model, and a function of the state that the model l
 (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). The function belongs to the
 arm: it was there before and is there now, so that other motions, which visit other states, have
 another misfit without anything having changed. Here it is a function of position plus one of
-velocity plus friction in proportion to the load in each joint, fitted to the recordings of both
-days jointly with whatever is tried.
+velocity plus friction that nobody asked for, which goes with the load, in each joint, fitted to
+the recordings of both days jointly with whatever is tried.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.effects import Action, Effect, Quantity
+from armid_ros.effects import Action, Effect, merge_actions, Quantity
 from armid_ros.effects.base import Arm
-from armid_ros.effects.hysteresis import LoadDependentFriction
+from armid_ros.effects.catalogue import UNASKED_FRICTION
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -32,37 +32,40 @@ _POSITIONS = 4
 #: a joint is slow.
 _SPEEDS = (0.03, 0.25, 1.0)
 _KNOTS = _POSITIONS + 2 * len(_SPEEDS)
-#: Functions of a joint: of position, of velocity, and friction by load.
-_FUNCTIONS = 3
+#: Functions of a joint: of position, of velocity, and further friction.
+_FUNCTIONS = 2 + len(UNASKED_FRICTION)
 
 
 @dataclass(frozen=True)
 class Discrepancy(Effect):
     """
-    Torque of each joint as a function of its position, one of its velocity, and friction by load.
+    Torque of each joint as a function of its position, one of its velocity, and further friction.
 
     Both functions are linear between knots and constant beyond them. Values are torques at the
-    knots, and friction at the usual load.
+    knots, and root mean square torques of friction.
 
     Attributes
     ----------
     position, velocity : tuple of tuple of float
         Knots of each joint [rad or m, rad/s or m/s].
     size : tuple of float
-        Root mean square torque of each joint as a rule, to which all three contribute alike [N m].
-    load : tuple of float
-        Root mean square load of each joint: what the rigid body takes [N m].
+        Root mean square torque of each joint as a rule, to which all of them contribute alike
+        [N m].
+    units : tuple of tuple of float
+        Root mean square torque of a unit of each law of friction, of each joint.
 
     """
 
     position: tuple[tuple[float, ...], ...] = ()
     velocity: tuple[tuple[float, ...], ...] = ()
     size: tuple[float, ...] = ()
-    load: tuple[float, ...] = ()
+    units: tuple[tuple[float, ...], ...] = ()
 
     name = 'discrepancy'
-    summary = 'what the model leaves of any motion, over position, velocity and load'
-    quantities = tuple(Quantity(f'discrepancy_{k}', 'N m') for k in range(_KNOTS + 1))
+    summary = 'what the model leaves of any motion, over position and velocity, and by friction'
+    quantities = tuple(
+        Quantity(f'discrepancy_{k}', 'N m') for k in range(_KNOTS + len(UNASKED_FRICTION))
+    )
     learned = True
     smooth = True
 
@@ -78,39 +81,43 @@ class Discrepancy(Effect):
         size : ndarray, shape (n,)
             Root mean square torque as a rule [N m].
         arm : Arm
-            Gives the load.
+            Gives the load that friction goes with.
 
         """
         q = np.concatenate([part.at_rows.q for part in data])
         top = np.max([np.abs(part.at_rows.dq).max(axis=0) for part in data], axis=0)
-        load = np.concatenate([arm.load(part.at_rows) for part in data])
-        usual = np.sqrt(np.mean(load**2, axis=0))
+        motions = [part.at_rows for part in data]
+        units = [
+            np.sqrt(np.mean(np.concatenate([_own(law, m, arm) for m in motions]) ** 2, axis=0))
+            for law in _laws(data[0].motion.joints)
+        ]
         sides = np.array([*(-share for share in reversed(_SPEEDS)), *_SPEEDS])
         return cls(
             data[0].motion.joints,
             position=_rows(np.linspace(q.min(axis=0), q.max(axis=0), _POSITIONS, axis=1)),
             velocity=_rows(np.outer(top, sides)),
             size=tuple(size.tolist()),
-            load=tuple(np.where(usual > 0.0, usual, 1.0).tolist()),
+            units=_rows(np.where(np.array(units) > 0.0, units, 1.0)),
         )
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque of a unit at each knot and at the usual load, shape (N, n, P)."""
+        """Return the torque of a unit at each knot, and of friction, shape (N, n, P)."""
         link = arm.link_motion(motion)
-        friction = LoadDependentFriction(self.joints).columns(motion, arm)
-        by_load = np.diagonal(friction, axis1=1, axis2=2) / np.array(self.load)
-        return joint_columns(self, motion, *self._shares(link.q, link.dq), by_load)
+        pairs = zip(_laws(self.joints), np.array(self.units), strict=True)
+        friction = [_own(law, motion, arm) / unit for law, unit in pairs]
+        return joint_columns(self, motion, *self._shares(link.q, link.dq), *friction)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque of all functions."""
         whole = scatter(self, values, arm.robot)
-        at_knots, by_load = whole[:-1], whole[-1] / np.array(self.load)
-        friction = LoadDependentFriction(self.joints).action(by_load, arm)
+        at_knots, sizes = whole[:_KNOTS], whole[_KNOTS:] / np.array(self.units)
+        pairs = zip(_laws(self.joints), sizes, strict=True)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             return np.asarray(np.einsum('k...j,kj->...j', self._shares(q, dq), at_knots))
 
-        return replace(friction, link_torque=torque)
+        friction = [law.action(size, arm) for law, size in pairs]
+        return merge_actions(arm.robot, [Action(link_torque=torque), *friction])
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
         """Return the standard deviations of the prior, shape (P,)."""
@@ -124,6 +131,16 @@ class Discrepancy(Effect):
             for joint, (position, velocity) in enumerate(rows)
         ]
         return np.moveaxis(np.array(joints), 0, -1)
+
+
+def _laws(joints: tuple[str, ...]) -> list[Effect]:
+    """Return the friction that nobody asked for, of all joints."""
+    return [kind(joints) for kind in UNASKED_FRICTION]
+
+
+def _own(law: Effect, motion: Motion, arm: Arm) -> FloatArray:
+    """Return the torque of a unit of a law in each joint, shape (N, n)."""
+    return np.diagonal(law.columns(motion, arm), axis1=1, axis2=2)
 
 
 def _hats(x: FloatArray, knots: tuple[float, ...]) -> list[FloatArray]:
