@@ -110,13 +110,13 @@ class LivedTruth:
             felt=felt_directions(Chain.of(load_arm(spec.arm))),
         )
 
-    def among(self, named: Named) -> str:
-        """Return which name of a finding is right, its own before its rivals; empty if none."""
-        for name in (named.name, *(rival for rival, _ in named.rivals)):
+    def among(self, named: Named) -> int | None:
+        """Return which name of a finding is right, 0 for its own, then rivals; None if none is."""
+        for k, (name, joints) in enumerate(((named.name, named.joints), *named.rivals)):
             same = name in ALSO.get(self.name, ())
-            if name == self.name or (same and set(named.joints_of(name)) == set(self.joints)):
-                return name
-        return ''
+            if name == self.name or (same and set(joints) == set(self.joints)):
+                return k
+        return None
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class LivedJudged:
     def first(self) -> bool:
         """Whether the cause is named first, before its rivals."""
         headline = self.answer.headline
-        return bool(headline) and self.truth.among(headline[0]) == headline[0].name
+        return bool(headline) and self.truth.among(headline[0]) == 0
 
     @property
     def tied(self) -> bool:
@@ -152,18 +152,18 @@ class LivedJudged:
             return False
         leading = self.answer.headline[0]
         return self.first or (
-            len(leading.names) <= LARGEST_TIE and bool(self.truth.among(leading))
+            len(leading.rivals) < LARGEST_TIE and self.truth.among(leading) is not None
         )
 
     @property
     def anywhere(self) -> bool:
         """Whether the cause is in the headline at all."""
-        return any(self.truth.among(named) for named in self.answer.headline)
+        return any(self.truth.among(named) is not None for named in self.answer.headline)
 
     @property
     def too_many(self) -> int:
         """Names in the headline that nothing stands behind."""
-        true = [named for named in self.answer.headline if self.truth.among(named)]
+        true = [named for named in self.answer.headline if self.truth.among(named) is not None]
         mounting = self.truth.name == 'gravity'  # direction and magnitude are two names
         return len(self.answer.headline) - min(len(true), 2 if mounting else 1)
 
@@ -171,8 +171,8 @@ class LivedJudged:
     def placed(self) -> bool:
         """Whether the first of the headline is in the joints of the cause."""
         first = self.answer.headline[0]
-        name = self.truth.among(first) or first.name
-        return set(first.joints_of(name)) == set(self.truth.joints)
+        names = (first.joints, *(joints for _, joints in first.rivals))
+        return set(names[self.truth.among(first) or 0]) == set(self.truth.joints)
 
     @property
     def share_error(self) -> float:

@@ -133,6 +133,13 @@ def test_first_tied_and_elsewhere_are_told_apart():
         )
 
 
+def test_the_same_name_elsewhere_is_a_rival_of_its_own():
+    link = replace(COULOMB, name='link_inertia')
+    elsewhere = Named('payload', ('wrist',), rivals=(('payload', link.joints),))
+    one = LivedJudged(link, said(elsewhere))
+    assert (one.first, one.tied, one.placed) == (False, True, True)
+
+
 def test_joint_share_and_parameters_are_compared_with_the_truth():
     values = (('coulomb_torque', 'elbow', 2.2, 0.2),)
     good = Named('coulomb_friction', ('elbow',), (), values, share=0.77)
