@@ -358,7 +358,8 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
 def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence | None) -> Evidence:
     """Return the data in which the worst of what is left shows, of which the sentence speaks."""
     worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
-    return evidence if unseen is None or worst % 2 == 0 else unseen
+    parts = [evidence] if unseen is None else [evidence, unseen]
+    return parts[worst % len(parts)]  # each kind of excess is there once for each of them
 
 
 def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
@@ -386,9 +387,8 @@ def _excesses(
     rest = names.rest
     settings, evidence = asked.settings, rest.evidence
     more = settings.thresholds.predicted
-    usual = 1.0 if chosen.measured else more  # a misfit varies from motion to motion
     arm, before = rest.fitted.arm, asked.before
-    left = [excess_of(arm, _sure(evidence, chosen), settings, usual)]
+    left = [_of_whole(arm, evidence, chosen, settings)]
     parts, where = [evidence], 'recordings that were not used'
     if unseen is not None:
         left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
@@ -404,8 +404,15 @@ def _as_it_is(asked: _Asked, chosen: Chosen, explanation: Explanation) -> Excess
     """Return what the given model leaves; None if its rigid body is not fitted anew."""
     if not frees_body(explanation.base, explanation.given):
         return None
-    usual = 1.0 if chosen.measured else asked.settings.thresholds.predicted
-    return excess_of(asked.arm, _sure(explanation.evidence, chosen), asked.settings, usual)
+    return _of_whole(asked.arm, explanation.evidence, chosen, asked.settings)
+
+
+def _of_whole(
+    arm: ArmModel, evidence: Evidence, chosen: Chosen, settings: DiagnosisSettings
+) -> Excess:
+    """Return what an arm leaves of the data: a misfit varies from motion to motion."""
+    usual = 1.0 if chosen.measured else settings.thresholds.predicted
+    return excess_of(arm, _sure(evidence, chosen), settings, usual)
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:

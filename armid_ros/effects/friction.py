@@ -11,6 +11,7 @@ from typing import ClassVar
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
@@ -300,13 +301,9 @@ class ThermalChange(ThermalFriction):
         return joint_columns(self, motion, self._warm(motion.t, arm) * motion.dq, motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque."""
-        change, first = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray((first + change * self._warm(t, arm)) * dq)
-
-        return Action(torque=torque)
+        """Return what both do."""
+        both = self.named_as(values, arm)
+        return merge_actions(arm.robot, [part.action(own, arm) for part, own in both])
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return both."""

@@ -84,9 +84,9 @@ class Discrepancy(Effect):
             Gives the load that friction goes with.
 
         """
-        q = np.concatenate([part.at_rows.q for part in data])
-        top = np.max([np.abs(part.at_rows.dq).max(axis=0) for part in data], axis=0)
         motions = [part.at_rows for part in data]
+        q = np.concatenate([motion.q for motion in motions])
+        top = np.max([np.abs(motion.dq).max(axis=0) for motion in motions], axis=0)
         units = [
             np.sqrt(np.mean(np.concatenate([_own(law, m, arm) for m in motions]) ** 2, axis=0))
             for law in _laws(data[0].motion.joints)

@@ -220,8 +220,9 @@ def _best(
     if not believed:
         return None
     sure = believed
-    if near is not None:
-        sure = [row for row in believed if _beyond_bodies(row.hypothesis, near)]
+    likeliest = None if near is None else near(AsRecorded())
+    if near is not None and likeliest is not None:
+        sure = [r for r in believed if _beyond_bodies(r.hypothesis, near, likeliest[0])]
         believed = sure or believed
     first = max(believed, key=lambda row: row.surplus)
     as_good = {
@@ -234,7 +235,7 @@ def _best(
     return Mistake(likely, before, first.after, fitted, links=not sure)
 
 
-def _beyond_bodies(one: Hypothesis, near: Judge) -> bool:
+def _beyond_bodies(one: Hypothesis, near: Judge, as_recorded: PredictionError) -> bool:
     """
     Whether a change of the data explains what no body that the description may mean does.
 
@@ -244,10 +245,8 @@ def _beyond_bodies(one: Hypothesis, near: Judge) -> bool:
     """
     if one.of_masses:
         return True
-    as_recorded, put_right = near(AsRecorded()), near(one)
-    if as_recorded is None or put_right is None:
-        return True
-    return as_recorded[0].gain(put_right[0]) >= LIMITS.gain**one.values
+    put_right = near(one)
+    return put_right is None or as_recorded.gain(put_right[0]) >= LIMITS.gain**one.values
 
 
 class _Row(NamedTuple):
