@@ -43,8 +43,10 @@ all: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## set up .venv: ROS 2, armid_msgs,
 demo: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## identify the shipped arm on the moon, from excitation to figures in OUT
 	$(BIN)/armid demo --out $(OUT)
 
+# The longest test takes a minute; one that waits for ever says where, and is ended.
 RUN_TESTS = OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \
-	--durations=15 --numprocesses=auto --dist=loadfile
+	--durations=15 --numprocesses=auto --dist=loadfile --max-worker-restart=2 \
+	-o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
 test: lint  ## lint, types, layers, and the tests that a change usually breaks; five minutes on two cores
 	ARMID_FUZZ=50 $(RUN_TESTS) -m 'not slow and not real_data' $(PYTEST)

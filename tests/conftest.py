@@ -2,46 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every test may ask for: recordings of real machines, and a ROS 2 domain of its own."""
 
-import fcntl
+from contextlib import ExitStack
 import os
 from pathlib import Path
 import sys
-import tempfile
 
 import pytest
 
-ROS_DOMAINS = range(1, 102)  # above 101 the ports of a domain are those Linux gives out itself
-
-
-def claim_ros_domain():
-    """
-    Lock a ROS 2 domain id that no other test process of this machine has.
-
-    Returns
-    -------
-    tuple of int and file
-        The id, and the lock; it lasts until the file is closed, at the latest with the process.
-
-    """
-    folder = Path(tempfile.gettempdir(), 'armid_ros_domains')
-    folder.mkdir(mode=0o777, exist_ok=True)
-    for domain in ROS_DOMAINS:
-        lock = open(folder / str(domain), 'w')
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            lock.close()
-            continue
-        return domain, lock
-    raise pytest.UsageError(f'all {len(ROS_DOMAINS)} ROS 2 domains are in use by other tests')
-
 
 def pytest_configure(config):
-    """Keep ROS 2 to this process and its children, before anything imports rclpy."""
-    domain, config.ros_domain_lock = claim_ros_domain()
-    os.environ['ROS_DOMAIN_ID'] = str(domain)
+    """Keep ROS 2 to this process and its children, before anything makes a context."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.setdefault('AMENT_PREFIX_PATH', sys.prefix)
+    from armid_ros.nodes.running.domains import reserved_domain
+
+    config.ros_domain = ExitStack()
+    os.environ['ROS_DOMAIN_ID'] = str(config.ros_domain.enter_context(reserved_domain()))
+
+
+def pytest_unconfigure(config):
+    """Leave the domain to others."""
+    config.ros_domain.close()
 
 
 @pytest.fixture(scope='session', autouse=True)

@@ -4,8 +4,9 @@
 
 import errno
 import json
-import multiprocessing
 import os
+import subprocess
+import sys
 
 from armid_ros.errors import OutputError
 from armid_ros.files import json_text, result_folder, write_file
@@ -47,21 +48,23 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path, monkeypatch):
     assert (tmp_path / 'a.json').read_text() == 'old'
 
 
-def write_for_ever(folder, begun):
-    for k in range(10**9):
-        write_file(folder / 'a.json', json.dumps([k] * 20_000))
-        begun.set()
+WRITE_FOR_EVER = """
+import json, sys
+from armid_ros.files import write_file
+
+for k in range(10**9):
+    write_file(sys.argv[1], json.dumps([k] * 20_000))
+    print(k, flush=True)
+"""
 
 
 def test_a_writer_that_is_killed_leaves_a_whole_file(tmp_path):
-    context = multiprocessing.get_context('fork')
-    for _ in range(20):
-        begun = context.Event()
-        writer = context.Process(target=write_for_ever, args=(tmp_path, begun))
-        writer.start()
-        begun.wait()
-        writer.kill()
-        writer.join()
+    command = [sys.executable, '-c', WRITE_FOR_EVER, str(tmp_path / 'a.json')]
+    for round_ in range(10):
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writer:
+            while int(writer.stdout.readline()) < round_:
+                pass
+            writer.kill()
         assert len(json.loads((tmp_path / 'a.json').read_text())) == 20_000
 
 

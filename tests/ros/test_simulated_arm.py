@@ -199,6 +199,7 @@ def test_with_simulated_time_it_moves_exactly_as_far_as_the_clock(bench):
     bench.settle()
     for clock, samples in ((50.01, 1), (50.03, 3), (50.035, 3), (50.5, 50)):
         bench.tick(round(clock * SECOND))
+        bench.spin_until(lambda samples=samples: len(states) >= samples, 'joint states')
         bench.settle()
         assert len(states) == samples
         assert states[-1].header.stamp.nanosec == samples * SECOND // 100 or samples == 50

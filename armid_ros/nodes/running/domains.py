@@ -33,7 +33,7 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
         If all domains are taken.
 
     """
-    with _reserved_domain() if domain is None else nullcontext(domain) as chosen:
+    with reserved_domain() if domain is None else nullcontext(domain) as chosen:
         context = Context()
         with _localhost_only():
             context.init(args=[], domain_id=chosen)
@@ -58,7 +58,16 @@ def _localhost_only() -> Iterator[None]:
 
 
 @contextmanager
-def _reserved_domain() -> Iterator[int]:
+def reserved_domain() -> Iterator[int]:
+    """
+    Reserve a domain on this machine, for as long as the context is open or the process lives.
+
+    Raises
+    ------
+    ArmidError
+        If all domains are taken.
+
+    """
     first = os.getpid() % len(_DOMAINS)
     for shift in range(len(_DOMAINS)):
         domain = _DOMAINS[(first + shift) % len(_DOMAINS)]
