@@ -323,9 +323,9 @@ class FrictionLevel(Effect):
     """
     What several joints have of friction, changed by one factor, tau = k (Fv dq + Fc sign(dq)).
 
-    An arm that is warm has less of it everywhere, and one that stood in the cold more. A search
-    looks for one value; what it finds is fitted with a factor for each joint, as no two warm up
-    alike, and said as viscous_friction and coulomb_friction.
+    An arm that is warm has less of it everywhere, and one that stood in the cold more, above all
+    of viscous friction. A search looks for one value, of both or of the viscous part; it is fitted
+    with a factor for each joint, as no two warm up alike, and said as friction of its kinds.
     Source: Bittencourt and Gunnarsson, Static friction in a robot joint - modeling and
     identification of load and temperature effects, 2012.
 
@@ -420,7 +420,7 @@ def friction_level(
     effects: Iterable[tuple[Effect, FloatArray]], robot: Robot, library: Collection[str]
 ) -> tuple[FrictionOfJoints, ...]:
     """
-    Return what is to be looked for where effects with values give joints friction, or nothing.
+    Return what is to be looked for where effects with values give two joints friction or more.
 
     Parameters
     ----------
@@ -439,9 +439,11 @@ def friction_level(
         for level, kind in zip(levels, _PARTS, strict=True):
             if isinstance(effect, kind):
                 level += scatter(effect, values, robot)[0]
-    there = np.flatnonzero(levels.any(axis=0))
-    if len(there) < 2:
-        return ()
-    viscous, coulomb = (tuple(level[there].tolist()) for level in levels)
-    joints = tuple(robot.joints[k] for k in there)
-    return (FrictionOfJoints(FrictionLevel(joints, viscous=viscous, coulomb=coulomb)),)
+    found: list[FrictionOfJoints] = []
+    for some in (levels, levels * [[1.0], [0.0]])[: 2 if levels[1].any() else 1]:
+        there = np.flatnonzero(some.any(axis=0))
+        if len(there) >= 2:
+            joints = tuple(robot.joints[k] for k in there)
+            viscous, coulomb = (tuple(level[there].tolist()) for level in some)
+            found.append(FrictionOfJoints(FrictionLevel(joints, viscous=viscous, coulomb=coulomb)))
+    return tuple(found)

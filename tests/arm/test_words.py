@@ -42,7 +42,7 @@ def test_friction_of_all_joints_is_added_to_what_they_have(robot, motion, tmp_pa
     for name in ('viscous_friction', 'coulomb_friction'):
         arm = arm.with_effect(make_effect(name, robot), np.ones(robot.n_joints))
     pairs = zip(arm.effects, arm.values, strict=True)
-    (kind,) = friction_level(pairs, robot, list(CATALOGUE))
+    kind, _ = friction_level(pairs, robot, list(CATALOGUE))
     warm = arm.with_effect(kind.on(robot), np.array([-0.3]))
     save_model(tmp_path / 'model.yaml', warm, robot.name)
     back = load_model(tmp_path / 'model.yaml')

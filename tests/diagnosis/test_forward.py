@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Causes are taken one by one; a way that is gone twice is looked along once."""
 
+from dataclasses import replace
+
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search import explain
@@ -45,6 +47,29 @@ def test_the_cause_that_takes_most_is_taken_first(search, monkeypatch):
     assert taken(way) == [('viscous_friction', ('shoulder',)), ('joint_spring', ('elbow',))]
     assert len(looks) == 3
     assert way.first.ranking[0].gain > max(one.gain for one in way.last.look.ranking)
+
+
+def test_a_cause_that_another_one_beats_beside_the_rest_is_exchanged(search):
+    way = search.forward()
+    right, rest = way.taken
+    coulomb = next(
+        trial
+        for trial in right.step.ranking
+        if trial.candidate.key[:2] == ('coulomb_friction', ('shoulder',))
+    )
+    wrong = explain._of(replace(right.step, trial=coulomb), search.question)
+    again = search.exchanged(replace(way, taken=(wrong, rest)))
+    assert sorted(taken(again)) == sorted(taken(way))
+    assert again.first is way.first
+
+
+def test_the_rest_is_no_rival_of_a_cause(search):
+    way = search.forward()
+    right, rest = way.taken
+    beside = right._replace(step=replace(right.step, rivals=(rest.step.trial,)))
+    again = search.exchanged(replace(way, taken=(beside, rest)))
+    assert taken(again) == taken(way)
+    assert not again.taken[0].step.rivals
 
 
 def test_a_search_for_no_cause_takes_none(bench, search):

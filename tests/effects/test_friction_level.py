@@ -32,7 +32,7 @@ def arm(robot):
 
 @pytest.fixture(scope='module')
 def level(arm, robot):
-    (kind,) = friction_level(zip(arm.effects, arm.values, strict=True), robot, CATALOGUE)
+    kind, _ = friction_level(zip(arm.effects, arm.values, strict=True), robot, CATALOGUE)
     return kind.on(robot)
 
 
@@ -47,6 +47,24 @@ def test_its_column_is_the_friction_that_there_was(arm, level, motion, robot):
     friction = arm.torque(motion) - ArmModel(robot).torque(motion)
     assert level.joints == robot.joints[:4]
     np.testing.assert_allclose(level.columns(motion, arm)[:, :, 0], friction, atol=1e-12)
+
+
+def test_viscous_friction_alone_may_have_the_factor(arm, motion, robot):
+    """What the lubricant does in the cold: Coulomb friction hardly depends on temperature."""
+    _, kind = friction_level(zip(arm.effects, arm.values, strict=True), robot, CATALOGUE)
+    viscous = kind.on(robot)
+    assert viscous.joints == robot.joints[:3] and viscous.said_as == 'viscous_friction'
+    torque = viscous.columns(motion, arm)[:, :, 0]
+    np.testing.assert_allclose(torque[:, :3], [0.4, 0.1, 0.4] * motion.dq[:, :3], atol=1e-12)
+    assert not torque[:, 3:].any()
+    ((said, values),) = viscous.named_as(np.array([0.5]), arm)
+    assert said.name == 'viscous_friction'
+    np.testing.assert_allclose(values, [0.2, 0.05, 0.2])
+
+
+def test_there_is_one_factor_where_there_is_no_coulomb_friction(arm, robot):
+    pairs = list(zip(arm.effects, arm.values, strict=True))[:2]
+    assert len(friction_level(pairs, robot, CATALOGUE)) == 1
 
 
 def test_it_acts_as_it_is_said(arm, level, motion, robot):

@@ -46,7 +46,7 @@ def explain(
 ) -> Explanation:
     """Accept causes as long as any passes, then name the friction that matters, and prune."""
     search = Search(question, evidence, settings, baseline, unseen)
-    way = search.forward(start)
+    way = search.exchanged(search.forward(start))
     survey, last = way.first, None if way.last is None else way.last.look.survey
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     retrial = Retrial(question, evidence, settings)
@@ -147,7 +147,34 @@ class Search:
         """Accept causes in addition to those to start with as long as any passes."""
         if not self.question.most:
             return Way(tuple(start), None, None)
-        place = self.first_place(start)
+        return self._from(self.first_place(start), start)
+
+    def exchanged(self, way: Way) -> Way:
+        """
+        Ask anew for each cause but the last, beside those that were accepted after it.
+
+        The cause that is accepted first is compared with others while all the rest is unexplained:
+        one that takes a part of the rest as well is ahead of the right one, and causes of the rest
+        are its rivals. One cause is exchanged at the most.
+
+        """
+        taken = list(way.taken)
+        for k in range(len(taken) - 1):
+            assert way.first is not None
+            others = [*taken[:k], *taken[k + 1 :]]
+            step = self.first_place(others, way.first.total).look.step()
+            if step is None:
+                continue
+            if step.trial.candidate.key[:2] == taken[k].step.trial.candidate.key[:2]:
+                taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=step.rivals))
+                continue
+            start = [*others, _of(step, self.question)]
+            again = self._from(self.first_place(start, way.first.total), start)
+            return replace(again, first=way.first)
+        return replace(way, taken=tuple(taken))
+
+    def _from(self, place: Place, start: Sequence[Accepted]) -> Way:
+        """Accept causes from a place on as long as any passes."""
         first, steps = place.look.survey, [one.step for one in start]
         named, values = place.named, place.values
         for remaining in range(self.question.most, 0, -1):
@@ -163,10 +190,10 @@ class Search:
         rows = zip(named, steps, values, strict=True)
         return Way(tuple(Accepted(*row) for row in rows), first, place, place.current.change)
 
-    def first_place(self, start: Sequence[Accepted] = ()) -> Place:
-        """Fit the causes to start with, and look at all others."""
+    def first_place(self, start: Sequence[Accepted] = (), total: float | None = None) -> Place:
+        """Fit the causes to start with, and look at all others; see `Round.total`."""
         return self._fitted_place(
-            [one.named for one in start], [one.values for one in start], None
+            [one.named for one in start], [one.values for one in start], total
         )
 
     def in_place_of(self, friction: Sequence[Accepted], way: Way) -> list[Accepted]:
