@@ -28,8 +28,6 @@ import numpy as np
 
 Quantity = Literal['position', 'torque', 'position and torque']
 
-#: Times that torque may be late by [s]; the best is refined.
-DELAYS = (0.01, 0.02, 0.05, 0.1, 0.2)
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
@@ -203,9 +201,20 @@ class ZeroOff(Hypothesis):
 
 @dataclass(frozen=True)
 class LateTorque(Hypothesis):
-    """Torque comes later than the position that it belongs to, or earlier."""
+    """
+    Torque comes later than the position that it belongs to, or earlier.
+
+    Attributes
+    ----------
+    seconds : float
+        By how much [s]; negative for earlier.
+    half_width : float
+        Of the 95 % interval [s].
+
+    """
 
     seconds: float
+    half_width: float = 0.0
 
     def motion(self, motion: Motion) -> Motion:
         """
@@ -222,17 +231,12 @@ class LateTorque(Hypothesis):
         )
         return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
 
-    def nearby(self) -> Iterator[Hypothesis]:
-        """Yield times in steps of an eighth."""
-        for share in (0.75, 0.875, 1.125, 1.25):
-            yield LateTorque(share * self.seconds)
-
     def sentence(self, robot: Robot) -> str:
         """Say by how much."""
         side = 'later' if self.seconds > 0.0 else 'earlier'
         return (
             f'the torque seems to come about {1e3 * abs(self.seconds):.0f} ms {side} than the '
-            'position: stamp both alike'
+            f'position (+- {np.ceil(1e3 * self.half_width):.0f} ms): stamp both alike'
         )
 
 
@@ -385,10 +389,7 @@ class Faulty(Hypothesis):
 
 
 def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
-    """Yield what may be wrong with any recording of an arm."""
-    for delay in DELAYS:
-        yield LateTorque(delay)
-        yield LateTorque(-delay)
+    """Yield what may be wrong with any recording of an arm, but for delays and faulty samples."""
     yield OtherGravity()
     yield OtherUnit()
     if not np.all(robot.prismatic):

@@ -29,6 +29,7 @@ from armid_ros.identification.assess.hypotheses import (
     OtherUnit,
     WithoutBody,
 )
+from armid_ros.identification.assess.late_torque import late_torque
 from armid_ros.identification.assess.prediction_error import (
     described_error,
     nearest_error,
@@ -132,6 +133,8 @@ def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) ->
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
     tried = list(hypotheses(robot))
+    late = late_torque(robot, recording, used)
+    tried += [] if late is None else [late]
     faults = faulty_samples(robot, recording)
     if faults is not None:
         without = tuple(slow_motions(recording.select(faults.sound), used))

@@ -261,7 +261,8 @@ def test_torques_that_come_late_are_not_good(structure, run):
     late = replace(run, t=run.t[:-10], q=run.q[10:], tau=run.tau[:-10])
     found, _ = graded(structure, [late])
     assert found.word == 'poor'
-    assert 'about 100 ms later than the position' in found.reasons[0]
+    (said,) = re.findall(r'about (\d+) ms later than the position', found.reasons[0])
+    assert int(said) == pytest.approx(100, abs=3)
 
 
 @pytest.mark.parametrize('since', [0, 1000])

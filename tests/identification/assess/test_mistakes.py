@@ -3,6 +3,7 @@
 """Mistakes of recordings are found and named; recordings without any are left in peace."""
 
 from dataclasses import replace
+import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
@@ -12,6 +13,7 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     hypotheses,
     InUnit,
+    LateTorque,
     OtherGravity,
     OtherUnit,
 )
@@ -269,7 +271,10 @@ def test_exchanged_joints(robot, sound, pair, what):
 def test_torque_that_comes_late_or_early(robot, sound, milliseconds):
     said = mistake_in(robot, late(sound, round(1e-3 * milliseconds * RATE)))
     side = 'later' if milliseconds > 0 else 'earlier'
-    assert f'about {abs(milliseconds)} ms {side} than the position' in said
+    pattern = rf'about (\d+) ms {side} than the position \(\+- (\d+) ms\)'
+    ((found, half),) = re.findall(pattern, said)
+    assert int(found) == pytest.approx(abs(milliseconds), abs=int(half))
+    assert int(half) < 0.1 * abs(milliseconds)
 
 
 @pytest.mark.parametrize('factor', [0.08, 0.3, 5.0])
@@ -394,7 +399,7 @@ def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, soun
 
 
 def test_every_hypothesis_has_a_sentence_with_its_joints(robot):
-    for one in hypotheses(robot):
+    for one in (LateTorque(0.02, 0.004), *hypotheses(robot)):
         said = one.settled(np.ones(3)).sentence(robot)
         places = (getattr(one, name, None) for name in ('joint', 'first', 'second'))
         named = [robot.joints[place] for place in places if place is not None]
