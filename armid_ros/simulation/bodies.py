@@ -11,7 +11,8 @@ import numpy as np
 
 NO_BODY = (
     'the inertia matrix of the arm is not positive definite, so its rigid-body parameters and '
-    'rotor inertias are not those of bodies: correct them, or estimate physically consistent ones'
+    'rotor inertias are not those of bodies: if they were identified, identify with --physical, '
+    'which keeps every link a body; if they are described, correct the description'
 )
 
 

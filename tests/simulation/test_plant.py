@@ -171,7 +171,7 @@ def test_an_arm_cannot_begin_beyond_its_stops(pendulum) -> None:
 
 def test_bodies_that_cannot_be_are_refused(slider) -> None:
     robot = slider()
-    with pytest.raises(ModelError, match='not positive definite'):
+    with pytest.raises(ModelError, match=r'not positive definite.* identify with --physical'):
         Plant(ArmModel(robot.with_inertias(-robot.rigid_parameters)))
     with pytest.raises(ModelError, match='positive time'):
         Plant(ArmModel(robot), dt=0.0)
