@@ -345,7 +345,9 @@ class FrictionLevel(Effect):
     name = 'friction_level'
     summary = 'friction of all joints by one factor'
     shown_by = ViscousFriction.shown_by
-    look_at = ViscousFriction.look_at
+    look_at = (
+        'how warm it was and how long it had stood; then the grease and the seals'
+    )
     friction = True
     common = True
     holds_at_rest = True

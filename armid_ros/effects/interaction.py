@@ -199,7 +199,7 @@ class InterfaceSlack(Attached):
     name = 'interface_slack'
     summary = 'spring from a link to an anchor that pulls beyond a slack only'
     shown_by = 'the same motion at two tensions of the strap'
-    look_at = 'the straps, and how tight they are'
+    look_at = 'the strap, cable, table or fixture that may hold it, and how tight or near it is'
     external = True
     smooth = True
     quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)

@@ -128,8 +128,17 @@ def test_a_run_that_tells_the_names_is_the_only_recording_that_is_asked_for():
 
 def test_why_there_is_no_run_is_said_once():
     doubt = diagnosis('payload', ('wrist',), LINK, 'ambiguous')
-    steps = next_steps(doubt, None, 'there is not a next run: none of the motions tells them')
-    assert steps[2] == 'There is not a next run: none of the motions tells them.'
+    steps = next_steps(doubt, None, 'there is no next run: none of the motions tells them')
+    assert steps[2] == 'There is no next run: none of the motions tells them.'
+
+
+def test_names_that_are_one_cause_are_one_thing_to_look_at():
+    found = diagnosis('viscous_friction', ('wrist',))
+    both = replace(found.findings[0], look_at='how warm it was')
+    found.findings = both, replace(both, name='coulomb_friction')
+    first, *others = next_steps(found)
+    assert first == 'Look at wrist first: how warm it was.'
+    assert not any(step.startswith('Look') for step in others)
 
 
 def test_an_effect_of_ones_own_says_it_as_well():

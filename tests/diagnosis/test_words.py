@@ -15,6 +15,7 @@ from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
     Hiding,
+    names_and_places,
     not_repeating,
     percent,
     sentence,
@@ -187,6 +188,13 @@ def test_friction_of_many_joints_is_said_with_how_much_of_it_has_changed(bench):
     assert said(np.linspace(-0.3, -0.2, 5)).summary.startswith(
         'Viscous friction and coulomb friction in 5 joints (by -30 to -20 % of what it was) '
         'together explain 97 % of the gap.'
+    )
+    assert '(by -7 % of what it was)' in said(np.linspace(-0.072, -0.068, 5)).summary
+    group = [finding(one, np.ones(5)) for one in both]
+    where = 'joint_0, joint_1, joint_2, joint_3, joint_4'
+    assert names_and_places(group) == f'viscous friction and coulomb friction of {where}'
+    assert names_and_places([replace(group[0], joints=()), group[1]]) == (
+        f'viscous friction of the whole arm and coulomb friction of {where}'
     )
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
 from armid_ros.diagnosis.verdict.document import SCHEMA
-from armid_ros.diagnosis.verdict.words import share_in_words
+from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
@@ -234,8 +235,8 @@ def show(result: Diagnosis) -> None:
     """Print the sentence first, then the values, then the small print."""
     say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
     if result.findings:
-        for finding in result.findings:
-            say(_share(finding))
+        for group in by_cause(result.findings):
+            say(f'  {names_and_places(group)}: {_share(group)}')
         rows = [row for finding in result.findings for row in _rows(finding)]
         print_rows(rows, as_json=False, right=('value, 95 %',))
     if result.minor:
@@ -262,11 +263,10 @@ def _rows(finding: Finding) -> list[dict[str, str]]:
     ]
 
 
-def _share(finding: Finding) -> str:
-    """Say how much of the gap a cause is."""
-    where = ', '.join(finding.joints) or 'the whole arm'
-    name = finding.name.replace('_', ' ')
-    return f'  {name} of {where}: {share_in_words(finding, interval=True)}'
+def _share(group: Sequence[Finding]) -> str:
+    """Say how much of the gap a cause is, once where it has several names."""
+    share = share_in_words(group[0], interval=True)
+    return f'{share}, together' if len(group) > 1 else share
 
 
 def _minor(finding: Finding, share: str) -> dict[str, str]:

@@ -113,11 +113,11 @@ def make_extras(result: Diagnosis, case: DiagnosisCase, seed: int, tick: Tick) -
         extras = _learned(result, seed)
     arm = result.arm if extras.residual is None else extras.residual.arm
     if case.data.held_out and result.gap is not None:
-        found, why = _tried('a simulation', lambda: _simulated(arm, case, tick))
+        found, why = _tried('simulation', lambda: _simulated(arm, case, tick))
         simulated, left_out = found or ((), ())
         extras = replace(extras, forward=simulated, notes=(*extras.notes, *left_out, *why))
     tick(1.0, 'next run')
-    run, why = _tried('a next run', lambda: next_run(result, np.random.default_rng(seed)))
+    run, why = _tried('next run', lambda: next_run(result, np.random.default_rng(seed)))
     return replace(extras, next_run=run, no_run='; '.join(why))
 
 
@@ -126,7 +126,7 @@ def _learned(result: Diagnosis, seed: int) -> Extras:
     if result.verdict not in WORTH_A_MAP:
         said = result.verdict.replace('_', ' ')
         return Extras(notes=(f'nothing is learned where the verdict is {said}',))
-    found, why = _tried('a map', lambda: learn_residual(result, np.random.default_rng(seed)))
+    found, why = _tried('map', lambda: learn_residual(result, np.random.default_rng(seed)))
     if why:
         return Extras(notes=why)
     if found is None:
@@ -150,4 +150,4 @@ def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[st
     try:
         return make(), ()
     except Exception as error:  # whatever it is, the diagnosis itself stands
-        return None, (f'there is not {what}: {error or type(error).__name__}',)
+        return None, (f'there is no {what}: {error or type(error).__name__}',)

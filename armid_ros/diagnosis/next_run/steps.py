@@ -49,7 +49,8 @@ def next_steps(
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
-    steps = _first([text for finding in findings for text in _looks(finding, diagnosis)])
+    looks = [_looks(finding, diagnosis) for finding in findings]
+    steps = _first(list(dict.fromkeys(text for one in looks for text in one)))
     if verdict == 'bad_data':
         steps.append('Correct the data, or the description, and diagnose again.')
     if verdict in ('unknown', 'partial'):
@@ -111,7 +112,7 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
     steps = []
     own = Rival(finding.name, finding.joints)
     for one in (own, *finding.rivals):
-        what = _look_at(one.name, diagnosis)
+        what = (finding.look_at if one is own else '') or _look_at(one.name, diagnosis)
         if not what:
             continue
         where = ', '.join(one.joints) or 'the whole arm'

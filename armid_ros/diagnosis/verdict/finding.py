@@ -76,6 +76,8 @@ class Finding:
     added_to : tuple of float
         Values of the same parameters in the given model, which its values are added to; empty
         where none is known.
+    look_at : str
+        What to look at for the one cause that several names stand for, instead of what each says.
 
     """
 
@@ -96,6 +98,7 @@ class Finding:
     together: tuple[str, ...] = ()
     of_joint: tuple[str, float] = ('', 0.0)
     added_to: tuple[float, ...] = ()
+    look_at: str = ''
 
     @property
     def had(self) -> tuple[float, ...]:

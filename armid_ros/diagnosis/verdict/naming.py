@@ -86,6 +86,7 @@ def findings(
                 tuple(other for other in together if other != name),
                 _of_joint(explanation, indices, attribution.share(indices)),
                 tuple(had.get((row[0].name, row[0].joint), 0.0) for row in rows),
+                explanation.fitted.named[own[0]].effect.look_at if len(together) > 1 else '',
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))

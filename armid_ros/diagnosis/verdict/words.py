@@ -235,6 +235,15 @@ def _subjects(group: Sequence[Finding]) -> str:
     return ' and '.join([first, *(text[0].lower() + text[1:] for text in others)])
 
 
+def names_and_places(group: Sequence[Finding]) -> str:
+    """Return what names that are one cause are and where, all places once where they are alike."""
+    names = [one.name.replace('_', ' ') for one in group]
+    places = [', '.join(one.joints) or 'the whole arm' for one in group]
+    if len(set(places)) == 1:
+        return f'{" and ".join(names)} of {places[0]}'
+    return ' and '.join(f'{name} of {place}' for name, place in zip(names, places, strict=True))
+
+
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
     """Return findings, those together that are one cause and have their share in common."""
     groups: list[list[Finding]] = []
@@ -280,8 +289,9 @@ def _by_shares(finding: Finding) -> str:
     had = np.array(finding.had)
     if not len(had) or not np.all(had):
         return ''
-    ends = sorted(100.0 * np.array(finding.values) / had)
-    return f' (by {ends[0]:.0f} to {ends[-1]:.0f} % of what it was)'
+    ends = sorted(np.round(100.0 * np.array(finding.values) / had).tolist())
+    span = ' to '.join(dict.fromkeys(f'{end:z.0f}' for end in (ends[0], ends[-1])))
+    return f' (by {span} % of what it was)'
 
 
 def _values(finding: Finding) -> Iterator[str]:

@@ -182,6 +182,8 @@ def _cause(finding: Finding) -> str:
     rivals = others_in_words(finding)
     doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
     name, share = finding.name.replace('_', ' '), share_in_words(finding, interval=True)
+    if finding.together:
+        share += f', together with {" and ".join(finding.together).replace("_", " ")}'
     return f'{name}{where}{numbers}; explains {share}{doubt}'
 
 
