@@ -36,6 +36,8 @@ import numpy as np
 
 #: Verdicts with nothing to go on with, besides that on data that cannot be diagnosed.
 _OPEN = ('unknown', 'not_repeatable')
+#: What a verdict that nothing is there is worth.
+_NOT_SEEN = 'note: how large each effect has to be to be seen is in report.html'
 
 
 @dataclass(frozen=True)
@@ -244,6 +246,8 @@ def show(result: Diagnosis) -> None:
         share = 'share of the gap' if result.findings else 'share of what is left'
         rows = [_minor(finding, share) for finding in result.minor]
         print_rows(rows, as_json=False, right=(share, 'p'))
+    if result.verdict == 'consistent':
+        say(_NOT_SEEN)
     for note in result.notes:
         say(f'note: {note}')
 
