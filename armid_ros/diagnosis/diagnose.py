@@ -30,7 +30,7 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.attribution import attribute, Names
+from armid_ros.diagnosis.verdict.attribution import Names
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
     blind_joints,
@@ -40,11 +40,12 @@ from armid_ros.diagnosis.verdict.gap import (
     held,
     hiding,
     measure_gap,
+    not_repeating,
     places_held,
 )
-from armid_ros.diagnosis.verdict.naming import findings, small_print
+from armid_ros.diagnosis.verdict.naming import findings, not_named
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
-from armid_ros.diagnosis.verdict.words import decide, not_repeating, suspicion, Verdict
+from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.identification.assess.grade_limits import LIMITS
@@ -244,7 +245,7 @@ class _Asked:
     ) -> _Asked:
         """Return the same, with a doubt of what was named, or of the model where nothing was."""
         doubt = self.doubt or (doubt_of_names(found) if self.before else '')
-        if not (doubt or found or as_it_is is None):
+        if not (doubt or as_it_is is None):
             doubt = doubt_as_it_is(as_it_is.ratio, self.arm.robot, floor_in_words)
         return replace(self, doubt=doubt)
 
@@ -257,32 +258,33 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
-    measured = chosen.measured
     names = Names.of(replace(chosen, explanation=explanation), unseen, arm, settings)
     explanation, notes = names.stated, [*notes, *names.notes]
     if unseen is not None and not names.shares.predicted:
         notes.append(_HARDLY_SHOWN)
     found = findings(explanation, names.shares, arm, asked.rng)
-    as_it_is = _as_it_is(asked, chosen, explanation)
-    asked = asked.doubting(found, as_it_is, chosen.floor_in_words)
+    refitted = _as_it_is(asked, chosen, explanation)
+    as_it_is = _patched(asked, chosen, names, unseen) if found else refitted
     worse = _harmed(chosen, explanation, unseen, settings)
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
     left, resting = _excesses(asked, chosen, names, unseen)
-    minor, suspected = _not_named(explanation, arm)
+    open_gap = any(one.ratio.max() > 1.0 for one in (*left, *resting))
+    asked = asked.doubting(found, None if open_gap else as_it_is, chosen.floor_in_words)
+    unnamed = not_named(explanation, arm, settings)
     matters = settings.material * evidence.torque_rms
-    hides = None if measured else hiding(names.rest, settings)
+    hides = None if chosen.measured else hiding(names.rest, settings)
     blind = blind_joints(evidence, arm.robot.joints, hides)
     word = decide(
         found,
-        not_repeating(floors, arm, settings.thresholds, matters) if measured else (),
+        not_repeating(floors, arm, settings.thresholds, matters) if chosen.measured else (),
         [*left, *resting],
         arm,
-        NOISE if measured else chosen.floor_in_words,
+        NOISE if chosen.measured else chosen.floor_in_words,
         as_it_is,
-        minor,
+        unnamed,
         hides,
     )
-    remarks = _unpatched(found, worse) or [suspicion(one) for one in suspected]
+    remarks = _unpatched(found, worse)
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
     shown, open_in = unseen if names.shares.predicted else None, _shows(left, evidence, unseen)
@@ -292,7 +294,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         verdict=word.word,
         summary=' '.join([word.summary, *remarks, *_doubts(asked, chosen, word, blind)]),
         findings=found,
-        minor=minor,
+        minor=tuple(unnamed.minor),
         where=places or places_held(arm, resting),
         left=where_left(explanation, explanation.fitted.arm, open_in, settings),
         gap=measure_gap(explanation, shown),
@@ -301,26 +303,14 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
         data=tuple(evidence.data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
-        refitted=as_it_is is not None,
+        refitted=refitted is not None,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
         doubt=asked.doubt,
-        suspected=suspected,
+        suspected=tuple(unnamed.suspected),
         blind=blind,
     )
-
-
-def _not_named(
-    explanation: Explanation, arm: ArmModel
-) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
-    """Return the small print, and where nothing is named the cause that is suspected."""
-    total = max(float(attribute(explanation, None).whole.sum()), 1e-300)
-    survey, small = explanation.survey, sorted(explanation.minor, key=lambda trial: -trial.gain)
-    tried = 1 if survey is None else survey.tried
-    may_be = () if survey is None or survey.suspected is None else (survey.suspected,)
-    suspected = () if explanation.steps else small_print(may_be, total, tried, arm)
-    return small_print(small, total, tried, arm), suspected
 
 
 def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
@@ -398,6 +388,13 @@ def _excesses(
     if settings.partner is not None:
         return left, []
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
+
+
+def _patched(asked: _Asked, chosen: Chosen, names: Names, unseen: Evidence | None) -> Excess:
+    """Return what the patched model leaves, whose body may be as it was given."""
+    each, _ = _excesses(asked, chosen, replace(names, rest=names.stated), unseen)
+    whole = each[: 1 + (unseen is not None)]
+    return Excess(np.max([one.ratio for one in whole], axis=0), '')
 
 
 def _as_it_is(asked: _Asked, chosen: Chosen, explanation: Explanation) -> Excess | None:

@@ -71,13 +71,15 @@ def doubt_of_names(findings: Sequence[Finding]) -> str:
 
 
 def doubt_as_it_is(excess: FloatArray, robot: Robot, floor_in_words: str) -> str:
-    """Say that a model leaves more than a floor can be, by loss over limit, (n,), or nothing."""
-    worst = int(np.argmax(excess))
+    """Say that a body as it was leaves more than a floor can be; '' where it does not."""
+    worst, *others = np.argsort(-excess)
     if excess[worst] <= 1.0:
         return ''
+    too = ', '.join(robot.joints[k] for k in others if excess[k] > 1.0)
     return (
-        f'As it is, the error of {robot.joints[worst]} is {larger(np.sqrt(excess[worst]))} '
-        f'{floor_in_words} can be.'
+        f'Without such a fit, the error of {robot.joints[worst]} is '
+        f'{larger(np.sqrt(excess[worst]))} {floor_in_words} can be'
+        f'{f", and that of {too} is too large as well" if too else ""}.'
     )
 
 

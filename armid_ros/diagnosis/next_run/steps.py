@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
 from armid_ros.diagnosis.verdict.naming import on_one_link, shown_best, two_names
-from armid_ros.diagnosis.verdict.words import as_sure
+from armid_ros.diagnosis.verdict.words import as_sure, by_cause, names_and_places
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
 
@@ -54,7 +54,7 @@ def next_steps(
     if verdict == 'bad_data':
         steps.append('Correct the data, or the description, and diagnose again.')
     if verdict in ('unknown', 'partial'):
-        steps += [f'Look at {w.joint}: what is left lives {w.signature}.' for w in diagnosis.left]
+        steps += [f'Look at {w.joint}: what is left is {w.signature}.' for w in diagnosis.left]
     if verdict == 'not_repeatable':
         steps.append('Keep people and loose parts away from the arm, and record again.')
     if run is not None:
@@ -62,7 +62,7 @@ def next_steps(
     elif no_run:
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
-    steps += [_more(one) for one in diagnosis.suspected]
+    steps += [_more(group) for group in by_cause(diagnosis.suspected)]
     unseen = _not_checked(diagnosis)
     if unseen:
         steps += unseen
@@ -92,12 +92,11 @@ def _not_checked(diagnosis: Diagnosis) -> list[str]:
     return steps
 
 
-def _more(finding: Finding) -> str:
+def _more(group: Sequence[Finding]) -> str:
     """Say how to learn whether a cause is there that recordings hardly tell."""
-    where = f' in {", ".join(finding.joints)}' if finding.joints else ''
     return (
         'Record three more motions, and diagnose all recordings together: that tells whether '
-        f'{finding.name.replace("_", " ")}{where} has changed.'
+        f'{names_and_places(group)} changed.'
     )
 
 

@@ -16,13 +16,14 @@ a brake, or a contact.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.evidence import Evidence, NoiseFloor
 from armid_ros.diagnosis.data.trajectory import at_rest, REST_TIME, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.settings import DiagnosisSettings, Thresholds
 from armid_ros.diagnosis.verdict.finding import Gap, Overlay
 from armid_ros.diagnosis.verdict.where import Excess, Where
 from armid_ros.diagnosis.verdict.words import Hiding
@@ -42,11 +43,15 @@ _HELD = 3.0
 _SECOND = 1.0
 #: Share of the rows of such a time that have to say something.
 _TELLING = 0.25
-#: Words for a joint that is held, for a table, and for the end of a sentence.
+#: From so many recordings on, slow differences of periods that are small in each are tested in
+#: their mean.
+_SEVERAL = 3
+#: What has nearly all of its squares in this share of the seconds, at the most, comes and goes.
+_NEARLY, _SOME = 0.95, 0.5
+#: Words for a joint that is held, for a table, and for the beginning and the end of a sentence.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
-_BESIDE = (
-    'with friction, where it stands still or turns round: a stop, a brake or a contact does that'
-)
+_TURNING = 'where it stands still or turns round'
+_BESIDE = ' beside friction: a stop, a brake or a contact does that'
 
 
 def measure_gap(explanation: Explanation, unseen: Evidence | None) -> Gap:
@@ -131,8 +136,27 @@ def excess_of(
 ) -> Excess:
     """Return the loss that an arm leaves over so many times the limit up to which it is no gap."""
     residual = evidence.residuals(arm)
-    ratio = evidence.chi2_per_row(residual) / evidence.limits(residual, settings)
-    return Excess(ratio / more, f'in {where}')
+    ratio = evidence.chi2_per_row(residual) / evidence.limits(residual, settings) / more
+    worst = int(np.argmax(ratio))
+    return Excess(ratio, f'in {where}', _at_times(evidence, residual, worst))
+
+
+def _at_times(evidence: Evidence, residual: Sequence[FloatArray], joint: int) -> str:
+    """Say in which seconds of those in which a joint moves nearly all of a residual is, or ''."""
+    each: list[tuple[float, str]] = []
+    for part, own, unit in zip(evidence.data, residual, evidence.sigma, strict=True):
+        means, rows = _seconds(part, own, unit)
+        middles = range(rows // 2, len(means), rows)
+        each += [
+            (float(means[k, joint]), _time(part, k)) for k in middles if means[k, joint] > 0.0
+        ]
+    each.sort(reverse=True)
+    squares = np.cumsum([mean for mean, _ in each])
+    count = int(np.sum(squares < _NEARLY * squares[-1:])) + 1
+    if count > _SOME * len(each):
+        return ''
+    moves = f'{count} of the {len(each)} seconds in which it moves'
+    return f', nearly all of it in {moves}, the worst at {each[0][1]}'
 
 
 def held(
@@ -167,7 +191,7 @@ def held(
         unit = (before.misfit,) * len(before.data)
         then = standing(given, Evidence(before.data, unit, unit), before.residual, surely)
         excess = excess / np.maximum(settings.thresholds.same_fit * then, 1.0)
-    return Excess(excess, _BESIDE)
+    return Excess(excess, _TURNING, _BESIDE)
 
 
 def for_a_second(
@@ -187,29 +211,44 @@ def for_a_second(
     """
     thresholds, left = settings.thresholds, evidence.residuals(arm)
     most = thresholds.other_motion * thresholds.predicted
-    then = _worst_second(before.data, before.residual, (before.misfit,) * len(before.data))
-    now = _worst_second(evidence.data, left, evidence.sigma)
+    then, _ = _worst_second(before.data, before.residual, (before.misfit,) * len(before.data))
+    now, times = _worst_second(evidence.data, left, evidence.sigma)
     pairs = zip(evidence.residuals(given), left, strict=True)
-    made = _worst_second(evidence.data, [had - has for had, has in pairs], evidence.sigma)
+    made, _ = _worst_second(evidence.data, [had - has for had, has in pairs], evidence.sigma)
     limit = np.where(then > 0.0, most * then, np.inf) + evidence.matters(settings)
-    return Excess(now / (limit + thresholds.tie * made), 'for a second')
+    ratio = now / (limit + thresholds.tie * made)
+    return Excess(ratio, f'in the second at {times[int(np.argmax(ratio))]}')
 
 
 def _worst_second(
     data: Sequence[Trajectory], residual: Sequence[FloatArray], sigma: Sequence[FloatArray]
-) -> FloatArray:
-    """Return the largest mean square over the unit of any second, of each joint, (n,)."""
+) -> tuple[FloatArray, list[str]]:
+    """Return the largest mean square of any second over the unit, (n,), and its middle."""
     worst = np.zeros(residual[0].shape[1])
+    times = [''] * len(worst)
     for part, own, unit in zip(data, residual, sigma, strict=True):
-        rows = max(round(_SECOND / float(part.t[1] - part.t[0])), 1)
-        told = part.informative.astype(float)
-        share, squares = (
-            uniform_filter1d(x, rows, axis=0, mode='constant')
-            for x in (told, told * (own / unit) ** 2)
-        )
-        means = np.where(share > _TELLING, squares / np.maximum(share, _TELLING), 0.0)
-        worst = np.maximum(worst, means.max(axis=0))
-    return worst
+        means, _ = _seconds(part, own, unit)
+        at, largest = means.argmax(axis=0), means.max(axis=0)
+        for joint in np.flatnonzero(largest > worst):
+            times[joint] = _time(part, int(at[joint]))
+        worst = np.maximum(worst, largest)
+    return worst, times
+
+
+def _seconds(part: Trajectory, own: FloatArray, unit: FloatArray) -> tuple[FloatArray, int]:
+    """Return the mean square over the unit of the second around each row, and its rows."""
+    rows = max(round(_SECOND / float(part.t[1] - part.t[0])), 1)
+    told = part.informative.astype(float)
+    share, squares = (
+        uniform_filter1d(x, rows, axis=0, mode='constant')
+        for x in (told, told * (own / unit) ** 2)
+    )
+    return np.where(share > _TELLING, squares / np.maximum(share, _TELLING), 0.0), rows
+
+
+def _time(part: Trajectory, row: int) -> str:
+    """Return the time of a row, in words."""
+    return f'{part.t[row]:.1f} s of {Path(part.source).name}'
 
 
 def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
@@ -274,3 +313,36 @@ def blind_joints(
     hidden = evidence.count == 0 if hides is None else (evidence.count == 0) | (hides.change > 1.0)
     still = at_rest(evidence.data, joints)
     return tuple(j for j, one in zip(joints, hidden, strict=True) if one and j not in still)
+
+
+def not_repeating(
+    floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds, least: FloatArray
+) -> list[str]:
+    """
+    Return the joints that differ between equal periods, slowly and by as much as matters.
+
+    Parameters
+    ----------
+    floors : sequence of NoiseFloor
+        Noise of the recordings.
+    arm : ArmModel
+        Gives the joints.
+    thresholds : Thresholds
+        From which power at low frequency, over that at high frequency, periods do not repeat.
+    least : ndarray, shape (n,)
+        Torque of each joint that matters [N m].
+
+    """
+    known = [
+        np.where(floor.slow > least, floor.structure, 1.0)
+        for floor in floors
+        if floor.period is not None
+    ]
+    if not known:
+        return []
+    odd_ones = [structure >= thresholds.one_period for structure in known]
+    often = np.sum(odd_ones, axis=0) >= max(1, len(known) / 2)
+    if len(known) >= _SEVERAL:
+        mean = np.exp(np.mean(np.log(known), axis=0))
+        often = often | (mean > thresholds.one_period_on_average)
+    return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]

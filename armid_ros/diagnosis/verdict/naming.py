@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.trial import Named, Step, Trial
-from armid_ros.diagnosis.verdict.attribution import Attribution
+from armid_ros.diagnosis.search.trial import Named, Step, Survey, Trial
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
+from armid_ros.diagnosis.verdict.words import Unnamed
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
@@ -48,7 +50,7 @@ def findings(
 
     """
     said = _in_words(explanation, arm)
-    taken = _without_later(explanation.steps)
+    taken = without_later(explanation.steps)
     given = zip(explanation.given.parameters, explanation.given.theta.tolist(), strict=True)
     had = {(parameter.name, parameter.joint): value for parameter, value in given}
     merged: dict[str, list[int]] = {}
@@ -144,6 +146,40 @@ def small_print(
     return tuple(result)
 
 
+def not_named(explanation: Explanation, arm: ArmModel, settings: DiagnosisSettings) -> Unnamed:
+    """Return the small print, and where nothing is named what may have changed."""
+    total = max(float(attribute(explanation, None).whole.sum()), 1e-300)
+    survey, small = explanation.survey, sorted(explanation.minor, key=lambda trial: -trial.gain)
+    minor = small_print(small, total, 1 if survey is None else survey.tried, arm)
+    if survey is None or explanation.steps:
+        return Unnamed(minor)
+    may_be = () if survey.suspected is None else (survey.suspected,)
+    first = () if explanation.baseline is None else survey.ranking[:1]
+    suspected, unproven = (_as_looked_at(some, survey, arm) for some in (may_be, first))
+    limits = settings.thresholds
+    large = [one for one in unproven if one.share > limits.headline and one.p < limits.error_rate]
+    return Unnamed(minor, suspected, large)
+
+
+def _as_looked_at(trials: Sequence[Trial], survey: Survey, arm: ArmModel) -> list[Finding]:
+    """Return findings of causes of the first look, one for each name that a cause has."""
+    result: list[Finding] = []
+    for trial in trials:
+        effect = trial.candidate.effect
+        words = effect.named_as(np.ones(len(effect.parameters(arm.robot))), arm)
+        names = [part.name for part, _ in words]
+        for one in small_print([trial], max(survey.total, 1e-300), survey.tried, arm):
+            result += (
+                [one]
+                if len(words) == 1
+                else [
+                    replace(one, name=name, joints=part.joints, together=tuple({*names} - {name}))
+                    for name, (part, _) in zip(names, words, strict=True)
+                ]
+            )
+    return result
+
+
 def _can_be(trial: Trial, arm: ArmModel) -> bool:
     """
     Return whether values are within their bounds, where they exclude zero.
@@ -228,7 +264,7 @@ def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
     return tuple(ties[joint] for joint in joints if joint in ties)
 
 
-def _without_later(steps: Sequence[Step]) -> list[Step]:
+def without_later(steps: Sequence[Step]) -> list[Step]:
     """
     Return steps without rivals that are a name accepted later, or a rival of one.
 

@@ -90,11 +90,14 @@ class Excess:
         Loss over the loss up to which there is no gap; above one there is a gap.
     where : str
         The data that show it, for a sentence.
+    more : str
+        What ends the sentence: when it is there, or what it is compared with as well.
 
     """
 
     ratio: FloatArray
     where: str
+    more: str = ''
 
 
 def where_it_is(
@@ -205,22 +208,22 @@ def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
 def _in_words(axes: Sequence[Axis]) -> str:
     best = axes[0]
     if best.share < _TELLING:
-        return 'along no single quantity of the joint: fast in time, or of several joints'
+        return 'no function of one quantity of the joint: fast in time, or of several joints'
     peak = int(np.argmax(np.abs(best.means)))
     line = np.polyfit(best.centres, best.means, 1)
     straight = np.polyval(line, best.centres)
     size = float(np.sum(best.means**2))
     share = f'{100 * best.share:.0f} % of its power'
     if np.sum((best.means - best.means.mean()) ** 2) < _CURVED * size:
-        return f'in a constant ({share})'
+        return f'constant ({share})'
     if np.sum((best.means - straight) ** 2) < _CURVED * size:
         slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
         through_zero = np.sum((best.means - slope * best.centres) ** 2) < _CURVED * size
-        how = 'in proportion to' if through_zero else 'along a straight line over'
+        how = 'in proportion to' if through_zero else 'linear in'
         return f'{how} {best.name} ({share})'
     if best.name == 'velocity' and _jumps(best):
         return f'a jump with the direction of motion ({share})'
-    return f'over {best.name}, most at {best.centres[peak]:.3g} {best.unit} ({share})'
+    return f'a function of {best.name}, largest at {best.centres[peak]:.3g} {best.unit} ({share})'
 
 
 def _jumps(axis: Axis) -> bool:

@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import NoiseFloor
-from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, SAID
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.effects import CATALOGUE, Shape
@@ -23,9 +21,6 @@ import numpy as np
 Word = Literal[
     'consistent', 'named', 'ambiguous', 'partial', 'unknown', 'not_repeatable', 'bad_data'
 ]
-#: From so many recordings on, slow differences of periods that are small in each are tested in
-#: their mean.
-_SEVERAL = 3
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
 #: What a share is of, where something is named and where nothing is.
@@ -68,6 +63,27 @@ class Hiding:
     change: FloatArray
 
 
+@dataclass(frozen=True)
+class Unnamed:
+    """
+    What is not in the headline.
+
+    Attributes
+    ----------
+    minor : sequence of Finding
+        The small print, the most important first.
+    suspected : sequence of Finding
+        What more recordings may tell from what those of one day differ by.
+    unproven : sequence of Finding
+        What would take most of a gap, where nothing shows that it has changed.
+
+    """
+
+    minor: Sequence[Finding] = ()
+    suspected: Sequence[Finding] = ()
+    unproven: Sequence[Finding] = ()
+
+
 def decide(
     findings: Sequence[Finding],
     strange: Sequence[str],
@@ -75,7 +91,7 @@ def decide(
     arm: ArmModel,
     floor_in_words: str,
     as_it_is: Excess | None = None,
-    minor: Sequence[Finding] = (),
+    unnamed: Unnamed = Unnamed(),
     hides: Hiding | None = None,
 ) -> Verdict:
     """
@@ -94,9 +110,10 @@ def decide(
     floor_in_words : str
         The floor of the gap: noise, or a misfit.
     as_it_is : Excess or None
-        The same of the given model, where its body and known effects were fitted anew.
-    minor : sequence of Finding
-        The small print, the most important first.
+        The same of the model with its rigid body as it was, where ``left`` is with one that was
+        fitted: the patched model, or the given one where nothing is named.
+    unnamed : Unnamed
+        What is not in the headline.
     hides : Hiding or None
         What may hide beside the floor where that is a misfit.
 
@@ -107,37 +124,46 @@ def decide(
     if strange and (not findings or open_gap):
         return Verdict('not_repeatable', _strange(strange, findings))
     rest = (
-        f'the error of {joint} is {larger(np.sqrt(worst.ratio.max()))} '
-        f'{floor_in_words} can be {worst.where}'
+        f'the error of {joint} {worst.where} is {larger(np.sqrt(worst.ratio.max()))} '
+        f'{floor_in_words} can be{worst.more}'
     )
     if not findings:
         if open_gap:
-            text = f'Something is missing: {rest}. {_unexplained(minor)}'
-            return Verdict('unknown', text)
-        text = _consistent(floor_in_words, as_it_is, minor)
-        hidden = [] if hides is None else [_could_hide(hides, minor, arm.robot)]
-        return Verdict('consistent', ' '.join([text, *hidden]))
-    said = _sentences(findings)
+            return Verdict('unknown', f'Something is missing: {rest}. {_unexplained(unnamed)}')
+        text = _consistent(floor_in_words, as_it_is, unnamed.minor)
+        hidden = [] if hides is None else [_could_hide(hides, unnamed.minor, arm.robot)]
+        told = [suspicion(group) for group in by_cause(unnamed.suspected)]
+        return Verdict('consistent', ' '.join([text, *hidden, *told]))
+    said, tied = _sentences(findings), _rivals_in_words(findings)
     if open_gap:
-        return Verdict('partial', f'{said} There is more: {rest}.')
-    doubtful = [finding for finding in findings if finding.rivals]
-    if doubtful:
-        first = doubtful[0]
-        others = others_in_words(first)
-        one = 'it' if len(findings) == 1 else f'the {first.name.replace("_", " ")}'
-        return Verdict('ambiguous', f'{said} These data cannot tell {one} from {others}.')
-    return Verdict('named', f'{said} The rest is {floor_in_words}.')
+        return Verdict('partial', f'{said}{tied} There is more: {rest}.')
+    if tied:
+        return Verdict('ambiguous', f'{said}{tied}')
+    fitted = as_it_is is not None and as_it_is.ratio.max() > 1.0
+    once = ', once its rigid body and friction are fitted as well' if fitted else ''
+    return Verdict('named', f'{said} The rest is {floor_in_words}{once}.')
+
+
+def _rivals_in_words(findings: Sequence[Finding]) -> str:
+    """Say which names may be others, a sentence with a space before it; '' where none may."""
+    several = len(findings) > 1
+    pairs = [
+        f'{f"the {one.name}".replace("_", " ") if several else "it"} from {others_in_words(one)}'
+        for one in findings
+        if one.rivals
+    ]
+    return f' These data cannot tell {", nor ".join(pairs)}.' if pairs else ''
 
 
 def _consistent(floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding]) -> str:
     """Say that a model explains the data, what is fitted anew for that, and what is too small."""
     small = [sentence(one, _LEFT) for one in minor[:1] if one.share >= SAID]
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
-        text = f'The model explains the recordings: what is left is {floor_in_words}'
+        text = f'The model explains the recordings: what is left is no more than {floor_in_words}'
         return f'{text}, or too small to matter. {small[0]}' if small else f'{text}.'
     text = (
         'The model explains the recordings once its rigid body and friction are fitted: what is '
-        f'left is {floor_in_words}{", or too small to matter" if small else ""}.'
+        f'left is no more than {floor_in_words}{", or too small to matter" if small else ""}.'
     )
     return ' '.join([text, *small])
 
@@ -154,11 +180,13 @@ def _could_hide(hides: Hiding, minor: Sequence[Finding], robot: Robot) -> str:
     )
 
 
-def _unexplained(minor: Sequence[Finding]) -> str:
+def _unexplained(unnamed: Unnamed) -> str:
     """Say that no cause explains a gap, and what explains most of it where something does."""
-    if not minor or minor[0].share < SAID:
-        return 'Nothing in the catalogue explains it.'
-    return f'Nothing in the catalogue closes it. {sentence(minor[0])}'
+    if unnamed.minor and unnamed.minor[0].share >= SAID:
+        return f'Nothing in the catalogue closes it. {sentence(unnamed.minor[0])}'
+    told = [suspicion(group) for group in by_cause(unnamed.suspected)]
+    told = told or [_unproven(one) for one in unnamed.unproven[:1]]
+    return ' '.join(told or ['Nothing in the catalogue explains it.'])
 
 
 def larger(ratio: float) -> str:
@@ -173,11 +201,20 @@ def sentence(finding: Finding, of: str = _GAP) -> str:
     return f'{_subject(finding)} explains {share_in_words(finding, of=of)}.'
 
 
-def suspicion(finding: Finding) -> str:
+def suspicion(group: Sequence[Finding]) -> str:
     """Say what a cause would explain that the recordings do not tell from their own spread."""
     return (
-        f'{_subject(finding)} would explain {share_in_words(finding, of=_LEFT)}: these '
+        f'{_subjects(group)} would explain {share_in_words(group[0], of=_LEFT)}: these '
         'recordings hardly tell it from what those of one day differ by.'
+    )
+
+
+def _unproven(finding: Finding) -> str:
+    """Say what a cause would explain that may have been there before."""
+    cause = _subject(replace(finding, parameters=(), values=(), std=()))
+    return (
+        f'{cause} would explain {share_in_words(finding)}, and is not named, as the recordings '
+        'from before do not tell whether it was there then.'
     )
 
 
@@ -216,11 +253,8 @@ def _sentences(findings: Sequence[Finding]) -> str:
     """Say in sentences what was named; names that are one cause share one."""
     said: list[str] = []
     for group in by_cause(findings):
-        if len(group) == 1:
-            said.append(sentence(group[0]))
-        else:
-            subjects = _subjects(group)
-            said.append(f'{subjects} together explain {share_in_words(group[0])}.')
+        explain = 'explains' if len(group) == 1 else 'together explain'
+        said.append(f'{_subjects(group)} {explain} {share_in_words(group[0])}.')
         said += [text for one in group for text in _left_open(one)]
     return ' '.join(said)
 
@@ -236,12 +270,10 @@ def _subjects(group: Sequence[Finding]) -> str:
 
 
 def names_and_places(group: Sequence[Finding]) -> str:
-    """Return what names that are one cause are and where, all places once where they are alike."""
-    names = [one.name.replace('_', ' ') for one in group]
-    places = [', '.join(one.joints) or 'the whole arm' for one in group]
-    if len(set(places)) == 1:
-        return f'{" and ".join(names)} of {places[0]}'
-    return ' and '.join(f'{name} of {place}' for name, place in zip(names, places, strict=True))
+    """Return what names that are one cause are, and where."""
+    joints = dict.fromkeys(joint for one in group for joint in one.joints)
+    names = ' and '.join(one.name.replace('_', ' ') for one in group)
+    return f'{names} of {", ".join(joints) or "the whole arm"}'
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
@@ -371,39 +403,6 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
         degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
         return f'{text}, {degrees} degrees'
     return text
-
-
-def not_repeating(
-    floors: Sequence[NoiseFloor], arm: ArmModel, thresholds: Thresholds, least: FloatArray
-) -> list[str]:
-    """
-    Return the joints that differ between equal periods, slowly and by as much as matters.
-
-    Parameters
-    ----------
-    floors : sequence of NoiseFloor
-        Noise of the recordings.
-    arm : ArmModel
-        Gives the joints.
-    thresholds : Thresholds
-        From which power at low frequency, over that at high frequency, periods do not repeat.
-    least : ndarray, shape (n,)
-        Torque of each joint that matters [N m].
-
-    """
-    known = [
-        np.where(floor.slow > least, floor.structure, 1.0)
-        for floor in floors
-        if floor.period is not None
-    ]
-    if not known:
-        return []
-    odd_ones = [structure >= thresholds.one_period for structure in known]
-    often = np.sum(odd_ones, axis=0) >= max(1, len(known) / 2)
-    if len(known) >= _SEVERAL:
-        mean = np.exp(np.mean(np.log(known), axis=0))
-        often = often | (mean > thresholds.one_period_on_average)
-    return [joint for joint, odd in zip(arm.robot.joints, often, strict=True) if odd]
 
 
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:

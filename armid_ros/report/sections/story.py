@@ -9,7 +9,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.words import added, others_in_words, share_in_words
+from armid_ros.diagnosis.verdict.words import (
+    added,
+    by_cause,
+    names_and_places,
+    others_in_words,
+    share_in_words,
+)
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import (
@@ -129,7 +135,7 @@ class Story(Section):
     def _which(self) -> list[str]:
         causes = [_cause(finding) for finding in self.diagnosis.findings] or [
             'Nothing is named.',
-            *(_suspected(one) for one in self.diagnosis.suspected),
+            *(_suspected(group) for group in by_cause(self.diagnosis.suspected)),
         ]
         return causes + [_likeness(one) for one in self._maps if one.law is not None]
 
@@ -187,10 +193,9 @@ def _cause(finding: Finding) -> str:
     return f'{name}{where}{numbers}; explains {share}{doubt}'
 
 
-def _suspected(finding: Finding) -> str:
+def _suspected(group: Sequence[Finding]) -> str:
     """Return a cause that these recordings hardly tell."""
-    where = ', '.join(finding.joints) or 'the whole arm'
-    return f'Suspected: {finding.name.replace("_", " ")} of {where}; more recordings tell.'
+    return f'Suspected: {names_and_places(group)}; more recordings tell.'
 
 
 def share_of(diagnosis: Diagnosis) -> str:
