@@ -270,7 +270,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     left, resting = _excesses(asked, chosen, names, unseen)
     open_gap = any(one.ratio.max() > 1.0 for one in (*left, *resting))
     asked = asked.doubting(found, None if open_gap else as_it_is, chosen.floor_in_words)
-    unnamed = not_named(explanation, arm, settings)
+    unnamed = not_named(explanation, arm)
     matters = settings.material * evidence.torque_rms
     hides = None if chosen.measured else hiding(names.rest, settings)
     blind = blind_joints(evidence, arm.robot.joints, hides)

@@ -345,7 +345,7 @@ class FrictionLevel(Effect):
     name = 'friction_level'
     summary = 'friction of all joints by one factor'
     shown_by = ViscousFriction.shown_by
-    look_at = 'how warm it was and how long it had stood; then the grease and the seals'
+    look_at = 'how warm the arm was and how long it had stood; then the grease and the seals'
     friction = True
     common = True
     holds_at_rest = True

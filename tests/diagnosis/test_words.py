@@ -11,7 +11,13 @@ from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.gap import not_repeating
-from armid_ros.diagnosis.verdict.naming import _rivals, _separating, small_print, without_later
+from armid_ros.diagnosis.verdict.naming import (
+    _as_looked_at,
+    _rivals,
+    _separating,
+    small_print,
+    without_later,
+)
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
@@ -23,6 +29,7 @@ from armid_ros.diagnosis.verdict.words import (
     Unnamed,
 )
 from armid_ros.effects import CATALOGUE
+from armid_ros.effects.friction import FrictionLevel
 from armid_ros.estimate import ParameterName
 from armid_ros.report.sections.diagnosed import NamedParameters
 import numpy as np
@@ -265,7 +272,7 @@ def test_a_cause_that_may_have_been_there_before_is_said_though_it_is_not_named(
     stop = replace(small_finding(bench, 0.5), name='soft_limit')
     unnamed = Unnamed(unproven=[stop])
     assert decide((), (), [gap], bench.arm, FLOOR, None, unnamed).summary.endswith(
-        'can be. A soft limit in elbow would explain 50 % of the gap, and is not named, as the '
+        'is at its reading plus that) would explain 50 % of the gap, and is not named, as the '
         'recordings from before do not tell whether it was there then.'
     )
 
@@ -281,6 +288,25 @@ def test_what_is_suspected_is_said_once_for_all_of_its_names(bench):
     said = decide((), (), [closed], bench.arm, FLOOR, None, Unnamed(suspected=both)).summary
     assert said.count('would explain') == 1
     assert 'Viscous friction and coulomb friction in 5 joints would explain 70 % of what' in said
+
+
+def test_a_factor_of_all_friction_is_suspected_with_the_names_of_its_parts(bench):
+    effect = FrictionLevel(bench.robot.joints, viscous=(1.0, 1.0), coulomb=(0.5, 0.5))
+    trial = SimpleNamespace(
+        candidate=SimpleNamespace(effect=effect, kept=(0,)),
+        values=np.array([0.05]),
+        std=np.array([0.01]),
+        gains=np.array([1.0, 2.0]),
+        gain=3.0,
+        p=1e-6,
+    )
+    found = _as_looked_at(trial, SimpleNamespace(total=6.0, tried=1), bench.arm)
+    names = 'viscous_friction', 'coulomb_friction'
+    assert [(one.name, one.share, *one.together) for one in found] == [
+        (names[0], 0.5, names[1]),
+        (names[1], 0.5, names[0]),
+    ]
+    assert _as_looked_at(None, SimpleNamespace(total=6.0, tried=1), bench.arm) == ()
 
 
 def test_an_experiment_names_the_joints_of_both():

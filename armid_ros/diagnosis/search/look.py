@@ -147,7 +147,10 @@ def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
     ranking, there, closing, here = _examined(refined, here)
     passing = tuple(_passing(ranking, closing, here))
     suspected = next((trial for trial in passing if may_have_changed(trial, here)), None)
-    survey = replace(survey, there=tuple(there[:_SMALL_PRINT]), suspected=suspected)
+    first = ranking[0] if ranking and acceptable(ranking[0], here) else None
+    unproven = None if first is None or _changes([first], here) != [None] else first
+    there = there[:_SMALL_PRINT]
+    survey = replace(survey, there=tuple(there), suspected=suspected, unproven=unproven)
     return Look(survey, passing, closing, tuple(ranking), here)
 
 

@@ -327,6 +327,8 @@ class Survey:
         Friction and offsets without given values, which are fitted jointly with all candidates.
     suspected : Trial or None
         The best candidate that might be named if more recordings told that it has changed.
+    unproven : Trial or None
+        The best candidate of all, if it might be named and the baseline shows nothing of it.
 
     """
 
@@ -339,6 +341,7 @@ class Survey:
     there: tuple[Trial, ...] = ()
     nuisance: tuple[Trial, ...] = ()
     suspected: Trial | None = None
+    unproven: Trial | None = None
 
     def and_nuisance(self, trials: Sequence[Trial], least_visible: float) -> Survey:
         """Return the survey with trials of nuisance parameters."""

@@ -11,7 +11,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Named, Step, Survey, Trial
-from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.diagnosis.verdict.words import Unnamed
@@ -146,38 +145,32 @@ def small_print(
     return tuple(result)
 
 
-def not_named(explanation: Explanation, arm: ArmModel, settings: DiagnosisSettings) -> Unnamed:
+def not_named(explanation: Explanation, arm: ArmModel) -> Unnamed:
     """Return the small print, and where nothing is named what may have changed."""
     total = max(float(attribute(explanation, None).whole.sum()), 1e-300)
     survey, small = explanation.survey, sorted(explanation.minor, key=lambda trial: -trial.gain)
     minor = small_print(small, total, 1 if survey is None else survey.tried, arm)
     if survey is None or explanation.steps:
         return Unnamed(minor)
-    may_be = () if survey.suspected is None else (survey.suspected,)
-    first = () if explanation.baseline is None else survey.ranking[:1]
-    suspected, unproven = (_as_looked_at(some, survey, arm) for some in (may_be, first))
-    limits = settings.thresholds
-    large = [one for one in unproven if one.share > limits.headline and one.p < limits.error_rate]
-    return Unnamed(minor, suspected, large)
+    may_be = (_as_looked_at(one, survey, arm) for one in (survey.suspected, survey.unproven))
+    return Unnamed(minor, *may_be)
 
 
-def _as_looked_at(trials: Sequence[Trial], survey: Survey, arm: ArmModel) -> list[Finding]:
-    """Return findings of causes of the first look, one for each name that a cause has."""
-    result: list[Finding] = []
-    for trial in trials:
-        effect = trial.candidate.effect
-        words = effect.named_as(np.ones(len(effect.parameters(arm.robot))), arm)
-        names = [part.name for part, _ in words]
-        for one in small_print([trial], max(survey.total, 1e-300), survey.tried, arm):
-            result += (
-                [one]
-                if len(words) == 1
-                else [
-                    replace(one, name=name, joints=part.joints, together=tuple({*names} - {name}))
-                    for name, (part, _) in zip(names, words, strict=True)
-                ]
-            )
-    return result
+def _as_looked_at(trial: Trial | None, survey: Survey, arm: ArmModel) -> tuple[Finding, ...]:
+    """Return a cause of the first look as one finding for each of its names."""
+    if trial is None:
+        return ()
+    effect, total = trial.candidate.effect, max(survey.total, 1e-300)
+    words = effect.named_as(np.ones(len(effect.parameters(arm.robot))), arm)
+    found = small_print([trial], total, survey.tried, arm)
+    if len(words) == 1:
+        return found
+    names = {part.name for part, _ in words}
+    return tuple(
+        replace(one, name=part.name, joints=part.joints, together=tuple(names - {part.name}))
+        for one in found
+        for part, _ in words
+    )
 
 
 def _can_be(trial: Trial, arm: ArmModel) -> bool:

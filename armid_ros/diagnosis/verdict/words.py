@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.arm import ArmModel
@@ -75,7 +75,7 @@ class Unnamed:
     suspected : sequence of Finding
         What more recordings may tell from what those of one day differ by.
     unproven : sequence of Finding
-        What would take most of a gap, where nothing shows that it has changed.
+        What takes most of a gap, where the baseline does not tell whether it has changed.
 
     """
 
@@ -185,7 +185,7 @@ def _unexplained(unnamed: Unnamed) -> str:
     if unnamed.minor and unnamed.minor[0].share >= SAID:
         return f'Nothing in the catalogue closes it. {sentence(unnamed.minor[0])}'
     told = [suspicion(group) for group in by_cause(unnamed.suspected)]
-    told = told or [_unproven(one) for one in unnamed.unproven[:1]]
+    told = told or [_unproven(group) for group in by_cause(unnamed.unproven)]
     return ' '.join(told or ['Nothing in the catalogue explains it.'])
 
 
@@ -209,12 +209,11 @@ def suspicion(group: Sequence[Finding]) -> str:
     )
 
 
-def _unproven(finding: Finding) -> str:
+def _unproven(group: Sequence[Finding]) -> str:
     """Say what a cause would explain that may have been there before."""
-    cause = _subject(replace(finding, parameters=(), values=(), std=()))
     return (
-        f'{cause} would explain {share_in_words(finding)}, and is not named, as the recordings '
-        'from before do not tell whether it was there then.'
+        f'{_subjects(group)} would explain {share_in_words(group[0])}, and is not named, as the '
+        'recordings from before do not tell whether it was there then.'
     )
 
 
