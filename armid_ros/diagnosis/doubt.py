@@ -77,7 +77,7 @@ def doubt_as_it_is(excess: FloatArray, robot: Robot, floor_in_words: str) -> str
         return ''
     too = ', '.join(robot.joints[k] for k in others if excess[k] > 1.0)
     return (
-        f'Without such a fit, the error of {robot.joints[worst]} is '
+        f'Without a fit of its rigid body and friction, the error of {robot.joints[worst]} is '
         f'{larger(np.sqrt(excess[worst]))} {floor_in_words} can be'
         f'{f", and that of {too} is too large as well" if too else ""}.'
     )
