@@ -151,24 +151,3 @@ def test_changes_are_compared_one_by_one_where_a_baseline_tells_no_more(monkeypa
     best = max(compared, key=lambda change: change.gain)
     assert best.name == first
     assert best.gain == pytest.approx(next(t.gain for t in trials if t.name == first))
-
-
-@pytest.mark.parametrize(('alike', 'rivals'), [(True, ['encoder']), (False, ['encoder', 'play'])])
-def test_what_says_no_more_than_a_rival_is_none(monkeypatch, alike, rivals):
-    """Play under a steady load is the offset of an encoder, which may be named next."""
-    friction, encoder, play = (
-        SimpleNamespace(candidate=SimpleNamespace(effect=SimpleNamespace(name=name)))
-        for name in ('friction', 'encoder', 'play')
-    )
-    for name, value in {'changed': True, 'beaten': False, '_joint_by_joint': []}.items():
-        monkeypatch.setattr(look, name, lambda *_, value=value: value)
-    monkeypatch.setattr(look, 'likeliest', lambda able, *_: able[0])
-    monkeypatch.setattr(look, 'frequency', lambda *_: 0)
-    monkeypatch.setattr(look, 'rarity', lambda trial: len(trial.candidate.effect.name))
-    monkeypatch.setattr(
-        look, 'says_no_more', lambda big, small, _: alike and (big, small) == (play, encoder)
-    )
-    survey, here = SimpleNamespace(total=1.0, tried=1), SimpleNamespace(tested=object())
-    step = look.Look(survey, (friction, encoder, play), {}, (), here).step()
-    assert step.trial is friction
-    assert sorted(one.candidate.effect.name for one in step.rivals) == rivals

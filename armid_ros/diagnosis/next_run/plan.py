@@ -21,7 +21,6 @@ from typing import Any
 
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, NOTHING, Separation
 from armid_ros.diagnosis.verdict.finding import Diagnosis
-from armid_ros.diagnosis.verdict.naming import without_later
 from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -225,8 +224,7 @@ def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
     explanation = diagnosis.explanation
     if explanation is None:
         return ()
-    steps = without_later(explanation.steps)
-    pairs = zip(explanation.fitted.named, steps, strict=True)
+    pairs = zip(explanation.fitted.named, explanation.steps, strict=True)
     found = {own.effect.name for own in explanation.fitted.named}
     doubts: dict[tuple[str, str], Doubt] = {}
     for named, step in pairs:

@@ -149,13 +149,14 @@ class Search:
             return Way(tuple(start), None, None)
         return self._from(self.first_place(start), start)
 
-    def exchanged(self, way: Way) -> Way:
+    def exchanged(self, way: Way, most: int = 1) -> Way:
         """
         Ask anew for each cause but the last, beside those that were accepted after it.
 
         The cause that is accepted first is compared with others while all the rest is unexplained:
         one that takes a part of the rest as well is ahead of the right one, and causes of the rest
-        are its rivals. One cause is exchanged at the most.
+        are its rivals. Each has the rivals that it has beside the others, and so many are
+        exchanged at the most.
 
         """
         taken = list(way.taken)
@@ -163,14 +164,13 @@ class Search:
             assert way.first is not None
             others = [*taken[:k], *taken[k + 1 :]]
             step = self.first_place(others, way.first.total).look.step()
-            if step is None:
-                continue
-            if step.trial.candidate.key[:2] == taken[k].step.trial.candidate.key[:2]:
-                taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=step.rivals))
-                continue
-            start = [*others, _of(step, self.question)]
-            again = self._from(self.first_place(start, way.first.total), start)
-            return replace(again, first=way.first)
+            same = step is None or step.trial.candidate.key[:2] == taken[k].key
+            if step is not None and not same and most:
+                start = [*others, _of(step, self.question)]
+                again = self._from(self.first_place(start, way.first.total), start)
+                return self.exchanged(replace(again, first=way.first), most - 1)
+            rivals = step.rivals if step is not None and same else ()
+            taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=rivals))
         return replace(way, taken=tuple(taken))
 
     def _from(self, place: Place, start: Sequence[Accepted]) -> Way:

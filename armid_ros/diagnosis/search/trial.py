@@ -301,6 +301,11 @@ class Accepted(NamedTuple):
     step: Step
     values: FloatArray
 
+    @property
+    def key(self) -> tuple[str, tuple[str, ...]]:
+        """Name and joints of the candidate that was accepted."""
+        return self.step.trial.candidate.key[:2]
+
 
 @dataclass(frozen=True)
 class Survey:

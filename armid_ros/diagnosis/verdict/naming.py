@@ -49,7 +49,6 @@ def findings(
 
     """
     said = _in_words(explanation, arm)
-    taken = without_later(explanation.steps)
     given = zip(explanation.given.parameters, explanation.given.theta.tolist(), strict=True)
     had = {(parameter.name, parameter.joint): value for parameter, value in given}
     merged: dict[str, list[int]] = {}
@@ -61,7 +60,7 @@ def findings(
         together = [other for other, where in merged.items() if set(own) & set(where)]
         indices = sorted({k for other in together for k in merged[other]})
         parts = [part for k in indices for part in said[k] if part.effect.name == name]
-        steps = [taken[k] for k in own]
+        steps = [explanation.steps[k] for k in own]
         joints = _joints([part.effect.joints for part in parts], arm)
         order = [joint for joint in arm.robot.joints if joint in joints]
         rows = _rows(parts)
@@ -255,22 +254,6 @@ def _determined(part: _Said) -> bool:
 def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
     ties = {t.joint: t for effect in effects if isinstance(effect, Tied) for t in effect.ties}
     return tuple(ties[joint] for joint in joints if joint in ties)
-
-
-def without_later(steps: Sequence[Step]) -> list[Step]:
-    """
-    Return steps without rivals that are a name accepted later, or a rival of one.
-
-    They explain what that name explains, which nothing explained yet in the earlier step.
-
-    """
-    result: list[Step] = []
-    later: set[tuple[str, tuple[str, ...]]] = set()
-    for step in reversed(steps):
-        rivals = tuple(trial for trial in step.rivals if trial.candidate.key[:2] not in later)
-        result.append(replace(step, rivals=rivals))
-        later.update(trial.candidate.key[:2] for trial in (step.trial, *step.rivals))
-    return result[::-1]
 
 
 def _rivals(
