@@ -49,7 +49,8 @@ def test_the_cause_that_takes_most_is_taken_first(search, monkeypatch):
     assert way.first.ranking[0].gain > max(one.gain for one in way.last.look.ranking)
 
 
-def test_a_cause_that_another_one_beats_beside_the_rest_is_exchanged(search):
+def test_a_cause_that_another_one_beats_beside_the_rest_is_exchanged(search, monkeypatch):
+    """Unless what the others leave in the end is less."""
     way = search.forward()
     right, rest = way.taken
     coulomb = next(
@@ -58,9 +59,12 @@ def test_a_cause_that_another_one_beats_beside_the_rest_is_exchanged(search):
         if trial.candidate.key[:2] == ('coulomb_friction', ('shoulder',))
     )
     wrong = explain._of(replace(right.step, trial=coulomb), search.question)
-    again = search.exchanged(replace(way, taken=(wrong, rest)))
+    again = search.exchanged(replace(way, taken=(wrong, rest), last=None))
     assert sorted(taken(again)) == sorted(taken(way))
     assert again.first is way.first
+    leaves_less = replace(way, taken=(wrong, rest), last=way.last)
+    monkeypatch.setattr(explain.Search, '_from', lambda *_: replace(way, last=None))
+    assert taken(search.exchanged(leaves_less)) == taken(leaves_less)
 
 
 def test_the_rest_is_no_rival_of_a_cause(search):

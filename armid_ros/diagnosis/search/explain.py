@@ -116,6 +116,11 @@ class Way:
     last: Place | None
     change: FloatArray | None = None
 
+    @property
+    def left(self) -> float:
+        """Held-out squares that the last look was to explain."""
+        return np.inf if self.last is None else self.last.look.here.power
+
 
 @dataclass(frozen=True)
 class Search:
@@ -155,8 +160,8 @@ class Search:
 
         The cause that is accepted first is compared with others while all the rest is unexplained:
         one that takes a part of the rest as well is ahead of the right one, and causes of the rest
-        are its rivals. Each has the rivals that it has beside the others, and so many are
-        exchanged at the most.
+        are its rivals. Each has the rivals that it has beside the others. So many are exchanged at
+        the most, for what leaves no more in the end.
 
         """
         taken = list(way.taken)
@@ -168,7 +173,8 @@ class Search:
             if step is not None and not same and most:
                 start = [*others, _of(step, self.question)]
                 again = self._from(self.first_place(start, way.first.total), start)
-                return self.exchanged(replace(again, first=way.first), most - 1)
+                if again.left <= way.left:
+                    return self.exchanged(replace(again, first=way.first), most - 1)
             rivals = step.rivals if step is not None and same else ()
             taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=rivals))
         return replace(way, taken=tuple(taken))
