@@ -122,14 +122,17 @@ def check_data(
         one.source: [part.motion for part in data if part.source == one.source]
         for one in recordings
     }
+    band_hz = _band(used, data)
+    uneven = (uneven_stamps(one, used.cutoff_hz, band_hz) for one in recordings)
+    stamps = [*filter(None, uneven)]  # by which anything else seems to be wrong
     blind = [x for one in recordings for x in dead_encoders(arm.body, one, motions[one.source])]
-    mistaken = blind or _velocities(recordings) or _mistaken(arm, recordings, used, before)
+    mistaken = (
+        stamps or blind or _velocities(recordings) or _mistaken(arm, recordings, used, before)
+    )
     mistaken = mistaken or _units(arm, recordings, used, before)
     if mistaken:
         return mistaken, []
-    band_hz = _band(used, data)
-    stamps = (uneven_stamps(one, used.cutoff_hz, band_hz) for one in recordings)
-    faults = [*filter(None, stamps), *_laws(arm, data)]
+    faults = [*_laws(arm, data)]
     for one in recordings:
         faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
     faults += [] if faults else _signs(arm, recordings, data)
