@@ -6,7 +6,9 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import NoiseFloor
+from armid_ros.diagnosis.search.explain import without_later
 from armid_ros.diagnosis.search.explanation import NOISE
+from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.gap import not_repeating
@@ -340,6 +342,18 @@ def test_the_same_name_in_another_joint_is_a_rival():
     arm = SimpleNamespace(robot=SimpleNamespace(joints=('elbow', 'wrist')))
     found = _rivals([step], Rival('payload', ('wrist',)), {'torque_gain'}, arm)
     assert found == (Rival('payload', ('elbow',)),)
+
+
+def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():
+    def trial(*key):
+        return SimpleNamespace(candidate=SimpleNamespace(key=(*key, ())))
+
+    link, lag = trial('link_inertia', ('elbow',)), trial('torque_lag', ())
+    first = Step(trial('viscous_friction', ('elbow',)), (link, lag), (), 1.0, 1, None)
+    second = Step(trial('payload', ('elbow',)), (link,), (), 1.0, 1, None)
+    earlier, later = without_later([first, second])
+    assert earlier.rivals == (lag,)
+    assert later.rivals == (link,)
 
 
 def test_a_parameter_of_several_joints_is_called_by_its_name_once(bench):

@@ -46,7 +46,9 @@ def explain(
 ) -> Explanation:
     """Accept causes as long as any passes, then name the friction that matters, and prune."""
     search = Search(question, evidence, settings, baseline, unseen)
-    way = search.exchanged(search.forward(start))
+    way = search.forward(start)
+    if question.since:
+        way = search.exchanged(way)
     survey, last = way.first, None if way.last is None else way.last.look.survey
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
     retrial = Retrial(question, evidence, settings)
@@ -62,6 +64,7 @@ def explain(
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
     change = way.change if question.nuisance_arm is question.arm else None
     steps, fitted = pruned(retrial, taken, change)
+    steps = steps if question.since else without_later(steps)
     by_chance = 0.0 if last is None else last.by_chance
     fitted = widened(fitted, evidence, question.prior, by_chance)
     said = {own.effect.name for own in fitted.named}
@@ -79,6 +82,22 @@ def explain(
         by_chance,
         baseline,
     )
+
+
+def without_later(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """
+    Return steps without rivals that are a name accepted later, or a rival of one.
+
+    They explain what that name explains, which nothing explained yet in the earlier step.
+
+    """
+    result: list[Step] = []
+    later: set[tuple[str, tuple[str, ...]]] = set()
+    for step in reversed(steps):
+        rivals = tuple(trial for trial in step.rivals if trial.candidate.key[:2] not in later)
+        result.append(replace(step, rivals=rivals))
+        later.update(trial.candidate.key[:2] for trial in (step.trial, *step.rivals))
+    return tuple(result[::-1])
 
 
 @dataclass(frozen=True)
@@ -161,7 +180,8 @@ class Search:
         The cause that is accepted first is compared with others while all the rest is unexplained:
         one that takes a part of the rest as well is ahead of the right one, and causes of the rest
         are its rivals. Each has the rivals that it has beside the others. So many are exchanged at
-        the most, for what leaves no more in the end.
+        the most, for what leaves no more in the end. Each question is as long as a search for one
+        cause: where no change is asked there are up to four searches, of more causes.
 
         """
         taken = list(way.taken)
