@@ -374,15 +374,10 @@ def _excesses(
     asked: _Asked, chosen: Chosen, names: Names, unseen: Evidence | None
 ) -> tuple[list[Excess], list[Excess]]:
     """Return losses over their limits, and residuals over friction where a joint is held."""
-    rest = names.rest
-    settings, evidence = asked.settings, rest.evidence
-    more = settings.thresholds.predicted
-    arm, before = rest.fitted.arm, asked.before
-    left = [_of_whole(arm, evidence, chosen, settings)]
-    parts, where = [evidence], 'recordings that were not used'
-    if unseen is not None:
-        left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
-        parts.append(unseen)
+    settings, evidence = asked.settings, names.rest.evidence
+    arm, before = names.rest.fitted.arm, asked.before
+    left = _of_data(asked, chosen, names.rest, unseen)
+    parts = [evidence] if unseen is None else [evidence, unseen]
     if before is not None:
         left += [for_a_second(arm, part, before, asked.arm, settings) for part in parts]
     if settings.partner is not None:
@@ -390,11 +385,22 @@ def _excesses(
     return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
 
 
+def _of_data(
+    asked: _Asked, chosen: Chosen, fit: Explanation, unseen: Evidence | None
+) -> list[Excess]:
+    """Return what a fit leaves of the data, and of further ones that nothing was fitted to."""
+    arm, settings = fit.fitted.arm, asked.settings
+    left = [_of_whole(arm, fit.evidence, chosen, settings)]
+    if unseen is not None:
+        more, where = settings.thresholds.predicted, 'recordings that were not used'
+        left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
+    return left
+
+
 def _patched(asked: _Asked, chosen: Chosen, names: Names, unseen: Evidence | None) -> Excess:
     """Return what the patched model leaves, whose body may be as it was given."""
-    each, _ = _excesses(asked, chosen, replace(names, rest=names.stated), unseen)
-    whole = each[: 1 + (unseen is not None)]
-    return Excess(np.max([one.ratio for one in whole], axis=0), '')
+    left = _of_data(asked, chosen, names.stated, unseen)
+    return Excess(np.max([one.ratio for one in left], axis=0), '')
 
 
 def _as_it_is(asked: _Asked, chosen: Chosen, explanation: Explanation) -> Excess | None:

@@ -63,7 +63,7 @@ def test_a_cause_that_another_one_beats_beside_the_rest_is_exchanged(search, mon
     assert sorted(taken(again)) == sorted(taken(way))
     assert again.first is way.first
     leaves_less = replace(way, taken=(wrong, rest), last=way.last)
-    monkeypatch.setattr(explain.Search, '_from', lambda *_: replace(way, last=None))
+    monkeypatch.setattr(explain.Search, 'forward', lambda *_: replace(way, last=None))
     assert taken(search.exchanged(leaves_less)) == taken(leaves_less)
 
 

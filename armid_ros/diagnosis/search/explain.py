@@ -167,40 +167,11 @@ class Search:
     baseline: Baseline | None = None
     unseen: Evidence | None = None
 
-    def forward(self, start: Sequence[Accepted] = ()) -> Way:
+    def forward(self, start: Sequence[Accepted] = (), total: float | None = None) -> Way:
         """Accept causes in addition to those to start with as long as any passes."""
         if not self.question.most:
             return Way(tuple(start), None, None)
-        return self._from(self.first_place(start), start)
-
-    def exchanged(self, way: Way, most: int = 1) -> Way:
-        """
-        Ask anew for each cause but the last, beside those that were accepted after it.
-
-        The cause that is accepted first is compared with others while all the rest is unexplained:
-        one that takes a part of the rest as well is ahead of the right one, and causes of the rest
-        are its rivals. Each has the rivals that it has beside the others. So many are exchanged at
-        the most, for what leaves no more in the end. Each question is as long as a search for one
-        cause: where no change is asked there are up to four searches, of more causes.
-
-        """
-        taken = list(way.taken)
-        for k in range(len(taken) - 1):
-            assert way.first is not None
-            others = [*taken[:k], *taken[k + 1 :]]
-            step = self.first_place(others, way.first.total).look.step()
-            same = step is None or step.trial.candidate.key[:2] == taken[k].key
-            if step is not None and not same and most:
-                start = [*others, _of(step, self.question)]
-                again = self._from(self.first_place(start, way.first.total), start)
-                if again.left <= way.left:
-                    return self.exchanged(replace(again, first=way.first), most - 1)
-            rivals = step.rivals if step is not None and same else ()
-            taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=rivals))
-        return replace(way, taken=tuple(taken))
-
-    def _from(self, place: Place, start: Sequence[Accepted]) -> Way:
-        """Accept causes from a place on as long as any passes."""
+        place = self.first_place(start, total)
         first, steps = place.look.survey, [one.step for one in start]
         named, values = place.named, place.values
         for remaining in range(self.question.most, 0, -1):
@@ -215,6 +186,31 @@ class Search:
                 named, values = place.named, place.values
         rows = zip(named, steps, values, strict=True)
         return Way(tuple(Accepted(*row) for row in rows), first, place, place.current.change)
+
+    def exchanged(self, way: Way, most: int = 1) -> Way:
+        """
+        Ask anew for each cause but the last, beside those that were accepted after it.
+
+        The cause that is accepted first is compared with others while all the rest is unexplained:
+        one that takes a part of the rest as well is ahead of the right one, and causes of the rest
+        are its rivals. Each has the rivals that it has beside the others. So many are exchanged at
+        the most, for what leaves no more in the end. To ask for one takes as long as a first look.
+
+        """
+        taken = list(way.taken)
+        for k in range(len(taken) - 1):
+            assert way.first is not None
+            others = [*taken[:k], *taken[k + 1 :]]
+            step = self.first_place(others, way.first.total).look.step()
+            same = step is None or step.trial.candidate.key[:2] == taken[k].key
+            if step is not None and not same and most:
+                start = [*others, _of(step, self.question)]
+                again = self.forward(start, way.first.total)
+                if again.left <= way.left:
+                    return self.exchanged(replace(again, first=way.first), most - 1)
+            rivals = step.rivals if step is not None and same else ()
+            taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=rivals))
+        return replace(way, taken=tuple(taken))
 
     def first_place(self, start: Sequence[Accepted] = (), total: float | None = None) -> Place:
         """Fit the causes to start with, and look at all others; see `Round.total`."""
