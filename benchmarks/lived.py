@@ -56,6 +56,8 @@ def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> Liv
     day_1, day_2 = ([recording_of(run) for run in day] for day in (case.day_1, case.day_2))
     held_out = recording_of(case.held_out)
     described = robot_of(case).gravity
+    runs = [*case.day_2, case.held_out] if case.truth else []
+    made = [run.contribution for run in runs]
     shares = (np.nan, np.nan)
     repeated = None
     try:
@@ -69,7 +71,7 @@ def judge(kind: str, index: int, again: bool = True, question: Ask = ask) -> Liv
             day_2,
             validate=[held_out],
             baseline=day_1,
-            contribution=case.held_out.contribution if case.truth else None,
+            contributions=made,
         )
         if day_1 and again:
             repeated = question(arm, day_1[:2], validate=day_1[2:], baseline=day_1)

@@ -76,7 +76,7 @@ def plain_ranking(
     *,
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
-    contribution: FloatArray | None = None,
+    contributions: Sequence[FloatArray] = (),
 ) -> Answer:
     """
     Rank causes and name the first, in the form of an answer of the diagnosis.

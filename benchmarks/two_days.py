@@ -120,7 +120,7 @@ def ask(
     validate: Sequence[Recording] = (),
     baseline: Sequence[Recording] = (),
     settings: DiagnosisSettings | None = None,
-    contribution: FloatArray | None = None,
+    contributions: Sequence[FloatArray] = (),
 ) -> Answer:
     """
     Ask the diagnosis what is not in a model.
@@ -135,8 +135,9 @@ def ask(
         Of the day on which the model was identified.
     settings : DiagnosisSettings, optional
         The numbers that decide.
-    contribution : ndarray, shape (N, n), optional
-        Torque of the cause in the only one of ``validate``, which tells its true share [N m].
+    contributions : sequence of ndarray, each (N, n), optional
+        Torque of the cause in each recording, those of ``validate`` last, which tells its true
+        share [N m].
 
     """
     begin = time.process_time()
@@ -150,30 +151,31 @@ def ask(
     )
     seconds = time.process_time() - begin
     answer = answer_of(diagnosis_document(found), seconds)
-    if contribution is None or found.gap is None or not found.gap.predicted:
+    if not contributions or found.gap is None:
         return answer
-    (held_out,) = validate
-    return replace(answer, true_share=true_share(found.gap, held_out.t, contribution))
+    pairs = zip((*recordings, *validate), contributions, strict=True)
+    made = [(recording.t, torque) for recording, torque in pairs]
+    shown = made[len(recordings) :] if found.gap.predicted else made[: len(recordings)]
+    return replace(answer, true_share=true_share(found.gap, shown))
 
 
-def true_share(gap: Gap, t: FloatArray, contribution: FloatArray) -> float:
+def true_share(gap: Gap, made: Sequence[tuple[FloatArray, FloatArray]]) -> float:
     """
     Return the share of the squares of a gap that goes with a torque.
 
     Parameters
     ----------
     gap : Gap
-        Measured on one recording.
-    t : ndarray, shape (N,)
-        Times of the torque [s].
-    contribution : ndarray, shape (N, n)
-        The torque [N m].
+        Where it was measured.
+    made : sequence of (ndarray, shape (N,), ndarray, shape (N, n))
+        Times and torque of each recording in which it was measured [s, N m].
 
     """
     there = rest = 0.0
     for one in gap.overlays:
         part = one.trajectory
-        torque = np.column_stack([np.interp(part.motion.t, t, tau) for tau in contribution.T])
+        t, whole = made[part.fold]
+        torque = np.column_stack([np.interp(part.motion.t, t, tau) for tau in whole.T])
         weight = part.informative / one.sigma
         left = one.measured - one.before
         there += float(np.sum((left * weight) ** 2))

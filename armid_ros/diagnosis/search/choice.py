@@ -220,7 +220,7 @@ class Explainer:
         question = self._since_then(data, known, [discrepancy])
         baseline = known if isinstance(known, Baseline) else None
         found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)
-        return found.in_arm(self._since_then(data, known))
+        return replace(found.in_arm(self._since_then(data, known)), beside=question)
 
     def _since_then(
         self,

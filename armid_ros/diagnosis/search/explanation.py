@@ -67,6 +67,9 @@ class Explanation:
         Mean gain per value, over all candidates, on the residual that the names leave.
     baseline : Baseline or None
         Recordings from before the named effects changed.
+    beside : Question or None
+        The same question with a model discrepancy, beside which stated values are fitted; None
+        where there is none.
 
     """
 
@@ -81,6 +84,7 @@ class Explanation:
     prior: Prior | None = None
     by_chance: float = 0.0
     baseline: Baseline | None = None
+    beside: Question | None = None
 
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
@@ -122,6 +126,7 @@ class Explanation:
             given=plain_arm(self.given),
             fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
             reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
+            beside=None,
         )
 
     @property
@@ -173,13 +178,21 @@ class Chosen:
 
 
 def in_model_as_given(found: Explanation) -> Explanation:
-    """Return what the names explain while the rigid body stays as it is."""
-    arm, evidence, fitted = found.given, found.evidence, found.fitted
+    """
+    Return what the names explain while the rigid body stays as it is.
+
+    Their values are those of a joint fit with the body and the model discrepancy: what the model
+    lacks in every motion is not taken for a part of what has changed.
+
+    """
+    arm, evidence = found.given, found.evidence
+    if found.beside is not None:
+        found = found.in_arm(found.beside)
+    fitted = found.fitted
     if found.prior is not None and found.baseline is not None:
         fitted = as_change(fitted, evidence, found.prior, found.baseline)
-    reference = fit(arm, (), evidence, None)
-    alone = with_values_of(fitted, arm, evidence)
-    return replace(found, base=None, prior=None, fitted=alone, reference=reference)
+    alone, reference = with_values_of(fitted, arm, evidence), fit(arm, (), evidence, None)
+    return replace(found, given=arm, base=None, prior=None, fitted=alone, reference=reference)
 
 
 def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
