@@ -20,12 +20,10 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
 from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajectory
 from armid_ros.diagnosis.doubt import doubt_as_it_is, doubt_of, doubt_of_names
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
-from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import (
     as_bodies,
     Chosen,
-    ESTIMATED,
     Explanation,
     NOISE,
 )
@@ -34,15 +32,12 @@ from armid_ros.diagnosis.verdict.attribution import Names
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
     blind_joints,
-    excess_of,
-    for_a_second,
-    harmed,
-    held,
     hiding,
     measure_gap,
     not_repeating,
     places_held,
 )
+from armid_ros.diagnosis.verdict.leaving import Leaving
 from armid_ros.diagnosis.verdict.naming import findings, not_named
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
@@ -263,11 +258,12 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     if unseen is not None and not names.shares.predicted:
         notes.append(_HARDLY_SHOWN)
     found = findings(explanation, names.shares, arm, asked.rng)
-    refitted = _as_it_is(asked, chosen, explanation)
-    as_it_is = _patched(asked, chosen, names, unseen) if found else refitted
-    worse = _harmed(chosen, explanation, unseen, settings)
+    measured = Leaving(chosen, unseen, asked.before, arm, settings)
+    refitted = measured.as_it_is(explanation)
+    as_it_is = measured.patched(names) if found else refitted
+    worse = measured.harmed(explanation)
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
-    left, resting = _excesses(asked, chosen, names, unseen)
+    left, resting = measured.beside(names), measured.resting(names)
     open_gap = any(one.ratio.max() > 1.0 for one in (*left, *resting))
     asked = asked.doubting(found, None if open_gap else as_it_is, chosen.floor_in_words)
     unnamed = not_named(explanation, arm)
@@ -287,7 +283,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     remarks = _unpatched(found, worse)
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
-    shown, open_in = unseen if names.shares.predicted else None, _shows(left, evidence, unseen)
+    shown, open_in = unseen if names.shares.predicted else None, measured.shown_in(left, evidence)
     places = where_it_is(explanation, (shown or evidence) if found else open_in, settings)
     asked.tell(1.0, word.word)
     return Diagnosis(
@@ -343,79 +339,6 @@ def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
     sigma = [np.maximum(one, chosen.misfit) for one in noise]
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
-
-
-def _shows(left: Sequence[Excess], evidence: Evidence, unseen: Evidence | None) -> Evidence:
-    """Return the data in which the worst of what is left shows, of which the sentence speaks."""
-    worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
-    parts = [evidence] if unseen is None else [evidence, unseen]
-    return parts[worst % len(parts)]  # each kind of excess is there once for each of them
-
-
-def _sure(evidence: Evidence, chosen: Chosen) -> Evidence:
-    """Return data in units of noise if the misfit is only estimated, which excuses nothing."""
-    if chosen.floor_in_words != ESTIMATED:
-        return evidence
-    return replace(evidence, sigma=evidence.noise)
-
-
-def _harmed(
-    chosen: Chosen,
-    explanation: Explanation,
-    unseen: Evidence | None,
-    settings: DiagnosisSettings,
-) -> tuple[str, ...]:
-    """Return the joints in which the patched model is worse than the given one."""
-    measured = replace(explanation, evidence=_sure(explanation.evidence, chosen))
-    return harmed(measured, None if unseen is None else _sure(unseen, chosen), settings)
-
-
-def _excesses(
-    asked: _Asked, chosen: Chosen, names: Names, unseen: Evidence | None
-) -> tuple[list[Excess], list[Excess]]:
-    """Return losses over their limits, and residuals over friction where a joint is held."""
-    settings, evidence = asked.settings, names.rest.evidence
-    arm, before = names.rest.fitted.arm, asked.before
-    left = _of_data(asked, chosen, names.rest, unseen)
-    parts = [evidence] if unseen is None else [evidence, unseen]
-    if before is not None:
-        left += [for_a_second(arm, part, before, asked.arm, settings) for part in parts]
-    if settings.partner is not None:
-        return left, []
-    return left, [held(arm, part, asked.before, asked.arm, settings) for part in parts]
-
-
-def _of_data(
-    asked: _Asked, chosen: Chosen, fit: Explanation, unseen: Evidence | None
-) -> list[Excess]:
-    """Return what a fit leaves of the data, and of further ones that nothing was fitted to."""
-    arm, settings = fit.fitted.arm, asked.settings
-    left = [_of_whole(arm, fit.evidence, chosen, settings)]
-    if unseen is not None:
-        more, where = settings.thresholds.predicted, 'recordings that were not used'
-        left.append(excess_of(arm, _sure(unseen, chosen), settings, more, where))
-    return left
-
-
-def _patched(asked: _Asked, chosen: Chosen, names: Names, unseen: Evidence | None) -> Excess:
-    """Return what the patched model leaves, whose body may be as it was given."""
-    left = _of_data(asked, chosen, names.stated, unseen)
-    return Excess(np.max([one.ratio for one in left], axis=0), '')
-
-
-def _as_it_is(asked: _Asked, chosen: Chosen, explanation: Explanation) -> Excess | None:
-    """Return what the given model leaves; None if its rigid body is not fitted anew."""
-    if not frees_body(explanation.base, explanation.given):
-        return None
-    return _of_whole(asked.arm, explanation.evidence, chosen, asked.settings)
-
-
-def _of_whole(
-    arm: ArmModel, evidence: Evidence, chosen: Chosen, settings: DiagnosisSettings
-) -> Excess:
-    """Return what an arm leaves of the data: a misfit varies from motion to motion."""
-    usual = 1.0 if chosen.measured else settings.thresholds.predicted
-    return excess_of(arm, _sure(evidence, chosen), settings, usual)
 
 
 def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:
