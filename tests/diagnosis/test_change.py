@@ -418,3 +418,22 @@ def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
     assert any('more than one recording a day tells that' in note for note in large.notes)
     assert not small.findings
     assert [one.name for one in small.minor] == ['coulomb_friction']
+
+
+def test_what_a_model_lacks_in_every_motion_is_no_part_of_a_stated_value(bench):
+    """The day before was slow, so that friction that no model has was another misfit then."""
+
+    def always(motion, tau):
+        curve = np.tanh(motion.dq / 0.4) * np.exp(-np.abs(motion.dq))
+        return [0.3, 0.18] * (np.sin(2.2 * motion.q + 0.4) + curve)
+
+    def today(motion, tau):
+        return always(motion, tau) + [0.0, 0.25]
+
+    rng = np.random.default_rng(0)
+    before = bench.recordings(always, seed=1)[:2]
+    arm = identify(bench.arm, before, rng=rng).arm
+    found = diagnose(arm, bench.recordings(today, seed=2)[1:], baseline=before, rng=rng)
+    (named,) = found.findings
+    assert (named.name, named.joints) == ('torque_offset', ('elbow',)), found.summary
+    assert named.values[0] == pytest.approx(0.25, abs=0.01)
