@@ -69,6 +69,31 @@ def test_a_gain_of_all_joints_since_the_baseline_is_no_unit(bench, factor):
     assert not faults_since(bench.arm, now, before)
 
 
+@pytest.mark.parametrize('quantity', ['position and torque', 'torque'])
+@pytest.mark.parametrize('first', [0, 1])
+def test_exchanged_joints_are_no_unit_since_the_baseline(upright, quantity, first):
+    """The factor that fits torques of exchanged joints best leaves most of them."""
+    before, now = upright.recordings(), upright.recordings(seed=1)
+    order = [0, 2, 1] if first else [1, 0, 2]
+    for k, one in enumerate(now):
+        moved = one.q[:, order] if 'position' in quantity else one.q
+        now[k] = replace(one, q=moved, tau=one.tau[:, order])
+    (said,) = faults_since(upright.arm, now, before)
+    names = upright.robot.joints[first : first + 2]
+    assert f'the {quantity} of {names[0]} and of {names[1]} seem to be exchanged' in said
+
+
+@pytest.mark.parametrize(
+    ('factor', 'said'),
+    [(1.0 / 9.80665, 'in kgf m if'), (1.0 / 9.0, '0.111 times'), (0.2, '0.2 times')],
+)
+def test_a_unit_leaves_what_a_right_unit_leaves(upright, factor, said):
+    before, now = upright.recordings(), scaled(upright.recordings(seed=1), factor)
+    (fault,) = faults_since(upright.arm, now, before)
+    assert said in fault
+    assert 'baseline' in fault and 'convert them' in fault
+
+
 def test_masses_in_grams_are_no_unit_of_torques_that_are_as_before(bench):
     before, now = bench.recordings(), bench.recordings(seed=1)
     grams = weighing(bench.arm, 1e3)

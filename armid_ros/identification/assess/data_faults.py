@@ -18,6 +18,7 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -32,8 +33,13 @@ from armid_ros.identification.assess.joint_units import (
     units_beside_model,
     units_beyond_drives,
 )
-from armid_ros.identification.assess.mistakes import effort_factor, find_mistake, slow_motions_of
-from armid_ros.identification.assess.torque_units import unit_of
+from armid_ros.identification.assess.mistakes import (
+    effort_factor,
+    find_mistake,
+    is_factor,
+    slow_motions_of,
+)
+from armid_ros.identification.assess.torque_units import unit_of, units_near
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import (
@@ -162,21 +168,45 @@ def _mistaken(
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
     if any(one.partner is not None for one in recordings):
         return []
-    ratio = _since(arm, recordings, used, before)
-    if ratio is not None and unit_of(ratio):
-        now, then = (slow_motions_of(some, used) for some in (recordings, before))
-        unit = f'torques are in {unit_of(ratio)} if those of the baseline are in N m: convert them'
-        return [factors_apart(arm, now, then) or unit]
-    said: set[tuple[str, ...]] = set()
-    for recording in recordings:
-        mistake = find_mistake(arm.body, recording, used)
-        if mistake is None:
-            return []
-        said.add(tuple(_fault(one, arm.robot, ratio) for one in mistake.hypotheses))
-    if len(said) != 1:
+    then = _baseline_factor(arm, before, used)
+    found = [find_mistake(arm.body, recording, used) for recording in recordings]
+    shown = [() if mistake is None else mistake.hypotheses for mistake in found]
+    said = {tuple(_fault(one, arm.robot, then) for one in some) for some in shown}
+    (first, *others) = said
+    if first and all(first) and not others:
+        return [', or '.join(first)]
+    now = None if then is None else effort_factor(arm.body, recordings, used)
+    if now is None or then is None:
         return []
-    (sentences,) = said
-    return [', or '.join(sentences)] if all(sentences) else []
+    wrong = _unit_since(arm, recordings, used, now, then)
+    if not wrong and all([type(one) for one in some] == [OtherUnit] for some in shown):
+        wrong = _gain_since(now / then)
+    apart = factors_apart(arm, *(slow_motions_of(some, used) for some in (recordings, before)))
+    return [apart or wrong] if wrong else []
+
+
+def _unit_since(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, now: float, then: float
+) -> str:
+    """Say in which unit torques are, by their factors on the model now and in a baseline."""
+    found = [
+        unit
+        for unit, per in units_near(now / then).items()
+        if is_factor(arm.body, recordings, used, then * per)
+    ]
+    if not found:
+        return ''
+    return f'torques are in {" or ".join(found)} if those of the baseline are in N m: convert them'
+
+
+def _gain_since(factor: float) -> str:
+    """Say that a factor of all torques is no unit, where nothing that happens to an arm is it."""
+    if 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor:
+        return ''
+    return (
+        f'torques of all joints are {factor:.3g} times those of the baseline, which is no unit '
+        '(currents?): convert them'
+    )
 
 
 def mistaken_recordings(
@@ -227,21 +257,21 @@ def _units(
     return beside or list(units_beyond_drives(arm.robot, recordings, now))
 
 
-def _since(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
+def _baseline_factor(
+    arm: ArmModel, before: Sequence[Recording], used: Conditioning
 ) -> float | None:
     """
-    Return by what factor torques have changed since a baseline; None where nothing tells.
+    Return by what factor torques of a baseline are those of the model; None where nothing tells.
 
-    Both are compared with the model, whose masses are what it has wrong on both days. One that
-    knows the torque of no joint of the baseline tells nothing.
+    Its masses are what it has wrong on both days. One that knows the torque of no joint of the
+    baseline tells nothing.
 
     """
-    now, then = (effort_factor(arm.body, some, used) for some in (recordings, before))
-    if now is None or then is None:
+    then = effort_factor(arm.body, before, used)
+    if then is None:
         return None
     known = knows(ArmModel(arm.body), slow_motions_of(before, used), then)
-    return now / then if np.any(known) else None
+    return then if np.any(known) else None
 
 
 def _fault(mistake: Hypothesis, robot: Robot, since: float | None) -> str:

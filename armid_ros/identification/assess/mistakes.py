@@ -155,14 +155,41 @@ def effort_factor(
     Return how many times what is described the efforts of recordings are, all joints together.
 
     Friction, offset and drive inertia of each joint are fitted beside it. None where motion is
-    too short, or the efforts do not follow the description.
+    too short, or the efforts do not follow the description with any factor.
+
+    """
+    found = _described(robot, slow_motions_of(recordings, used))(OtherUnit())
+    if found is None or 100.0 * found[0].whole(robot) > LIMITS.unusable:
+        return None
+    factor = float(found[0].shared[0])
+    return factor if factor > 0.0 else None
+
+
+def is_factor(
+    robot: Robot, recordings: Sequence[Recording], used: Conditioning, factor: float
+) -> bool:
+    """
+    Whether efforts are so many times what is described, as the one that fits leaves no less.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    recordings : sequence of Recording
+        Data with torques.
+    used : Conditioning
+        Filters that they are identified with.
+    factor : float
+        Of their efforts on those of the description.
 
     """
     slow = slow_motions_of(recordings, used)
-    found = _described(robot, slow)(OtherUnit())
-    if found is None or not found[0].shared[0] > 0.0:
-        return None
-    return float(found[0].shared[0])
+    converted = [one.with_torque(one.tau / factor) for one in slow if one.tau is not None]
+    free, fixed = (
+        _described(robot, motions)(hypothesis)
+        for motions, hypothesis in ((slow, OtherUnit()), (converted, AsRecorded()))
+    )
+    return free is not None and fixed is not None and fixed[0].gain(free[0]) < LIMITS.gain
 
 
 def _predicts(judge: Judge) -> bool:

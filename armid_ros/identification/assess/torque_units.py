@@ -21,11 +21,17 @@ _OF_JOINTS = {**TORQUE_UNITS, 'N m times 57.3 (degrees against radians)': float(
 
 def unit_of(factor: float) -> str:
     """Return the unit, or two, in which torques are that are so many times too large, or ''."""
+    return ' or '.join(units_near(factor))
+
+
+def units_near(factor: float) -> dict[str, float]:
+    """Return the factors of units that torques may be in, by their names, the nearest first."""
     if factor <= 0.0:
-        return ''
+        return {}
+    known = {**_OF_JOINTS, **_FORCE_UNITS}
     off = {
         unit: abs(float(np.log(factor / per))) / float(np.log(near))
         for units, near in ((_OF_JOINTS, NEAR), (_FORCE_UNITS, _NEAR_FORCE))
         for unit, per in units.items()
     }
-    return ' or '.join(unit for unit in sorted(off, key=off.__getitem__) if off[unit] < 1.0)
+    return {unit: known[unit] for unit in sorted(off, key=off.__getitem__) if off[unit] < 1.0}
