@@ -44,6 +44,7 @@ from armid_ros.identification import identify as run
 from armid_ros.identification.estimators.names import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.parameters_file import parameters_of
+from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 
 if TYPE_CHECKING:
@@ -296,7 +297,8 @@ def identify(
     Raises
     ------
     IdentificationError
-        If the data cannot identify anything; the message says why and what to do.
+        If the data cannot identify anything, or no joint moves in what is held out; the message
+        says why and what to do.
     RecordingError
         If there is no recording, or one is given twice, or held out and fitted.
 
@@ -313,6 +315,7 @@ def identify(
         some_recordings_of(recordings, model.robot), recordings_of(validate, model.robot)
     )
     require_once(training, held_out)
+    check_held_out(model.robot, held_out)
     known = PhysicalSettings() if physical is True else physical or None
     settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
     result = run(model, training, settings, rng=generator(rng))

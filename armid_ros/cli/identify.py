@@ -43,6 +43,7 @@ from armid_ros.identification.estimators.side_by_side import (
 )
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.output import SCHEMA
+from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.report import identification_report
 from armid_ros.report.identification_report import Assessment
@@ -218,6 +219,7 @@ def _work(
     recordings = options.read(data.bags, arm.robot, data.topic)
     held_out = options.read(data.validate, arm.robot, data.topic)
     require_once(recordings, held_out)
+    check_held_out(arm.robot, held_out)
     tick(0.0, 'identifying')
     result = run(arm, recordings, settings, rng=rng, progress=tick)
     validation = {r.source: result.predict([r]) for r in held_out}

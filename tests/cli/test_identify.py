@@ -42,6 +42,19 @@ def test_a_recording_is_fitted_once_and_not_held_out_as_well(bags, tmp_path, aga
     assert f'given twice, or in two roles: {bags[0]}; give each recording once' in said
 
 
+def test_a_recording_without_motion_is_not_held_out(bags, tmp_path):
+    """Its torque error is of noise, and checks no model."""
+    robot = load_robot(ROBOT)
+    recording = read_recording(bags[1], joints=robot.joints)
+    still = replace(recording, q=np.tile(recording.q[0], (len(recording), 1)), dq=None)
+    write_recording(tmp_path / 'still', still)
+    out = tmp_path / 'out'
+    more = ('--validate', tmp_path / 'still', '--out', out)
+    said = armid('identify', bags[0], '--robot', ROBOT, *more, code=2).stderr
+    assert 'still: no motion, every joint stays within' in said
+    assert not out.exists()
+
+
 def test_identify_prints_json_and_nothing_else(bags, tmp_path):
     result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o', '--json')
     assert json.loads(result.stdout)['robot'] == ROBOT

@@ -27,6 +27,7 @@ from armid_ros.identification.fitting.least_squares import noise_products, solve
 from armid_ros.identification.fitting.nonlinear import linearised
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Regression, regressions
+from armid_ros.identification.rows.signals import even_positions, sampling_rate, unbroken
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -37,6 +38,8 @@ from scipy.stats import chi2
 INSTRUMENT_SHARE = 0.2
 #: Noise is what lies above this share of the sampling rate.
 _NOISE_ABOVE = 0.3
+#: Samples that a stretch is continued by at its ends, as far as the smoothing reaches.
+_EDGE = 15
 #: A difference between the two fits of less than this share of a deviation does not matter, and
 #: counts little in the test: two fits of the same data are distinguishable to a thousandth.
 NEGLIGIBLE = 0.1
@@ -212,7 +215,11 @@ def _steps(count: int, progress: Callable[[float], None] | None) -> Callable[[],
 def calm_recording(recording: Recording, cutoff_hz: float) -> Recording:
     """Return a recording with positions smoothed below a frequency."""
     sections = signal.butter(4, cutoff_hz * recording.period * 2.0, output='sos')
-    return replace(recording, q=signal.sosfiltfilt(sections, recording.q, axis=0), dq=None)
+    q = recording.q.copy()
+    for part in unbroken(recording, sampling_rate(recording)):
+        edge = min(_EDGE, len(part) - 1)
+        q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
+    return replace(recording, q=q, dq=None)
 
 
 def _hausman(
@@ -260,13 +267,23 @@ def _hausman(
 
 
 def position_noise(recording: Recording) -> FloatArray:
-    """Return the standard deviation of white position noise, from the top of the spectrum (n,)."""
-    rate = 1.0 / recording.period
-    length = min(len(recording), int(8.0 * rate))
-    frequency, power = signal.welch(
-        recording.q, fs=rate, window='blackmanharris', nperseg=length, detrend='linear', axis=0
-    )
-    level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
+    """
+    Return the standard deviation of white position noise, shape (n,) [rad or m].
+
+    It is the top of the spectrum of stretches without a gap: a jump across one is no noise.
+
+    """
+    rate = sampling_rate(recording)
+    stretches = even_positions(recording)
+    length = min(max(map(len, stretches)), int(8.0 * rate))
+    long_enough = [q for q in stretches if len(q) >= length]
+    levels = []
+    for q in long_enough:
+        frequency, power = signal.welch(
+            q, fs=rate, window='blackmanharris', nperseg=length, detrend='linear', axis=0
+        )
+        levels.append(np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0))
+    level = np.average(levels, axis=0, weights=[len(q) for q in long_enough])
     return np.asarray(np.sqrt(level * 0.5 * rate))
 
 

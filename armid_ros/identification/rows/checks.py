@@ -75,6 +75,12 @@ def check_motion(
     return resting(robot, recordings[0].source, ranges)
 
 
+def check_held_out(robot: Robot, held_out: Sequence[Recording]) -> None:
+    """Refuse recordings in which no joint moves: they check no model, whatever it predicts."""
+    for recording in held_out:
+        resting(robot, recording.source, np.ptp(recording.q, axis=0))
+
+
 def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Say that recordings are short, all together."""
     duration = sum(recording.duration for recording in recordings)

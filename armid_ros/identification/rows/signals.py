@@ -227,15 +227,15 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     if recording.partner is not None:
         positions = np.hstack([positions, recording.partner.q])
     period = 1.0 / used.rate_hz
-    for part in _unbroken(recording, used.rate_hz):
+    for part in unbroken(recording, used.rate_hz):
         if len(part) >= _LEAST_SAMPLES and recording.t[part[-1]] - recording.t[
             part[0]
         ] > _shortest(used):
-            t, q, tau = _even(recording.t[part], positions[part], recording.tau[part], period)
+            t, q, tau = _even(recording.t[part], period, positions[part], recording.tau[part])
             yield _differentiated(recording, t, q, tau, used)
 
 
-def _unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
+def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
     """Return the samples of every stretch without a gap: what is across one is no motion."""
     longest = GAP_PERIODS * max(1.0 / rate, recording.period)
     breaks = np.flatnonzero(np.diff(recording.t) > longest) + 1
@@ -249,7 +249,7 @@ def _shortest(used: Conditioning) -> float:
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     """Say that no stretch is long enough for the filters, and how long one has to be."""
-    spans = [recording.t[part[[0, -1]]] for part in _unbroken(recording, used.rate_hz)]
+    spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
     return IdentificationError(
         f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
@@ -302,14 +302,19 @@ def decimated_samples(n_samples: int, used: Conditioning) -> range:
     return range(half, max(half, n_samples - half), used.decimation)
 
 
-def _even(
-    t: FloatArray, q: FloatArray, tau: FloatArray, period: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Bring signals onto an even time base; a cubic through the stamps where they jitter."""
+def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArray, ...]:
+    """Return even times, and signals there; a cubic through the stamps where they jitter."""
     grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / period) + 1)
     if len(grid) == len(t) and np.max(np.abs(grid - t)) < JITTER_TOLERANCE * period:
-        return grid, q, tau
-    return grid, CubicSpline(t, q)(grid), CubicSpline(t, tau)(grid)
+        return grid, *signals
+    return grid, *(CubicSpline(t, one)(grid) for one in signals)
+
+
+def even_positions(recording: Recording) -> list[FloatArray]:
+    """Return the positions of every stretch without a gap at even times, each (K, n)."""
+    rate = sampling_rate(recording)
+    parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
+    return [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
 
 
 def _differentiated(
@@ -352,7 +357,7 @@ def _central_difference(x: FloatArray, step: float) -> FloatArray:
 
 def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
     """Return the positions of every stretch without a gap, or of all where each is too short."""
-    parts = [part for part in _unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
+    parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
     return [recording.q[part] for part in parts] or [recording.q]
 
 

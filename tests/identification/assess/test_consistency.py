@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
-from armid_ros.identification.assess.consistency import check_noise
+from armid_ros.identification.assess.consistency import check_noise, position_noise
 import numpy as np
 import pytest
 
@@ -80,3 +80,14 @@ def test_one_simulation_is_not_enough(arm, structure, motion):
     result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
     with pytest.raises(IdentificationError, match='1 simulations'):
         check_noise(result, [recording], rng=np.random.default_rng(0), repeats=1)
+
+
+@pytest.mark.parametrize('lost', [slice(800, 1400), slice(800, 810), [500, 900, 1500]])
+def test_samples_that_are_missing_are_no_noise_of_encoders(arm, structure, motion, lost):
+    """What the arm does meanwhile is a jump from one sample to the next."""
+    whole = recorded(arm, motion, 0, 0.05, 3e-6)
+    recording = whole.select(np.delete(np.arange(len(whole)), lost))
+    np.testing.assert_allclose(position_noise(recording), position_noise(whole), rtol=0.2)
+    result = identify(structure, [recording], SETTINGS, rng=np.random.default_rng(0))
+    check = check_noise(result, [recording], rng=np.random.default_rng(0), repeats=2)
+    assert check.harmless, check.sentences()
