@@ -289,8 +289,9 @@ class OtherGravity(Hypothesis):
         if not limits.gravity_change * max(size, 1.0) < np.linalg.norm(found - told):
             return False
         weighs = length / size if size > 0.0 else np.inf
-        turned = np.linalg.norm(found / length - told / max(size, 1e-9)) > limits.gravity_change
-        return length < _STRONGEST and bool(turned or _beyond_masses(weighs, limits))
+        turned = np.linalg.norm(found / max(length, 1e-9) - told / max(size, 1e-9))
+        turns = turned > limits.gravity_change
+        return length < _STRONGEST and bool(turns or _beyond_masses(weighs, limits))
 
     def sentence(self, robot: Robot) -> str:
         """Say the direction and the option that puts it right."""

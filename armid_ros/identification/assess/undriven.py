@@ -23,6 +23,10 @@ from armid_ros.recording import PositionRange, Recording
 from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
 import numpy as np
 
+#: Places of its range at which a joint that moves is compared: weight and inertia may be the same
+#: at both ends, as those of a link that swings as far to either side.
+_PLACES = 7
+
 
 @dataclass(frozen=True)
 class Elsewhere:
@@ -71,7 +75,8 @@ def held_elsewhere(
         moves = found.highest - found.lowest > REST_RANGE
         if not (moves or joint.carries):
             continue  # a part of the body that carries it, in whatever position
-        places = [found.lowest, found.highest, *([joint.position] if joint.carries else [])]
+        places = list(np.linspace(found.lowest, found.highest, _PLACES if moves else 1))
+        places += [joint.position] if moves or joint.carries else []
         shares = _changes(robot, joint.name, places, motions)
         worst = int(np.argmax(shares))
         if shares[worst] > LIMITS.floor or (moves and joint.carries):

@@ -3,13 +3,18 @@
 """Joints that moved, or stood elsewhere, while the model holds them."""
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.identification import grade, identify
+from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.undriven import held_elsewhere
+from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import PositionRange, Recording
 from armid_ros.robots import described_at, held_joints, load_robot, robot_from_urdf
 import numpy as np
 import pytest
+
+from tests.diagnosis.conftest import UPRIGHT_URDF
 
 from ..conftest import multisine
 
@@ -116,6 +121,35 @@ def test_a_joint_that_moves_without_being_driven_is_never_passed_over(whole, ind
     (reason,) = (text for text in found.reasons if joint in text and 'not driven' in text)
     assert 'drive it as well (--joints), or hold it still' in reason
     assert found.word != 'good'
+
+
+def swinging(motion, own):
+    """Swing as far to either side of where the model has the joint."""
+    angle = 2.0 * np.pi * 0.31 * motion.t
+    rate = 2.0 * np.pi * 0.31
+    return 1.4 * np.sin(angle), 1.4 * rate * np.cos(angle), -1.4 * rate**2 * np.sin(angle)
+
+
+def test_a_joint_nearer_to_the_hand_is_said_where_both_ends_of_its_swing_are_alike():
+    """What turns about a vertical axis feels the reach of links, and not to which side it is."""
+    whole = robot_from_urdf(UPRIGHT_URDF, gravity='earth')
+    waist = robot_from_urdf(UPRIGHT_URDF, gravity='earth', joints=('turn',))
+    motion = multisine(whole.joints, 20.0, RATE, seed=1, base_hz=0.12)
+    q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+    q[:, 1], dq[:, 1], ddq[:, 1] = swinging(motion, 1)
+    q[:, 2], dq[:, 2], ddq[:, 2] = 0.0, 0.0, 0.0
+    tau = inverse_dynamics(whole, type(motion)(motion.joints, motion.t, q, dq, ddq))
+    others = (PositionRange('shoulder', -1.4, 1.4), PositionRange('elbow', 0.0, 0.0))
+    recording = Recording(
+        joints=('turn',), t=motion.t, q=q[:, :1], tau=tau[:, :1], source='run', others=others
+    )
+    used = conditioning([recording], SignalSettings())
+    (found,) = held_elsewhere(waist, [recording], list(segments(recording, used)))
+    assert 'joint shoulder is not driven, but moves from -1.4 to 1.4 rad' in found.text
+    assert found.spoils
+    stretches = [part.stretch for part in trajectories([recording], used)]
+    faults, _ = check_data(ArmModel(waist), [recording], used, stretches)
+    assert found.text.split(';')[0] in '; '.join(faults)
 
 
 def test_a_joint_that_carries_others_and_stands_elsewhere_is_said(whole):
