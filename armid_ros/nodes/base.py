@@ -10,7 +10,13 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.complaints import Complaints
-from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter
+from armid_ros.nodes.parameters.table import (
+    as_declared,
+    declare,
+    is_as,
+    NodeParameter,
+    unknown,
+)
 from armid_ros.nodes.running.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -21,8 +27,9 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-#: How long a simulation may take to publish /clock before it is said that nothing does [s].
-_CLOCK_PATIENCE = 5.0
+#: How long a simulation may take to publish /clock, and others to send what a node waits for,
+#: before it is said that nothing does [s].
+_PATIENCE = 5.0
 
 EXECUTOR = NodeParameter(
     name='executor',
@@ -56,14 +63,15 @@ class ArmidNode(Node):
         super().__init__(name, **kwargs)
         self.complaints = Complaints(self.get_logger())
         self._paced: dict[str, tuple[Callable[[], None], Timer]] = {}
-        self._clock_missed = False
+        self._clock_missed = self._trouble_said = False
         declare(self, self.parameters())
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_CLOCK_PATIENCE, self.look_for_clock, clock=steady)
+        self.create_timer(_PATIENCE, self.look_for_clock, clock=steady)
+        self.create_timer(_PATIENCE, self.look_for_trouble, clock=steady)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
@@ -117,6 +125,19 @@ class ArmidNode(Node):
         if missing and not self._clock_missed:
             self.get_logger().warning(f'{missing}; until then the node waits')
         self._clock_missed = bool(missing)
+
+    def look_for_trouble(self) -> None:
+        """Log once what keeps the node from its work: not everybody looks at /diagnostics."""
+        trouble = '' if self.missing_clock else self.condition()[0]
+        if trouble and not self._trouble_said:
+            self.get_logger().info(trouble)
+        self._trouble_said = bool(trouble)
+
+    def warn_of_unknown(self) -> None:
+        """Log the parameters that the node was started with and does not have."""
+        said = unknown(self)
+        if said:
+            self.complaints.say('parameter', said)
 
     @property
     def finished(self) -> bool:

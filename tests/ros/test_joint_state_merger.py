@@ -52,6 +52,23 @@ def test_joints_of_two_senders_are_one_message_in_the_order_asked_for(bench):
     assert out[0].header.stamp == stamp_of(1.05)
 
 
+@pytest.mark.parametrize(
+    ('joints', 'waits_for'),
+    [
+        (JOINTS, 'no position of a, b so far; no torque of a, b so far'),
+        (('',), 'waiting for robot_description'),
+    ],
+)
+def test_what_it_waits_for_is_logged_once(bench, joints, waits_for):
+    logged = bench.rosout()
+    node = bench.add(JointStateMergerNode, joints=list(joints))
+    for _ in range(3):
+        node.look_for_trouble()
+    bench.spin_until(lambda: logged, 'the log')
+    bench.settle()
+    assert [log.msg for log in logged] == [waits_for]
+
+
 def test_joint_states_on_several_topics_are_merged(bench):
     node, out = merger(bench, position_topics=['left', 'right'])
     left, right = (sender(bench, node, JointState, topic) for topic in ('left', 'right'))

@@ -5,7 +5,13 @@
 from __future__ import annotations
 
 from armid_ros.nodes.base import EXECUTOR
-from armid_ros.nodes.parameters.table import declare, NodeParameter, ParameterError
+from armid_ros.nodes.parameters.table import (
+    as_declared,
+    declare,
+    names,
+    NodeParameter,
+    ParameterError,
+)
 from armid_ros.nodes.recorder import RecorderNode
 import pytest
 from rclpy.node import Node
@@ -16,7 +22,9 @@ TABLE = (
     NodeParameter('count', 3, 'How many.', lower=1, upper=9, read_only=False),
     NodeParameter('kind', 'a', 'Which.', choices=('a', 'b'), read_only=False),
     NodeParameter('fixed', True, 'Whether.'),
-    NodeParameter('names', [''], 'Who.'),
+    NodeParameter('names', ['b'], 'Who.', read_only=False),
+    NodeParameter('gains', [1.0], 'How much.'),
+    NodeParameter('text', '', 'What.'),
 )
 
 
@@ -38,12 +46,47 @@ class Declared(Node):
         ('kind', 'c', "'kind' is 'c', not one of a, b"),
         ('kind', 7, 'quote it'),
         ('fixed', 1, 'use a value such as true'),
+        ('gains', [], r"'gains' is empty; use a value such as \[1\.0\]"),
+        ('text', [], "'text' is empty; give it a text, or leave it out"),
     ],
 )
 def test_a_wrong_override_is_refused_with_what_to_write(bench, name, value, advice):
     with pytest.raises(ParameterError, match=advice) as error:
         bench.add(Declared, **{name: value})
     assert '\n' not in str(error.value)
+
+
+@pytest.mark.parametrize('given', [{'names': []}, {'cli_args': ['-p', 'names:=[]']}])
+def test_an_empty_list_is_no_names(bench, given):
+    if 'cli_args' in given:
+        given = {'cli_args': ['--ros-args', *given['cli_args']]}
+    node = bench.add(Declared, **given)
+    assert names(node, 'names') == ()
+    assert names(bench.add(Declared, namespace='other'), 'names') == ('b',)
+
+
+def test_an_empty_list_is_no_names_while_running(bench, tmp_path):
+    node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), record=False, topics=['a'])
+    for empty in (Parameter('topics', Parameter.Type.NOT_SET), Parameter('topics', value=[])):
+        assert as_declared(node, empty).value == ['']
+
+
+def test_parameters_that_a_node_does_not_have_are_named_once_but_not_those_of_ros(bench, tmp_path):
+    said = bench.rosout()
+    given = {'bag': str(tmp_path / 'bag'), 'record': False, 'use_sim_time': False}
+    node = bench.add(RecorderNode, compresion='zstd', rte=200.0, **given)
+    node.warn_of_unknown()
+    bench.spin_until(lambda: any('is named' in log.msg for log in said), 'the warning')
+    (text,) = [log.msg for log in said if 'is named' in log.msg]
+    assert "'compresion'; did you mean 'compression'?" in text and "'rte'" in text
+    assert not any(name in text for name in given)
+    assert node.complaints.counts['parameter'] == 1
+
+
+def test_a_node_with_the_parameters_it_has_warns_of_none(bench, tmp_path):
+    node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), record=False)
+    node.warn_of_unknown()
+    assert not node.complaints.counts
 
 
 def test_descriptors_hold_unit_range_choices_and_read_only(bench):

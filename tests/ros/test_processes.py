@@ -52,9 +52,11 @@ class Processes:
         self.running = []
 
     def start(self, node, *parameters):
-        options = [part for p in parameters for part in ('-p', p)]
+        return self.run(node, '--ros-args', *(part for p in parameters for part in ('-p', p)))
+
+    def run(self, node, *arguments):
         process = subprocess.Popen(
-            [sys.executable, '-m', f'armid_ros.nodes.{node}', '--ros-args', *options],
+            [sys.executable, '-m', f'armid_ros.nodes.{node}', *arguments],
             env=self._environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -221,6 +223,24 @@ def test_a_wrong_start_ends_with_one_clear_line(processes, node, parameter, line
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
     assert line in errors and len(errors.strip().splitlines()) == 1, errors
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'line'),
+    [
+        (['--ros-args', '-p', 'bag'], '-p bag: write -p NAME:=VALUE'),
+        (['--ros-args', '--params-file', 'nope.yaml'], 'nope.yaml: there is no such file'),
+        (['--bag', 'run'], '--bag run: recorder takes arguments of ROS alone'),
+    ],
+)
+def test_arguments_that_cannot_be_read_end_a_process_with_a_line_that_names_them(
+    processes, arguments, line
+):
+    process = processes.run('recorder', *arguments)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert errors.strip().splitlines()[-1].startswith(line), errors
+    assert 'Traceback' not in errors
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,13 @@ the page of the documentation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 import math
 import re
 from typing import Any
 
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, meant
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -26,6 +26,9 @@ from rcl_interfaces.msg import (
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+
+#: Parameters that ROS gives to nodes.
+_ROS = ('use_sim_time', 'start_type_description_service')
 
 Value = bool | int | float | str | list[str] | list[float]
 
@@ -41,7 +44,7 @@ class NodeParameter:
         Its name.
     default : bool, int, float, str, list of str or list of float
         Value when nothing else is said; it fixes the type. A list must not be empty, since ROS
-        cannot tell the type of an empty one: [''] stands for no names.
+        cannot tell the type of an empty one: [''] stands for no names, and [] is taken for it.
     description : str
         What it does, in one sentence.
     unit : str
@@ -127,17 +130,38 @@ def declare(node: Node, table: Iterable[NodeParameter]) -> None:
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(validate)
+    given = overrides(node)
     for entry in entries.values():
+        nothing = entry.name in given and not _has_type(given[entry.name])
+        default = _none_of(entry) if nothing else entry.default
         try:
-            node.declare_parameter(entry.name, entry.default, entry.descriptor())
+            node.declare_parameter(
+                entry.name, default, entry.descriptor(), ignore_override=nothing
+            )
         except InvalidParameterTypeException as error:
             raise ParameterError(_explain_type(entry, str(error))) from error
         except InvalidParameterValueException as error:
             raise ParameterError(_explain_value(entry, str(error))) from error
 
 
+def overrides(node: Node) -> Mapping[str, Parameter]:
+    """Return what a node was given when it was started, by name, declared or not."""
+    given: Mapping[str, Parameter] = node._parameter_overrides
+    return given
+
+
+def unknown(node: Node) -> str:
+    """Say which parameters a node was given that it does not have; empty if none."""
+    mine = {name for name in node.get_parameters_by_prefix('') if not _of_ros(name)}
+    wrong = [name for name in overrides(node) if name not in mine and not _of_ros(name)]
+    if not wrong:
+        return ''
+    named = '; '.join(f"no parameter is named '{name}'{meant(name, mine)}" for name in wrong)
+    return f'{named}; left out, see --help'
+
+
 def as_declared(node: Node, parameter: Parameter) -> Parameter:
-    """Return a parameter whose numbers are of the type that the node declared."""
+    """Return a parameter of the type that the node declared: numbers, and no names."""
     floats = {
         Parameter.Type.DOUBLE: (Parameter.Type.INTEGER, float),
         Parameter.Type.DOUBLE_ARRAY: (Parameter.Type.INTEGER_ARRAY, lambda v: list(map(float, v))),
@@ -145,6 +169,8 @@ def as_declared(node: Node, parameter: Parameter) -> Parameter:
     if node.has_parameter(parameter.name):
         declared = node.get_parameter(parameter.name).type_
         whole, convert = floats.get(declared, (None, None))
+        if declared == Parameter.Type.STRING_ARRAY and not _has_type(parameter):
+            return Parameter(parameter.name, declared, [''])
         if parameter.type_ == whole and convert is not None:
             return Parameter(parameter.name, declared, convert(parameter.value))
     return parameter
@@ -164,6 +190,29 @@ def names(node: Node, parameter: str) -> tuple[str, ...]:
     return tuple(name for name in values if name)
 
 
+def _has_type(parameter: Parameter) -> bool:
+    """Whether a value says what it is; an empty list has lost that, or has any."""
+    return parameter.type_ is not Parameter.Type.NOT_SET and parameter.value != []
+
+
+def _none_of(entry: NodeParameter) -> Value:
+    """Return what stands for an empty list of names; of anything else there is none."""
+    if isinstance(entry.default, list) and all(isinstance(one, str) for one in entry.default):
+        return ['']
+    raise ParameterError(f"parameter '{entry.name}' is empty; {_instead(entry)}")
+
+
+def _instead(entry: NodeParameter) -> str:
+    """Say what a value may look like."""
+    value = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
+    return f'use a value such as {value}' if value != '' else 'give it a text, or leave it out'
+
+
+def _of_ros(name: str) -> bool:
+    """Whether ROS itself has a parameter, in any node."""
+    return name in _ROS or name.startswith('qos_overrides.')
+
+
 def _explain_type(entry: NodeParameter, text: str) -> str:
     """Say what to write instead, for the mistake everybody makes: 100 for 100.0."""
     found = re.search(r"to '(.*)' of type '(\w+)'", text, re.DOTALL)
@@ -173,8 +222,7 @@ def _explain_type(entry: NodeParameter, text: str) -> str:
     elif isinstance(entry.default, str):
         instead = f'quote it twice: -p {entry.name}:="\'{value}\'"'
     else:
-        example = str(entry.default).lower() if isinstance(entry.default, bool) else entry.default
-        instead = f'use a value such as {example}'
+        instead = _instead(entry)
     return f"parameter '{entry.name}' cannot be {value} of type {given}; {instead}"
 
 

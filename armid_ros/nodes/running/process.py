@@ -13,10 +13,12 @@ import sys
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.parameters.table import ParameterError
+from armid_ros.nodes.running.arguments import stray, unreadable
 from armid_ros.nodes.running.steady import steady
 from armid_ros.nodes.running.usage import is_asked_for, usage
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -101,8 +103,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     hung_up = _note_hang_up()
     try:
         with ending.at_once():
-            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-            node = make_node()
+            node = _made(make_node, args)
         executor = make_executor(node.value('executor'))
         executor.add_node(node)
         with steady():
@@ -125,6 +126,29 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     if hung_up:
         trouble.append('ended by SIGHUP, as by a terminal that is closed')
     _exit(trouble, node)
+
+
+def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> ArmidNode:
+    """
+    Begin with ROS and make a node.
+
+    Raises
+    ------
+    ParameterError
+        Where arguments cannot be read, or are none of ROS.
+
+    """
+    own = sys.argv[1:] if args is None else args
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+        raise ParameterError(unreadable(error)) from error
+    said = stray(own, Path(sys.argv[0]).stem)
+    if said:
+        raise ParameterError(said)
+    node = make_node()
+    node.warn_of_unknown()
+    return node
 
 
 def _exit(trouble: list[str], node: ArmidNode | None) -> None:
