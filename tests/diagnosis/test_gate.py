@@ -83,15 +83,20 @@ def test_exchanged_joints_are_no_unit_since_the_baseline(upright, quantity, firs
     assert f'the {quantity} of {names[0]} and of {names[1]} seem to be exchanged' in said
 
 
-@pytest.mark.parametrize(
-    ('factor', 'said'),
-    [(1.0 / 9.80665, 'in kgf m if'), (1.0 / 9.0, '0.111 times'), (0.2, '0.2 times')],
-)
-def test_a_unit_leaves_what_a_right_unit_leaves(upright, factor, said):
-    before, now = upright.recordings(), scaled(upright.recordings(seed=1), factor)
-    (fault,) = faults_since(upright.arm, now, before)
-    assert said in fault
-    assert 'baseline' in fault and 'convert them' in fault
+@pytest.mark.parametrize('seed', [1, 2])
+def test_torques_in_kilogram_force_metres_since_the_baseline(upright, seed):
+    now = scaled(upright.recordings(seed=seed), 1.0 / 9.80665)
+    (fault,) = faults_since(upright.arm, now, upright.recordings())
+    assert 'in kgf m if those of the baseline are in N m: convert them' in fault
+
+
+@pytest.mark.parametrize('factor', [0.07, 1.0 / 9.0, 0.2])
+def test_a_factor_that_leaves_less_than_a_unit_is_none(upright, factor):
+    """Converted by that of kgf m, torques of a ninth are 9 % too large."""
+    now = scaled(upright.recordings(seed=1), factor)
+    (fault,) = faults_since(upright.arm, now, upright.recordings())
+    assert 'times those of the baseline, which is no unit (currents?)' in fault
+    assert float(fault.split('are ')[1].split()[0]) == pytest.approx(factor, rel=0.1)
 
 
 def test_masses_in_grams_are_no_unit_of_torques_that_are_as_before(bench):

@@ -263,13 +263,14 @@ def _baseline_factor(
     """
     Return by what factor torques of a baseline are those of the model; None where nothing tells.
 
-    Its masses are what it has wrong on both days. One that knows the torque of no joint of the
-    baseline tells nothing.
+    Its masses are what it has wrong on both days, where a factor leaves less than none does. One
+    that knows the torque of no joint of the baseline tells nothing.
 
     """
     then = effort_factor(arm.body, before, used)
     if then is None:
         return None
+    then = 1.0 if is_factor(arm.body, before, used, 1.0) else then
     known = knows(ArmModel(arm.body), slow_motions_of(before, used), then)
     return then if np.any(known) else None
 

@@ -189,7 +189,7 @@ def is_factor(
         _described(robot, motions)(hypothesis)
         for motions, hypothesis in ((slow, OtherUnit()), (converted, AsRecorded()))
     )
-    return free is not None and fixed is not None and fixed[0].gain(free[0]) < LIMITS.gain
+    return free is not None and fixed is not None and fixed[0].gain(free[0]) < LIMITS.gain**0.5
 
 
 def _predicts(judge: Judge) -> bool:

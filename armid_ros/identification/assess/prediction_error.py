@@ -28,6 +28,8 @@ _BLOCKS = 10
 _OWN = 4
 #: A joint below this share of its top speed may be held by its friction.
 _SLOW = 0.05
+#: Fits of what joints share: the first tells how much each leaves.
+_PASSES = 4
 
 
 @dataclass(frozen=True)
@@ -206,15 +208,27 @@ def _left(columns: FloatArray, rest: FloatArray, fitted: npt.NDArray[np.bool_]) 
 def _shared_values(
     own: FloatArray, rest: FloatArray, shared: FloatArray, fitted: npt.NDArray[np.bool_]
 ) -> FloatArray:
-    """Fit what joints share, with what each has of its own taken out (Frisch and Waugh 1933)."""
+    """
+    Fit what joints share, with what each has of its own taken out (Frisch and Waugh 1933).
+
+    Joints count by what they leave, down to the floor: one whose friction is another than what is
+    fitted to it tells little of what all have in common.
+
+    """
     if shared.shape[2] == 0:
         return np.empty(0)
     both = np.concatenate([shared[fitted], rest[fitted, :, np.newaxis]], axis=2)
     both = both.transpose(1, 0, 2)
-    basis, size, _ = np.linalg.svd(own[:, fitted], full_matrices=False)
-    basis = basis * (size > 1e-9 * size[:, :1])[:, np.newaxis]
-    stacked = (both - basis @ (basis.transpose(0, 2, 1) @ both)).reshape(-1, both.shape[2])
-    return np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
+    basis, told, _ = np.linalg.svd(own[:, fitted], full_matrices=False)
+    basis = basis * (told > 1e-9 * told[:, :1])[:, np.newaxis]
+    both -= basis @ (basis.transpose(0, 2, 1) @ both)
+    values, size = np.empty(0), np.ones(len(both))
+    for _ in range(_PASSES):
+        stacked = (both / size[:, np.newaxis, np.newaxis]).reshape(-1, both.shape[2])
+        values = np.asarray(np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=None)[0])
+        left = both[:, :, -1] - both[:, :, :-1] @ values
+        size = np.maximum(np.sqrt(np.mean(left**2, axis=1)), LIMITS.floor)
+    return values
 
 
 def _own_columns(motion: Motion, joint: int) -> FloatArray:
