@@ -254,9 +254,8 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
     names = Names.of(replace(chosen, explanation=explanation), unseen, arm, settings)
-    explanation, notes = names.stated, [*notes, *names.notes]
-    if unseen is not None and not names.shares.predicted:
-        notes.append(_HARDLY_SHOWN)
+    hardly = unseen is not None and not names.shares.predicted
+    explanation, notes = names.stated, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
     found = findings(explanation, names.shares, arm, asked.rng)
     measured = Leaving(chosen, unseen, asked.before, arm, settings)
     refitted = measured.as_it_is(explanation)
@@ -266,8 +265,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     left, resting = measured.beside(names), measured.resting(names)
     open_gap = any(one.ratio.max() > 1.0 for one in (*left, *resting))
     asked = asked.doubting(found, None if open_gap else as_it_is, chosen.floor_in_words)
-    unnamed = not_named(explanation, arm)
-    matters = settings.material * evidence.torque_rms
+    unnamed, matters = not_named(explanation, arm), settings.material * evidence.torque_rms
     hides = None if chosen.measured else hiding(names.rest, settings)
     blind = blind_joints(evidence, arm.robot.joints, hides)
     word = decide(

@@ -428,7 +428,7 @@ def test_what_a_model_lacks_in_every_motion_is_no_part_of_a_stated_value(bench):
         return [0.3, 0.18] * (np.sin(2.2 * motion.q + 0.4) + curve)
 
     def today(motion, tau):
-        return always(motion, tau) + [0.0, 0.25]
+        return always(motion, tau) + np.array([0.0, 0.25])
 
     rng = np.random.default_rng(0)
     before = bench.recordings(always, seed=1)[:2]
