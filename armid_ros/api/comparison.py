@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import Shown, Summary
-from armid_ros.files import json_text, write_file
+from armid_ros.files import json_text, staged, write_file
 from armid_ros.identification.assess.comparison import compare as run
 from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
@@ -70,11 +70,11 @@ class ComparisonResult(Shown):
 
     def save(self, folder: str | Path) -> Path:
         """Write comparison.json and report.html as ``armid compare`` does."""
-        out = Path(folder)
-        out.mkdir(parents=True, exist_ok=True)
-        write_file(out / 'comparison.json', json_text(self.document(), indent=1))
-        self.report(out / 'report.html')
-        return out
+        with staged(Path(folder)) as result:
+            write_file(result.folder / 'comparison.json', json_text(self.document(), indent=1))
+            self.report(result.folder / 'report.html')
+            result.keep()
+        return result.out
 
     def summary(self) -> Summary:
         """Return what changed, the surest first."""

@@ -28,7 +28,7 @@ from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
-from armid_ros.files import write_file
+from armid_ros.files import staged, write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.identified_from import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
@@ -139,15 +139,15 @@ class DiagnosisResult(Shown):
 
     def save(self, folder: str | Path) -> Path:
         """Write diagnosis.json, model.yaml and report.html as ``armid diagnose`` does."""
-        out = Path(folder)
-        out.mkdir(parents=True, exist_ok=True)
-        text = json.dumps(self.document(), indent=1)
-        write_file(out / 'diagnosis.json', text)
-        save_model(out / 'model.yaml', self.arm, self._robot, self.core.estimate)
-        if self.residual is not None:
-            write_file(out / TABLE_FILE, lookup_table(self.residual))
-        self.report(out / 'report.html')
-        return out
+        with staged(Path(folder)) as result:
+            part = result.folder
+            write_file(part / 'diagnosis.json', json.dumps(self.document(), indent=1))
+            save_model(part / 'model.yaml', self.arm, self._robot, self.core.estimate)
+            if self.residual is not None:
+                write_file(part / TABLE_FILE, lookup_table(self.residual))
+            self.report(part / 'report.html')
+            result.keep()
+        return result.out
 
     def summary(self) -> Summary:
         """Return what was named, with values."""

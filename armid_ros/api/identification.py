@@ -27,7 +27,7 @@ from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf
 from armid_ros.diagnosis import known_misfit
 from armid_ros.estimate import Estimate
-from armid_ros.files import write_file
+from armid_ros.files import staged, write_file
 from armid_ros.identification import (
     Fit,
     Grade,
@@ -177,16 +177,17 @@ class IdentificationResult(Shown):
 
     def save(self, folder: str | Path) -> Path:
         """Write model.yaml, identification.json and report.html as ``armid identify`` does."""
-        out = Path(folder)
-        out.mkdir(parents=True, exist_ok=True)
-        save_model(out / 'model.yaml', self.arm, self._robot, self.estimate, self._misfit)
-        write_document(out / 'identification.json', with_contents(self.document()))
-        self.report(out / 'report.html')
-        if self.core.physical is not None:
-            self.urdf(out / 'identified.urdf')
-            text = arm_mjcf(self.arm).text
-            write_file(out / 'identified.mjcf.xml', text)
-        return out
+        with staged(Path(folder)) as result:
+            part = result.folder
+            save_model(part / 'model.yaml', self.arm, self._robot, self.estimate, self._misfit)
+            write_document(part / 'identification.json', with_contents(self.document()))
+            self.report(part / 'report.html')
+            if self.core.physical is not None:
+                self.urdf(part / 'identified.urdf')
+                text = arm_mjcf(self.arm).text
+                write_file(part / 'identified.mjcf.xml', text)
+            result.keep()
+        return result.out
 
     def summary(self) -> Summary:
         """Return errors joint by joint, with the friction."""

@@ -19,14 +19,15 @@ import click
 
 def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -> None:
     """Say what changed between two identifications of one robot."""
-    options.hold(out, SCHEMA)
+    staged = options.stage(out, SCHEMA)
     first, second = read_parameters(before), read_parameters(after)
     comparison = run(first, second)
     files = [Path(first.source), Path(second.source)]
     page = compare_report(comparison, provenance(files))
     document = comparison.document()
-    write_file(out / 'report.html', page)
-    write_file(out / 'comparison.json', json_text(document, indent=1))
+    write_file(staged.folder / 'report.html', page)
+    write_file(staged.folder / 'comparison.json', json_text(document, indent=1))
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:

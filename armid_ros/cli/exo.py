@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from armid_ros.cli.groups import gathered
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say, Tick
 from armid_ros.errors import ModelError
-from armid_ros.files import json_text, write_file
+from armid_ros.files import json_text, settled, write_file
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
@@ -41,7 +41,7 @@ from armid_ros.pair.shares import ground_by_shares
 from armid_ros.pair.torque_driven import check_gait
 from armid_ros.pair.walkers import walking_pair
 from armid_ros.recording import read_recording, Recording, write_joint_states
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import require_new, whole_bag
 from armid_ros.robots.assumptions import read_assumptions
 import click
 import numpy as np
@@ -113,9 +113,11 @@ def exo(
     names = topics.split(',')
     if len(names) != 2:
         raise ModelError(f'--topics {topics}: give two, of the machine and of its wearer')
-    options.hold(out, SCHEMA)
+    if bag is None:
+        require_new(out / 'recording')
+    staged = options.stage(out, SCHEMA)
     with progress('recording') as tick:
-        path = out / 'recording' if bag is None else bag
+        path = staged.folder / 'recording' if bag is None else bag
         if bag is None:
             simulated.record(path, names, pair, gait, np.random.default_rng(seed))
         both = _read(path, names, pair)
@@ -132,8 +134,9 @@ def exo(
             [path], {'inertias': inertias, 'topics': topics}, seed if bag is None else None
         ),
     )
-    write_file(out / 'report.html', page)
-    write_file(out / 'exo.json', json_text(document, indent=1))
+    write_file(staged.folder / 'report.html', page)
+    write_file(staged.folder / 'exo.json', json_text(document, indent=1))
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
         return
@@ -159,7 +162,8 @@ def _read(bag: Path, topics: Sequence[str], pair: TiedPair) -> tuple[Recording, 
         for one, topic in zip((pair.robot, pair.other), topics, strict=True)
     )
     options.tell_damage(machine, wearer)
-    return machine, wearer
+    source = str(settled(bag))
+    return replace(machine, source=source), replace(wearer, source=source)
 
 
 def _tell(document: dict[str, Any]) -> None:

@@ -153,7 +153,7 @@ def identify(
     as_json: bool,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
-    options.hold(out, SCHEMA, robot.robot_source)
+    staged = options.stage(out, SCHEMA, robot.robot_source)
     loaded = robot.load(data.bags, tell=False)
     arm = options.with_effects(ArmModel(loaded, quasi_static=fit.quasi_static), fit.effects)
     known = bodies.settings(loaded)
@@ -167,10 +167,10 @@ def identify(
     )
     if work.scores:
         document['methods'] = [score.document() for score in work.scores]
-    source = options.kept_source(robot.robot_source, loaded, out)
+    source = options.kept_source(robot.robot_source, loaded, staged.folder)
     misfit = known_misfit(result, work.recordings, work.held_out)
-    save_model(out / 'model.yaml', result.arm, source, result.estimate, misfit)
-    exports = _export(result.arm, out) if bodies.physical else {}
+    save_model(staged.folder / 'model.yaml', result.arm, source, result.estimate, misfit)
+    exports = _export(result.arm, staged.folder) if bodies.physical else {}
     page = identification_report(
         result,
         description=arm,
@@ -181,9 +181,10 @@ def identify(
         assessment=Assessment(work.verification, work.graded, work.scores, exports),
         provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
-    write_file(out / 'report.html', page)
+    write_file(staged.folder / 'report.html', page)
     document = with_contents(document)
-    write_document(out / 'identification.json', document)
+    write_document(staged.folder / 'identification.json', document)
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:

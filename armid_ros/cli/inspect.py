@@ -41,8 +41,7 @@ def inspect(
     as_json: bool,
 ) -> None:
     """Look at a recording: a bag, or a table."""
-    if out is not None:
-        options.hold(out, SCHEMA, robot_source or '')
+    staged = None if out is None else options.stage(out, SCHEMA, robot_source or '')
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, gravity, joints, [bag])
@@ -54,11 +53,12 @@ def inspect(
             (recording,) = columns.read([bag], robot, topic, options.read_settings())
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = look(recording, robot, topics=topics, rng=np.random.default_rng(seed))
-    if out is not None:
+    if staged is not None:
         page = inspection_report(
             found, robot=robot_source or '', provenance=provenance([bag], seed=seed)
         )
-        write_file(out / 'inspection.html', page)
+        write_file(staged.folder / 'inspection.html', page)
+        staged.keep()
     if as_json:
         click.echo(json_text(inspection_document(found)))
         return

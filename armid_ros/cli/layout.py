@@ -15,7 +15,7 @@ from armid_ros.report.rviz import rviz_config
 
 def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
     """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
-    options.hold(out, SCHEMA)
+    staged = options.stage(out, SCHEMA)
     robot = options.open_robot(robot_source, 'earth', joints)
     files = {
         'plotjuggler.xml': plotjuggler_layout(robot.name, robot.joints, namespace),
@@ -23,5 +23,6 @@ def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> 
         'arm.rviz': rviz_config(robot.base, namespace),
     }
     for name, text in files.items():
-        write_file(out / name, text)
+        write_file(staged.folder / name, text)
+    staged.keep()
     say(f'{out}: {", ".join(files)}')

@@ -22,13 +22,14 @@ OUTPUTS = ('lunar.json', 'report.html')
 
 def lunar(out: Path, seed: int, as_json: bool) -> None:
     """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
-    options.hold(out, SCHEMA)
+    staged = options.stage(out, SCHEMA)
     with progress('designing the trajectory') as tick:
         found = reproduce(seed=seed, progress=tick)
     document = lunar_document(found)
-    write_document(out / 'lunar.json', document)
+    write_document(staged.folder / 'lunar.json', document)
     page = lunar_report(found, provenance=provenance([], {'robot': 'humanoid_arm'}, seed))
-    write_file(out / 'report.html', page)
+    write_file(staged.folder / 'report.html', page)
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
         return

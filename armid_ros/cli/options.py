@@ -14,7 +14,8 @@ from armid_ros.cli.commands import NOTES
 from armid_ros.cli.signatures.options import CRC, FORCE, MEMORY
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, RobotError, visible
-from armid_ros.files import default_memory_limit, result_folder, write_file
+from armid_ros.files import default_memory_limit, result_folder, Staged, staged, write_file
+from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.ros1 import is_ros1
@@ -53,6 +54,22 @@ def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) ->
     context = click.get_current_context()
     forced = bool(context.meta.get(FORCE, False))
     context.with_resource(result_folder(out, schema, robot, also=also, force=forced))
+
+
+def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> Staged:
+    """
+    Keep a folder as `hold` does, and return where to write until all of the result is there.
+
+    Nothing of it gets to the folder unless the command keeps it. Files of an earlier result that
+    the new one has not go with it, except a description that --robot names; with --force, which
+    leaves what it does not replace, they stay.
+
+    """
+    hold(out, schema, robot, also)
+    context = click.get_current_context()
+    replaced = () if context.meta.get(FORCE, False) else written_by(schema, also)
+    spared = (out / 'robot.urdf', *(Path(part) for part in (robot, robot.split(' ')[0]) if part))
+    return context.with_resource(staged(out, replaced, spared))
 
 
 def read_settings() -> ReadSettings:

@@ -6,7 +6,7 @@ Files as untrusted input, and as output that is whole or absent.
 Every reader of text goes through `read_text` (no FIFO, no device, a bounded size), `load_yaml` or
 `load_json` (bounded depth and expansion) and `reading`, which turns what a parser raises into the
 error of the package with the path. Every writer of results goes through `write_file`, inside the
-`result_folder` of its command.
+`result_folder` of its command and into what is `staged` there until all of it is written.
 
 """
 
@@ -20,7 +20,9 @@ from armid_ros.files.documents import (
 )
 from armid_ros.files.limits import available_memory, default_memory_limit, size_text
 from armid_ros.files.output import json_text, result_folder, write_file
+from armid_ros.files.own import settled
 from armid_ros.files.regular import is_file, open_regular, read_text
+from armid_ros.files.staging import Staged, staged
 
 __all__ = [
     'is_file',
@@ -35,6 +37,9 @@ __all__ = [
     'write_file',
     'json_text',
     'result_folder',
+    'Staged',
+    'staged',
+    'settled',
     'available_memory',
     'default_memory_limit',
     'size_text',

@@ -22,11 +22,11 @@ from typing import Any
 
 from armid_ros.errors import OutputError
 from armid_ros.files.documents import load_json, load_yaml, reading
-from armid_ros.files.own import refuse_foreign
+from armid_ros.files.own import refuse_foreign, settled
 from armid_ros.files.regular import read_text
 
 #: Files by whose schema a folder is known; each is the one that its command writes last.
-_RESULTS = (
+DOCUMENTS = (
     'identification.json',
     'diagnosis.json',
     'excitation.json',
@@ -70,7 +70,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
     except OSError as error:
         with suppress(OSError):
             beside.unlink(missing_ok=True)
-        raise OutputError(f'{path}: cannot be written: {error.strerror}') from error
+        raise OutputError(f'{settled(path)}: cannot be written: {error.strerror}') from error
 
 
 def json_text(document: Any, indent: int | None = None) -> str:
@@ -152,7 +152,7 @@ def _try_to_write(path: Path) -> None:
 
 
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
-    for name in _RESULTS:
+    for name in DOCUMENTS:
         if not os.path.lexists(path / name):
             continue
         try:
@@ -165,7 +165,7 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
             raise OutputError(f'{path}: holds {kind}, not {schema}; {_HINT}')
         if robot and other and not _same(robot, other):
             raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
-    alone = not any(os.path.lexists(path / name) for name in _RESULTS)
+    alone = not any(os.path.lexists(path / name) for name in DOCUMENTS)
     if alone and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
         _refuse_other_model(path, robot)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import re
 
 from armid_ros.errors import OutputError
-from armid_ros.files.regular import open_regular
+from armid_ros.files.regular import open_regular, read_text
 
 #: What each kind of result may leave in its folder.
 _WRITES = {
@@ -65,8 +65,13 @@ _WRITES = {
         'watch',
     ),
 }
+#: Folder in which a run writes until its result is whole.
+STAGING = '.armid-part'
 #: What a page has in its head.
 GENERATOR = '<meta name="generator" content="armid_ros">'
+#: Types of messages as metadata.yaml has them, and those of a bag that is to be run.
+_KIND = re.compile(r'^ *type: *(\S+)', re.MULTILINE)
+_OF_A_PLAN = {'trajectory_msgs/msg/JointTrajectory', 'std_msgs/msg/String'}
 #: Where a file says what it is [bytes from the beginning].
 _HEAD = 4096
 _SCHEMA = re.compile(rb'schema"?: *"?armid/[a-z_]+/[0-9]')
@@ -77,6 +82,16 @@ _MARKS = {
     '.rviz': _SCHEMA,
     'plotjuggler.xml': _SCHEMA,
 }
+
+
+def settled(path: Path) -> Path:
+    """Return where a file of a result in the making will be; another path as it is."""
+    return Path(*(part for part in path.parts if part != STAGING))
+
+
+def written_by(schema: str, also: Collection[str] = ()) -> tuple[str, ...]:
+    """Return the names of what a kind of result may leave; patterns such as '*.png' among them."""
+    return (*_WRITES.get(schema, ()), *also)
 
 
 def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> None:
@@ -100,8 +115,8 @@ def refuse_foreign(folder: Path, schema: str, also: Collection[str] = ()) -> Non
     """
     if schema not in _WRITES:
         return
-    writes = (*_WRITES[schema], *also)
-    names = sorted(path.name for path in folder.iterdir())
+    writes = written_by(schema, also)
+    names = sorted(path.name for path in folder.iterdir() if path.name != STAGING)
     for name in names:
         if not any(fnmatch(name.removeprefix('.').removesuffix('.part'), one) for one in writes):
             raise OutputError(
@@ -148,8 +163,20 @@ def _mark_of(name: str) -> re.Pattern[bytes] | None:
     return _MARKS.get(name) or _MARKS.get(Path(name).suffix)
 
 
+def is_plan(path: Path) -> bool:
+    """Tell whether a folder is a bag with a trajectory to run, and nothing that was measured."""
+    try:
+        text = read_text(path / 'metadata.yaml', OutputError)
+    except OutputError:
+        return False
+    kinds = set(_KIND.findall(text))
+    return 'trajectory_msgs/msg/JointTrajectory' in kinds <= _OF_A_PLAN
+
+
 def is_own(path: Path) -> bool:
-    """Tell whether a document or a page is a result of this package."""
+    """Tell whether a document, a page or a trajectory is a result of this package."""
+    if path.is_dir():
+        return is_plan(path)
     mark = _mark_of(path.name)
     if mark is None:
         return False

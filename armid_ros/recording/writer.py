@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+import os
 from pathlib import Path
 import shutil
 import time
@@ -74,6 +75,12 @@ def whole_bag(
         raise
 
 
+def require_new(path: Path) -> None:
+    """Raise a RecordingError where a bag, or anything, is already."""
+    if os.path.lexists(path):
+        raise RecordingError(f'{path}: exists already; choose another name, or remove it')
+
+
 class _OpenChunk(NamedTuple):
     """The records of a chunk that is not written yet."""
 
@@ -122,12 +129,9 @@ class BagWriter:
 
         """
         self.path = Path(path)
+        require_new(self.path)
         try:
             self.path.mkdir(parents=True)
-        except FileExistsError as error:
-            raise RecordingError(
-                f'{self.path}: exists already; choose another name, or remove it'
-            ) from error
         except OSError as error:
             raise RecordingError(f'{self.path}: cannot be made: {error.strerror}') from error
         self.file = self.path / f'{self.path.resolve().name}_0.mcap'

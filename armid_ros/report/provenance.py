@@ -11,6 +11,8 @@ from importlib import metadata
 from pathlib import Path
 import platform
 
+from armid_ros.files import settled
+
 _BLOCK = 1 << 20
 #: Packages whose version can change a result.
 _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
@@ -93,4 +95,4 @@ def _hash(path: Path) -> FileHash:
         while block := stream.read(_BLOCK):
             digest.update(block)
             size += len(block)
-    return FileHash(str(path), size, digest.hexdigest())
+    return FileHash(str(settled(path)), size, digest.hexdigest())

@@ -144,8 +144,6 @@ def test_speed_classes_come_in_folders_each_as_it_is_alone(tmp_path):
     assert f'at {100.0 * nearest:.0f} %' in page
     alone = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one').stdout
     assert json.loads(alone)['cost'] == medium['cost']
-    again = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one', code=2)
-    assert 'exists already' in again.stderr
 
 
 def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):

@@ -4,6 +4,7 @@
 
 from importlib.metadata import files
 import json
+import shutil
 
 from armid_ros.arm import ArmModel
 import armid_ros.cli.excite.files as excitation_files
@@ -170,6 +171,39 @@ def test_the_design_is_kept_where_no_way_leads_to_it(tmp_path, monkeypatch):
     refused = excite(ROBOT, tmp_path / 'plan', code=2).stderr
     assert 'excitation.yaml holds the design' in refused and 'walled in' in refused
     assert load_excitation(tmp_path / 'plan' / 'excitation.yaml').n_periods == 2
+
+
+def test_a_design_is_replaced_by_one_and_kept_where_the_next_one_fails(tmp_path, monkeypatch):
+    def nothing(*_, **__):
+        raise TrajectoryError('walled in')
+
+    out = tmp_path / 'plan'
+    excite(ROBOT, out)
+    first = {path: path.read_bytes() for path in out.rglob('*') if path.is_file()}
+    with monkeypatch.context() as patch:
+        patch.setattr(excitation_files, 'plan_run', nothing)
+        assert 'stays as it was' in excite(ROBOT, out, '--seed', 1, code=2).stderr
+    assert {path: path.read_bytes() for path in out.rglob('*') if path.is_file()} == first
+    excite(ROBOT, out, '--seed', 1)
+    second = {path: path.read_bytes() for path in out.rglob('*') if path.is_file()}
+    assert second.keys() == first.keys()
+    assert all(second[path] != first[path] for path in first if path.suffix != '.yaml')
+
+
+def test_steps_are_replaced_by_steps(tmp_path):
+    out, robot = tmp_path / 'steps', 'two_link_elastic'
+    for _ in range(2):
+        armid('excite', '--robot', robot, '--kind', 'steps', '--duration', 20, '--out', out)
+    assert [path.name for path in out.iterdir()] == ['trajectory']
+
+
+def test_a_recording_where_the_trajectory_goes_is_not_replaced(tmp_path, bags):
+    out = tmp_path / 'plan'
+    excite(ROBOT, out)
+    shutil.rmtree(out / 'trajectory')
+    shutil.copytree(bags[0], out / 'trajectory')
+    refused = excite(ROBOT, out, '--force', code=2).stderr
+    assert 'is no trajectory of armid excite; name another --out, or move it away' in refused
 
 
 @pytest.mark.parametrize('kind', ['revolute', 'continuous', 'prismatic'])

@@ -10,6 +10,7 @@ import shutil
 
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import make_effect
+from armid_ros.errors import OutputError
 from armid_ros.recording import read_recording, write_recording
 from armid_ros.robots import load_robot
 import numpy as np
@@ -269,3 +270,26 @@ def test_the_model_file_says_what_the_model_leaves(bags, tmp_path):
     assert misfit.rms == pytest.approx(held_out['rms'], rel=0.2)
     whole = held_out['relative_error_percent']
     assert misfit.relative_error_percent == pytest.approx(whole, rel=0.2)
+
+
+@pytest.mark.parametrize('end', [OutputError('the disk is full'), KeyboardInterrupt()])
+def test_a_run_that_fails_leaves_the_result_that_was_there(bags, tmp_path, monkeypatch, end):
+    """Model, numbers and page of a folder are those of one run."""
+
+    def fails(*_, **__):
+        raise end
+
+    out = tmp_path / 'out'
+    armid('identify', bags[0], '--robot', ROBOT, '--physical', '--out', out)
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    monkeypatch.setattr('armid_ros.cli.identify.write_document', fails)
+    code = 2 if isinstance(end, OutputError) else 1
+    armid('identify', bags[1], '--robot', ROBOT, '--out', out, code=code)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    monkeypatch.undo()
+    armid('identify', bags[1], '--robot', ROBOT, '--out', out)
+    assert {path.name for path in out.iterdir()} == {
+        'model.yaml',
+        'identification.json',
+        'report.html',
+    }

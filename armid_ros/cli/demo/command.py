@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-import shutil
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.arm import ArmModel, save_model
@@ -15,7 +15,7 @@ from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
-from armid_ros.files import json_text, load_yaml, read_text
+from armid_ros.files import json_text, load_yaml, read_text, settled
 from armid_ros.identification import (
     grade,
     identification_document,
@@ -27,7 +27,7 @@ from armid_ros.identification.assess.agreement import Agreement
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.identification.output import SCHEMA
 from armid_ros.motion import FloatArray
-from armid_ros.recording import read_recording
+from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import collision_model, load_robot, Robot
 from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -45,6 +45,12 @@ SENSORS = Sensors(
 #: Files that a folder to be filled may hold already, from a demo before.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
+#: What is written beside the story.
+_FILES = (
+    'bag, excitation.yaml, model.yaml, identification.json, torque.png, parameters.png, '
+    'convergence.png'
+)
+
 
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find what was hidden in the arm."""
@@ -54,25 +60,24 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     robot = load_robot(ROBOT, gravity=gravity)
     truth = true_arm(robot)
     nominal = ArmModel(robot, truth.effects)
-    options.hold(out, SCHEMA, ROBOT, [*OUTPUTS, '*.png'])
-    _make_room(out)
-
+    staged = options.stage(out, SCHEMA, ROBOT, [*OUTPUTS, '*.png'])
+    new = staged.folder
     excitation = _excite(nominal, rng)
-    save_excitation(excitation, out / 'excitation.yaml')
+    save_excitation(excitation, new / 'excitation.yaml')
     identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     target = identifier.base.values(truth.theta)
     plant = SimulatedArm(truth, rng=rng, sensors=SENSORS)
-    history, end = _run(plant, excitation, identifier, target, out / 'bag', rate)
+    history, end = _run(plant, excitation, identifier, target, new / 'bag', rate)
     again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     with progress('playing the bag back') as tick:
         replay = replay_lockstep(
-            out / 'bag',
+            new / 'bag',
             again,
             duration=end.duration,
             on_progress=lambda now: tick(now.t / now.duration),
         )
         tick(0.0, 'identifying offline')
-        recording = read_recording(out / 'bag', joints=robot.joints)
+        recording = _read(new / 'bag', robot)
         result = identify(nominal, [recording], rng=rng, progress=tick)
         graded = grade(result, nominal, [recording], {})
     offline = Agreement.of(result.estimate, result.base.values(truth.theta))
@@ -85,25 +90,24 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         'real_time_factor': end.real_time_factor,
         'held_out': _held_out_error(result.arm, truth, rng),
     }
-    save_model(out / 'model.yaml', result.arm, ROBOT, result.estimate)
-    write_document(out / 'identification.json', document)
+    save_model(new / 'model.yaml', result.arm, ROBOT, result.estimate)
     with progress('drawing'):
-        _draw(out, robot, result, history, target, result.base.values(truth.theta))
+        _draw(new, robot, result, history, target, result.base.values(truth.theta))
     if not as_json:
         say(f'{graded.word}: {graded.reasons[0]}')
-        say(f'online:  {online.sentence()}')
-        say(f'offline: {offline.sentence()}')
-        _tell(out, document, Score.of(result.training).relative_error_percent)
+        _tell(document, online, offline, Score.of(result.training).relative_error_percent)
     rng = np.random.default_rng([seed, 1])
     told = tell_story(
-        out / 'story', truth, result.arm, recording, sensors=SENSORS, rng=rng, hide=hide, rate=rate
+        new / 'story', truth, result.arm, recording, sensors=SENSORS, rng=rng, hide=hide, rate=rate
     )
     document['story'] = told.document()
-    write_document(out / 'identification.json', document)
+    write_document(new / 'identification.json', document)
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:
         show_story(told, out / 'story')
+        say(f'{out}: {_FILES}')
 
 
 def _run(
@@ -138,19 +142,6 @@ def true_arm(robot: Robot) -> ArmModel:
     for name, values in true['effects'].items():
         arm = arm.with_effect(make_effect(name, robot), values)
     return arm
-
-
-def _make_room(out: Path) -> None:
-    """Take away what a demo left."""
-    ours = {*OUTPUTS, *(path.name for path in out.glob('*.png'))}
-    ours |= {f'.{name}.part' for name in ours}  # of a demo that was killed
-    for path in out.iterdir():
-        if path.name not in ours:
-            continue
-        if path.is_dir():
-            shutil.rmtree(path)
-        else:
-            path.unlink()
 
 
 def _excite(arm: ArmModel, rng: np.random.Generator) -> Excitation:
@@ -202,7 +193,16 @@ def _draw(
     save_figure(figure, out / 'convergence.png')
 
 
-def _tell(out: Path, document: dict[str, Any], training: float) -> None:
+def _read(bag: Path, robot: Robot) -> Recording:
+    """Read what was recorded, under the name that it is going to have."""
+    return replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
+
+
+def _tell(
+    document: dict[str, Any], online: Agreement, offline: Agreement, training: float
+) -> None:
+    say(f'online:  {online.sentence()}')
+    say(f'offline: {offline.sentence()}')
     say(
         f'relative error {training:.2f} % with the noise, {document["held_out"]:.2f} % of the '
         'true torque in a motion that was never run'
@@ -210,8 +210,4 @@ def _tell(out: Path, document: dict[str, Any], training: float) -> None:
     say(
         f'the bag played back gives the online estimate again, to '
         f'{document["replay_difference"]:.1g}'
-    )
-    say(
-        f'{out}: bag, excitation.yaml, model.yaml, identification.json, torque.png, '
-        'parameters.png, convergence.png'
     )

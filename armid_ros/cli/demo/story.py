@@ -11,7 +11,7 @@ revealed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import diagnose, Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
+from armid_ros.files import settled
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
@@ -295,4 +296,4 @@ def _recorded(
         record_lockstep(
             SimulatedArm(arm, rng=rng, sensors=sensors), run, bag, rate=rate, on_progress=tick
         )
-    return read_recording(bag, joints=arm.robot.joints)
+    return replace(read_recording(bag, joints=arm.robot.joints), source=str(settled(bag)))

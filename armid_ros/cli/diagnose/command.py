@@ -157,7 +157,7 @@ def diagnose(
     """Find which effect a model lacks, and add it."""
     if asked.residual is not None:
         require_libraries()
-    options.hold(out, SCHEMA, robot.robot_source)
+    staged = options.stage(out, SCHEMA, robot.robot_source)
     loaded = robot.load(data.bags)
     arm = ArmModel(loaded) if asked.model is None else _model_of(asked.model, loaded)
     arm = options.with_effects(arm, asked.effects)
@@ -183,17 +183,19 @@ def diagnose(
         case = DiagnosisCase(
             arm,
             robot.robot_source,
-            options.kept_source(robot.robot_source, loaded, out),
+            options.kept_source(robot.robot_source, loaded, staged.folder),
             DiagnosedRecordings(recordings, held_out, before),
             settings,
             None if data.baseline else misfit,
             provenance([*data.bags, *data.validate, *data.baseline], seed=seed),
             asked.residual is not None,
         )
-        write_results(out, result, case, Extras())
+        write_results(staged.folder, result, case, Extras())
+        staged.keep()
         extras = make_extras(result, case, seed, tick)
         tick(1.0, 'writing')
-        document = write_results(out, result, case, extras)
+        document = write_results(staged.folder, result, case, extras)
+        staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:

@@ -33,8 +33,9 @@ from armid_ros.elastic.plant.signals import (
 from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
 from armid_ros.elastic.report.page import elastic_report
 from armid_ros.errors import RecordingError, RobotError
-from armid_ros.files import json_text, write_file
+from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
+from armid_ros.recording.writer import require_new
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import (
@@ -48,6 +49,8 @@ from armid_ros.simulation.motor_control import VelocityLoop
 import click
 import numpy as np
 
+#: Recordings that --demo makes.
+DEMO_BAGS = ('resonances', 'steps')
 #: Noise of the simulated sensors: rates in rad/s, accelerations in rad/s^2, at the joints.
 SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
 STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_acceleration=0.2)
@@ -160,16 +163,16 @@ def elastic(
     if model is not None:
         raise RobotError('--model has no place in the three steps, which find the inertias')
     pair = drives.pair(robot)
-    options.hold(out, SCHEMA, robot_source)
+    staged = options.stage(out, SCHEMA, robot_source)
     with progress('reading') as tick:
         if demo.demo:
-            data = _simulate(pair, out, demo.experiments, seed, tick)
+            data = _simulate(pair, staged, demo.experiments, seed, tick)
         elif not data.bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
         result = _identify(pair, data, printed, tick)
         tick(1.0, 'drawing')
         known, table = _known(robot, pair.shipped, begin)
-        files = _draw(result, known, out)
+        files = _draw(result, known, staged.folder)
         page = elastic_report(
             result,
             robot.name,
@@ -177,14 +180,15 @@ def elastic(
             source=table,
             provenance=_provenance(data, begin, seed if demo.demo else None),
         )
-        write_file(out / 'report.html', page)
+        write_file(staged.folder / 'report.html', page)
     document = elastic_document(result, robot_source)
     story = None
     if demo.demo and result.tuning is not None:
         start = printed or result.untuned
         story = TuningStory.of(result.tuning, start, pair.shipped.parameters)
         document['story'] = story.document()
-    write_file(out / 'elastic.json', json_text(document, indent=1))
+    write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
         return
@@ -231,24 +235,29 @@ def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
     return values
 
 
-def _simulate(pair: _Machine, out: Path, experiments: int, seed: int, tick: Tick) -> ElasticData:
+def _simulate(
+    pair: _Machine, staged: Staged, experiments: int, seed: int, tick: Tick
+) -> ElasticData:
     """Write bags of the simulated arm: through the resonances, and steps."""
+    for name in DEMO_BAGS:
+        require_new(staged.out / name)
+    resonances, steps = (staged.folder / name for name in DEMO_BAGS)
     rng, shipped = np.random.default_rng(seed), pair.shipped
     plant = two_link_plant(shipped.parameters)
     plans = (
         (
-            out / 'resonances',
+            resonances,
             two_link_loop(shipped, WEAK),
             resonance_experiments(experiments, rms=EXCITATION_RMS, rng=rng),
             SENSORS,
         ),
-        (out / 'steps', two_link_loop(shipped), step_experiments(STEP_POSES, STEPS), STEP_SENSORS),
+        (steps, two_link_loop(shipped), step_experiments(STEP_POSES, STEPS), STEP_SENSORS),
     )
     for path, loop, plan, noise in plans:
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
         write_runs(path, runs, pair.robot, pair.sensors.on_links(pair.robot))
-    return ElasticData((out / 'resonances',), (out / 'steps',))
+    return ElasticData((resonances,), (steps,))
 
 
 def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParameters | None, str]:

@@ -32,7 +32,7 @@ def identify_springs(
     as_json: bool,
 ) -> None:  # fmt: skip
     """Fit springs to bags with both encoders of any arm, and write what was found."""
-    options.hold(out, SPRINGS_SCHEMA, source)
+    staged = options.stage(out, SPRINGS_SCHEMA, source)
     body = robot if model is None else options.model_of(model, robot).body
     if not bags:
         raise RecordingError('no bag is named; give one with encoders on both sides of the joints')
@@ -46,12 +46,13 @@ def identify_springs(
         tick(0.5, 'fitting')
         found = fit_springs(body, sides, np.random.default_rng(seed))
     document = springs_document(found, source)
-    write_file(out / 'elastic.json', json_text(document, indent=1))
+    write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
     provenance = Provenance(
         files=hash_files(bags), versions=versions(), settings={'model': str(model or source)}
     )
     page = springs_report(found, robot.name, provenance=provenance)
-    write_file(out / 'report.html', page)
+    write_file(staged.folder / 'report.html', page)
+    staged.keep()
     if as_json:
         click.echo(json_text(document))
         return

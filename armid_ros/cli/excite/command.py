@@ -87,7 +87,7 @@ def excite(
     folders = {s: out if len(motion.speeds) == 1 else out / f'{s}' for s in motion.speeds}
     for folder in folders.values():
         require_free(folder)
-        options.hold(folder, SCHEMA, robot.robot_source)
+    staged = {s: options.stage(f, SCHEMA, robot.robot_source) for s, f in folders.items()}
     known = _known(arm, settings, search.after, search.seed) if search.after else None
     task = _Task(plan, settings, rival, known)
     missing = list(folders)
@@ -95,7 +95,7 @@ def excite(
         with progress('designing') as tick:
             result = task.design(speed, _share(tick, number, len(folders)))
             tick((number + 1.0) / len(folders), 'writing')
-            written = write_plan(folder, plan, result, planners[speed])
+            written = write_plan(staged[speed], plan, result, planners[speed])
         missing.remove(speed)
         if as_json:
             click.echo(json_text(written.document))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+import os
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,8 @@ from armid_ros.excitation import (
     TransferPlanner,
     with_obstacles,
 )
-from armid_ros.files import json_text, write_file
+from armid_ros.files import json_text, settled, Staged, write_file
+from armid_ros.files.own import is_plan
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.report.excitation_report import CheckedRun, excitation_report
@@ -127,12 +129,15 @@ def require_free(folder: Path) -> None:
     """Raise a RecordingError where a recording is already, before a design takes its time."""
     if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
         raise RecordingError(f'{folder} is a recording; name another --out')
-    if (folder / BAG).exists():
-        raise RecordingError(f'{folder / BAG} exists already; name another --out, or delete it')
+    if os.path.lexists(folder / BAG) and not is_plan(folder / BAG):
+        raise RecordingError(
+            f'{folder / BAG}: is no trajectory of armid excite; name another --out, or move it '
+            'away'
+        )
 
 
 def write_plan(
-    folder: Path, plan: ExcitationPlan, result: Design, planner: TransferPlanner
+    staged: Staged, plan: ExcitationPlan, result: Design, planner: TransferPlanner
 ) -> Written:
     """
     Fill a folder with a design; what took longest to find is written first.
@@ -140,16 +145,21 @@ def write_plan(
     Raises
     ------
     TrajectoryError
-        If no way leads from the start to the trajectory; its coefficients are written then.
+        If no way leads from the start to the trajectory; its coefficients are written then, where
+        that does not take the place of an earlier design.
 
     """
+    folder = staged.folder
     _save_coefficients(folder, result.excitation)
     try:
         run = plan_run(result.excitation, planner, plan.start, WAYPOINT_RATE, seed=plan.seed)
     except TrajectoryError as error:
+        held = f'{staged.out}: stays as it was'
+        if staged.alone:
+            staged.keep()
+            held = f'{staged.out / "excitation.yaml"} holds the design'
         raise TrajectoryError(
-            f'{folder / "excitation.yaml"} holds the design, but there is no {BAG}: {error}; '
-            'take another --start, or another --seed'
+            f'{held}, but there is no {BAG}: {error}; take another --start, or another --seed'
         ) from error
     result = replace(result, excitation=run.excitation)
     _save_coefficients(folder, result.excitation)
@@ -159,6 +169,7 @@ def write_plan(
     document = _document(plan, result, run, checked)
     write_file(folder / 'excitation.json', json_text(document, indent=1))
     _write_page(folder / 'report.html', plan, result, run, checked)
+    staged.keep()
     return Written(document, run, checked)
 
 
@@ -188,7 +199,7 @@ def _write_page(
         )
         write_file(path, page)
     except Exception as error:  # whatever it is, the trajectory is written and good
-        click.echo(f'{path}: not written: {type(error).__name__}: {error}', err=True)
+        click.echo(f'{settled(path)}: not written: {type(error).__name__}: {error}', err=True)
 
 
 def _document(plan: ExcitationPlan, result: Design, run: Run, checked: Fitness) -> dict[str, Any]:

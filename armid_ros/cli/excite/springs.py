@@ -41,7 +41,7 @@ def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: P
     """Write the trajectory as a bag."""
     robot = space.collision.robot
     require_free(out)
-    options.hold(out, SCHEMA, robot.name)
+    staged = options.stage(out, SCHEMA, robot.name)
     bodies = space.bodies
 
     def clear(q: FloatArray) -> bool:
@@ -50,7 +50,8 @@ def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: P
 
     rng = np.random.default_rng(seed)
     course = COURSES[motion.kind](robot, motion.duration, motion.share, rng, clear)
-    write_joint_trajectory(out / BAG, course, robot_description=robot.urdf)
+    write_joint_trajectory(staged.folder / BAG, course, robot_description=robot.urdf)
+    staged.keep()
     say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')
     first = ', '.join(
         f'{joint} {q:.3g} {unit}'

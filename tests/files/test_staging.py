@@ -1,0 +1,118 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A result of several files is that of one run, whatever ends the next one."""
+
+import errno
+from pathlib import Path
+
+from armid_ros.errors import OutputError
+from armid_ros.files import settled, staged, write_file
+from armid_ros.files.own import STAGING
+import pytest
+
+
+def contents(folder):
+    return {
+        str(path.relative_to(folder)): path.read_text()
+        for path in folder.rglob('*')
+        if path.is_file()
+    }
+
+
+@pytest.fixture
+def out(tmp_path):
+    """Return a folder with a result of Monday."""
+    for name in ('identification.json', 'model.yaml', 'identified.urdf', 'notes.txt'):
+        (tmp_path / name).write_text('monday')
+    (tmp_path / 'recording').mkdir()
+    (tmp_path / 'recording' / 'a.mcap').write_text('monday')
+    return tmp_path
+
+
+@pytest.mark.parametrize('end', [OutputError, KeyboardInterrupt])
+def test_a_run_that_ends_before_all_is_written_leaves_the_earlier_result(out, end):
+    before = contents(out)
+    with pytest.raises(end):
+        with staged(out, ('*.json', 'model.yaml', 'identified.urdf')) as result:
+            write_file(result.folder / 'model.yaml', 'tuesday')
+            raise end
+    assert contents(out) == before
+    assert not (out / STAGING).exists()
+
+
+def test_a_result_that_is_kept_replaces_the_earlier_one(out):
+    named = ('*.json', 'model.yaml', 'identified.urdf', 'recording')
+    with staged(out, named) as result:
+        for name in ('model.yaml', 'identification.json'):
+            write_file(result.folder / name, 'tuesday')
+        result.keep()
+    assert contents(out) == {
+        'model.yaml': 'tuesday',
+        'identification.json': 'tuesday',
+        'notes.txt': 'monday',
+        'recording/a.mcap': 'monday',
+    }
+    assert not (out / STAGING).exists()
+
+
+def test_what_is_kept_later_goes_beside_what_was_kept_before(out):
+    with staged(out, ('*.json', 'model.yaml', 'identified.urdf')) as result:
+        for name in ('model.yaml', 'identification.json'):
+            write_file(result.folder / name, 'tuesday')
+            result.keep()
+    kept = contents(out)
+    assert kept['model.yaml'] == kept['identification.json'] == 'tuesday'
+
+
+def test_a_description_that_the_result_refers_to_stays(out):
+    with staged(out, ('identified.urdf',), [out / 'identified.urdf']) as result:
+        write_file(result.folder / 'model.yaml', 'tuesday')
+        result.keep()
+    assert (out / 'identified.urdf').read_text() == 'monday'
+
+
+def test_a_folder_of_a_result_is_replaced_by_one(out):
+    with staged(out) as result:
+        (result.folder / 'recording').mkdir()
+        write_file(result.folder / 'recording' / 'b.mcap', 'tuesday')
+        result.keep()
+    assert contents(out / 'recording') == {'b.mcap': 'tuesday'}
+
+
+def test_no_document_vouches_for_files_that_are_half_moved(out, monkeypatch):
+    """The document that names the recordings of a model is not there beside another model."""
+
+    def full(self, target):
+        raise OSError(errno.EIO, 'Input/output error')
+
+    with pytest.raises(OutputError, match='cannot be written: Input/output error'):
+        with staged(out) as result:
+            for name in ('model.yaml', 'identification.json'):
+                write_file(result.folder / name, 'tuesday')
+            monkeypatch.setattr(Path, 'replace', full)
+            result.keep()
+    assert not (out / 'identification.json').exists()
+    assert (out / 'model.yaml').read_text() == 'monday'
+
+
+def test_what_a_killed_run_left_is_no_obstacle_and_no_way_out(out, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp('elsewhere')
+    (elsewhere / 'precious').write_text('kept')
+    (out / STAGING).symlink_to(elsewhere)
+    with staged(out) as result:
+        write_file(result.folder / 'model.yaml', 'tuesday')
+        result.keep()
+    assert contents(elsewhere) == {'precious': 'kept'}
+    (out / STAGING).mkdir()
+    (out / STAGING / 'model.yaml').write_text('half')
+    with staged(out) as result:
+        result.keep()
+    assert (out / 'model.yaml').read_text() == 'tuesday'
+
+
+def test_errors_name_the_place_of_a_file_and_not_where_it_is_made(out):
+    with staged(out) as result:
+        assert settled(result.folder / 'model.yaml') == out / 'model.yaml'
+        with pytest.raises(OutputError) as refused:
+            write_file(result.folder / 'none' / 'model.yaml', '')
+    assert str(refused.value).startswith(f'{out / "none" / "model.yaml"}: cannot be written')
