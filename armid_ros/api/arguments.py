@@ -135,7 +135,7 @@ def read_recording(
     **columns
         Of a table, as in ColumnSettings: ``position='q{}'``, ``effort='tau{}'``, ``time='t'``,
         ``degrees=True``, ``effort_scale=(11.2, ...)``, ``rename={'fer_': 'panda_'}``. What is not
-        said is guessed.
+        said is guessed. Units, scales, zeros, gears and names are those of a bag, too.
 
     Returns
     -------

@@ -12,7 +12,15 @@ from armid_ros.cli.terminal import say
 from armid_ros.errors import RecordingError
 from armid_ros.recording import write_recording
 from armid_ros.recording.ros1 import convert_ros1, Copied, copy_renamed, is_ros1
-from armid_ros.recording.tables import is_table, measured, open_table, plan, side_by_side
+from armid_ros.recording.tables import (
+    is_table,
+    measured,
+    open_table,
+    plan,
+    refuse_columns,
+    refuse_units,
+    side_by_side,
+)
 from armid_ros.robots import Robot
 import click
 
@@ -65,7 +73,10 @@ def _table(
 
 
 def _bag(path: Path, out: Path | None) -> None:
-    rename = columns.settings().rename
+    said = columns.settings()
+    refuse_columns(path, said)
+    refuse_units(path, said)
+    rename = said.rename
     if out is None:
         raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
     if not is_ros1(path) and not rename:

@@ -16,11 +16,13 @@ from armid_ros.recording.ros1 import convert_ros1, is_ros1
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.tables import (
     ColumnSettings,
+    in_si,
     is_table,
     measured,
     name_in_file,
     open_table,
     plan,
+    refuse_columns,
     renamed,
     TablePlan,
 )
@@ -53,8 +55,8 @@ def read_anything(
     topic : str, optional
         Of a bag, where it has several of JointState.
     columns : ColumnSettings, optional
-        Of a table: which columns are what, in which unit; what is not said is guessed. Its
-        ``rename`` counts for bags too.
+        Of a table: which columns are what, in which unit; what is not said is guessed. Names,
+        units, zeros and gears count for bags too; which columns are what, and their rate, do not.
     show : callable, optional
         Given the plan of a table before it is read.
     settings : ReadSettings, optional
@@ -74,6 +76,7 @@ def read_anything(
         if show is not None:
             show(settled)
         return measured(settled)
+    refuse_columns(path, columns)
     called = [name_in_file(joint, columns.rename) for joint in joints]
     recording = (
         _read_ros1(path, called, topic)
@@ -83,7 +86,8 @@ def read_anything(
     others = tuple(
         replace(other, joint=renamed(other.joint, columns.rename)) for other in recording.others
     )
-    return replace(recording, joints=tuple(joints), others=others)
+    named = replace(recording, joints=tuple(joints), others=others)
+    return in_si(named, columns, slides)
 
 
 def _read_ros1(path: Path, joints: Sequence[str], topic: str | None) -> Recording:

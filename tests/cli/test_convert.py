@@ -69,6 +69,8 @@ def test_a_table_is_identified_as_the_bag_is(bags, csv, tmp_path):
         (('{csv}', '--gear', '3', '--coupling', '5'), "--coupling '5' has to be MOTOR,JOINT"),
         (('{csv}', '{bag}'), 'several files have to be tables'),
         (('{bag}',), 'nothing to do: a bag of ROS 2 stays as it is without --rename'),
+        (('{bag}', '--rename', 'a:b', '--degrees'), '--degrees changes no bag that is copied'),
+        (('{bag}', '--rate', '200'), '--rate is for tables, and this is a bag'),
         (('{csv}', '--episode', '1', '--position', 'x'), "no column is 'x', given for position"),
     ],
 )

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Options that say which columns of a table are what; of every command that takes recordings."""
+"""Options that say what a recording holds: which columns of a table are what, and the units."""
 
 from __future__ import annotations
 
@@ -40,25 +40,35 @@ _OPTIONS = (
     ),
     _option('--velocity', metavar='C', help="The same of velocities; 'none' leaves them out."),
     _option('--effort', metavar='C', help='The same of torques, forces or currents.'),
-    _option('--time-unit', type=click.Choice(TIME_UNITS), help='Of the column of time.'),
-    _option('--rate', type=float, metavar='HZ', help='Rows per second, without that column.'),
-    _option('--degrees', is_flag=True, help='Positions and velocities are in degrees.'),
+    _option(
+        '--time-unit', type=click.Choice(TIME_UNITS), help='Of the column of time of a table.'
+    ),
+    _option('--rate', type=float, metavar='HZ', help='Rows per second of a table, without it.'),
+    _option(
+        '--degrees', is_flag=True, help='Positions and velocities are in degrees; of bags too.'
+    ),
     _option(
         '--position-scale',
         metavar='X,...',
-        help='Makes positions and velocities rad (or m): one number, or one a joint.',
+        help='Makes positions and velocities rad (or m): one number, or one a joint; of bags too.',
     ),
     _option(
         '--effort-scale',
         '--current-gain',
         metavar='X,...',
-        help='Makes efforts N m: torque constants [N m/A], gear ratios as 1798/7, signs.',
+        help='Makes efforts N m: torque constants [N m/A], gear ratios as 1798/7, signs; of bags '
+        'too.',
     ),
-    _option('--zero', metavar='X,...', help="Added to the positions [rad or m], as '-pi/2'."),
+    _option(
+        '--zero',
+        metavar='X,...',
+        help="Added to the positions [rad or m], as '-pi/2'; of bags too.",
+    ),
     _option(
         '--gear',
         metavar='X,...',
-        help='Columns are those of the motors, which turn X times for a turn of the joint.',
+        help='Values are those of the motors, which turn X times for a turn of the joint; of bags '
+        'too.',
     ),
     _option(
         '--coupling',

@@ -10,6 +10,7 @@ Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets.
 
 from armid_ros.recording.tables.files import is_table, open_table, side_by_side
 from armid_ros.recording.tables.measured import measured
+from armid_ros.recording.tables.of_bags import in_si, refuse_columns, refuse_units
 from armid_ros.recording.tables.plan import plan, TablePlan
 from armid_ros.recording.tables.settings import ColumnSettings, name_in_file, numbers, renamed
 from armid_ros.recording.tables.table import Table, TableColumn
@@ -19,12 +20,15 @@ __all__ = [
     'ColumnSettings',
     'TablePlan',
     'Table',
+    'in_si',
     'is_table',
     'measured',
     'name_in_file',
     'numbers',
     'open_table',
     'plan',
+    'refuse_columns',
+    'refuse_units',
     'renamed',
     'side_by_side',
 ]

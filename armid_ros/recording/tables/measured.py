@@ -12,7 +12,7 @@ from armid_ros.recording.recording import PositionRange, ReadReport, Recording, 
 from armid_ros.recording.series import GAP_PERIODS, longest_run, not_finite
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
-from armid_ros.recording.tables.settings import gear_matrix, per_joint, TIME_UNITS
+from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
 import numpy as np
 import numpy.typing as npt
@@ -53,7 +53,10 @@ def measured(plan: TablePlan) -> Recording:
     rows = rows[first]
     if len(rows) < 2:
         raise RecordingError(f'{table.source}: {len(rows)} rows with numbers are left')
-    q, dq, tau = _joint_side(plan, {name: array[rows] for name, array in values.items()})
+    of = {name: array[rows] for name, array in values.items()}
+    q, dq, tau = on_joint_side(
+        plan.settings, plan.joints, of['position'], of.get('velocity'), of.get('effort')
+    )
     time = t[rows] - t[rows[0]]
     report = ReadReport(
         messages=len(table),
@@ -117,23 +120,6 @@ def _finite(
             f'{plan.table.source}: {lost} of {len(t)} rows have a value that is no number'
         )
     return good, culprits
-
-
-def _joint_side(
-    plan: TablePlan, values: Mapping[QuantityName, FloatArray]
-) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
-    """Return positions, velocities and efforts of the joints, where those of motors are given."""
-    q, dq, tau = values['position'], values.get('velocity'), values.get('effort')
-    settings = plan.settings
-    if settings.gear:
-        gear = gear_matrix(settings, plan.joints)
-        inverse = np.linalg.inv(gear)
-        q = q @ inverse.T
-        dq = None if dq is None else dq @ inverse.T
-        tau = None if tau is None else tau @ gear
-    if settings.zero:
-        q = q + per_joint(settings.zero, plan.joints, 'the zero of positions')
-    return q, dq, tau
 
 
 def _others(plan: TablePlan) -> Iterator[PositionRange]:

@@ -144,6 +144,25 @@ def gear_matrix(settings: ColumnSettings, joints: Sequence[str]) -> FloatArray:
     return matrix
 
 
+def on_joint_side(
+    settings: ColumnSettings,
+    joints: Sequence[str],
+    q: FloatArray,
+    dq: FloatArray | None,
+    tau: FloatArray | None,
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    """Return positions, velocities and efforts of the joints, where those of motors are given."""
+    if settings.gear:
+        gear = gear_matrix(settings, joints)
+        inverse = np.linalg.inv(gear)
+        q = q @ inverse.T
+        dq = None if dq is None else dq @ inverse.T
+        tau = None if tau is None else tau @ gear
+    if settings.zero:
+        q = q + per_joint(settings.zero, joints, 'the zero of positions')
+    return q, dq, tau
+
+
 def _position(joint: str, joints: Sequence[str]) -> int:
     if joint in joints:
         return list(joints).index(joint)

@@ -1,0 +1,106 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a person says of a bag: units and sides are taken, columns and rate refused."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
+from armid_ros.recording.recording import PositionRange, Recording
+from armid_ros.recording.tables.settings import ColumnSettings, on_joint_side, per_joint
+import numpy as np
+
+#: Settings that say where a table has what a bag has by itself, and their options.
+_WHERE = {
+    'time': '--time',
+    'time_unit': '--time-unit',
+    'rate_hz': '--rate',
+    'position': '--position',
+    'velocity': '--velocity',
+    'effort': '--effort',
+    'episode': '--episode',
+}
+#: Settings that say what numbers mean.
+_WHAT = {
+    'degrees': '--degrees',
+    'position_scale': '--position-scale',
+    'effort_scale': '--effort-scale or --current-gain',
+    'zero': '--zero',
+    'gear': '--gear',
+}
+
+
+def refuse_columns(path: str | Path, settings: ColumnSettings) -> None:
+    """Raise a RecordingError where a bag is told which of its columns are what, or its rate."""
+    for name, option in _WHERE.items():
+        if getattr(settings, name) is not None:
+            raise RecordingError(
+                f'{path}: {option} is for tables, and this is a bag, whose messages have stamps '
+                'and names; leave it out, or make a bag of the tables with armid convert'
+            )
+
+
+def refuse_units(path: str | Path, settings: ColumnSettings) -> None:
+    """Raise a RecordingError where a bag that is copied as it is gets other units."""
+    for name, option in _WHAT.items():
+        if getattr(settings, name):
+            raise RecordingError(
+                f'{path}: {option} changes no bag that is copied; give it to the command that '
+                'reads the bag'
+            )
+
+
+def in_si(
+    recording: Recording, settings: ColumnSettings, slides: Collection[bool] | None = None
+) -> Recording:
+    """
+    Return what a bag holds with its numbers in SI, on the side of the joints.
+
+    Parameters
+    ----------
+    recording : Recording
+        Positions, velocities and efforts as they are in the bag.
+    settings : ColumnSettings
+        Scales, degrees, gears and zeros.
+    slides : collection of bool, optional
+        Whether each joint is prismatic, which has no degrees.
+
+    """
+    if not any(getattr(settings, name) for name in _WHAT):
+        return recording
+    turn = _turn(recording.joints, settings, slides)
+    torque = per_joint(settings.effort_scale or (1.0,), recording.joints, 'the scale of efforts')
+    q, dq, tau = on_joint_side(
+        settings,
+        recording.joints,
+        recording.q * turn,
+        None if recording.dq is None else recording.dq * turn,
+        None if recording.tau is None else recording.tau * torque,
+    )
+    return replace(recording, q=q, dq=dq, tau=tau, others=_others(recording, settings, turn))
+
+
+def _turn(
+    joints: Sequence[str], settings: ColumnSettings, slides: Collection[bool] | None
+) -> FloatArray:
+    """Return what makes positions and velocities rad or m, shape (n,)."""
+    if settings.position_scale or not settings.degrees:
+        return per_joint(settings.position_scale or (1.0,), joints, 'the scale of positions')
+    return np.where(list(slides or [False] * len(joints)), 1.0, np.pi / 180.0)
+
+
+def _others(
+    recording: Recording, settings: ColumnSettings, turn: FloatArray
+) -> tuple[PositionRange, ...]:
+    """Return where other joints were, as far as their unit is known."""
+    if settings.gear or settings.zero or len(set(turn)) != 1:
+        return ()
+    return tuple(
+        replace(one, lowest=min(ends), highest=max(ends))
+        for one in recording.others
+        for ends in [(float(one.lowest * turn[0]), float(one.highest * turn[0]))]
+    )
