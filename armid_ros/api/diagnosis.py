@@ -41,6 +41,7 @@ from armid_ros.residual import (
     Residual,
     TABLE_FILE,
 )
+from armid_ros.simulation.bodies import require_any_mass
 import numpy as np
 
 if TYPE_CHECKING:
@@ -250,6 +251,7 @@ def diagnose(
     if residual is not None:
         require_libraries()
     model = arm.arm if isinstance(arm, IdentificationResult) else arm_of(arm, effects)
+    require_any_mass(model.robot)
     looked_at = some_recordings_of(recordings, model.robot)
     held_out = recordings_of(validate, model.robot)
     if baseline is None:

@@ -213,26 +213,30 @@ class Robot:
                 f'{self.name}: rigid parameters have to be {expected[0]} finite numbers, '
                 f'not an array of shape {pi.shape}'
             )
-        model = self.model.copy()
+        model, place = self.model.copy(), self.path or self.name
         for body, values in enumerate(pi.reshape(self.n_joints, PARAMETERS_PER_BODY)):
-            model.inertias[body + 1] = _inertia(self.links[body], values)
+            model.inertias[body + 1] = _inertia(f"{place}: link '{self.links[body]}'", values)
         return replace(self, model=model)
 
 
-def _inertia(link: str, values: FloatArray) -> pin.Inertia:
+def _inertia(place: str, values: FloatArray) -> pin.Inertia:
     """Spatial inertia of the ten parameters; pinocchio's own conversion divides by the mass."""
     mass, moment, about_origin = values[0], values[1:4], values[4:]
     if mass == 0.0:
         if np.any(moment != 0.0):
-            raise RobotError(f"link '{link}': a first moment {moment} kg m needs a mass")
+            raise RobotError(
+                f'{place}: a first moment {moment} kg m needs a mass; give the link an <inertial> '
+                'with a rough one'
+            )
         ixx, ixy, iyy, ixz, iyz, izz = about_origin
-        rotational = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-        return pin.Inertia(0.0, np.zeros(3), rotational)
+        inertia = pin.Inertia.Zero()  # the constructor takes none that is not positive
+        inertia.inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        return inertia
     inertia = pin.Inertia.FromDynamicParameters(values)
     lost = np.abs(inertia.toDynamicParameters() - values).max()
     if not lost <= _LOST * np.abs(values).max():
         raise RobotError(
-            f"link '{link}': a first moment {moment} kg m needs more mass than {mass:g} kg, which "
-            f'puts its centre {np.abs(moment).max() / abs(mass):g} m away'
+            f'{place}: a first moment {moment} kg m needs more mass than {mass:g} kg, which puts '
+            f'its centre {np.abs(moment).max() / abs(mass):g} m away; give it a rough one'
         )
     return inertia

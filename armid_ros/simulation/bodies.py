@@ -31,6 +31,24 @@ def require_masses(robot: Robot) -> None:
         raise ModelError(f'{robot.name}: {negative}; correct the description')
 
 
+def require_any_mass(robot: Robot) -> None:
+    """
+    Refuse a robot of which no link has a mass, so that no torque is to be expected of it.
+
+    Raises
+    ------
+    ModelError
+        Naming the description and its links.
+
+    """
+    if not np.any(robot.rigid_parameters[::PER_LINK]):
+        raise ModelError(
+            f'{robot.path or robot.name}: no link has a mass ({", ".join(robot.links)}), so there '
+            'is no model to compare with: give them an <inertial>, or identify the arm first '
+            '(armid identify) and name its model.yaml with --model'
+        )
+
+
 def no_body(robot: Robot) -> str:
     """Say that the inertia matrix is not positive definite, and which links make it so."""
     links = zip(robot.links, robot.rigid_parameters.reshape(-1, PER_LINK), strict=True)

@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+import re
 import shutil
 
 from armid_ros.arm import load_misfit, load_model, Misfit, save_model
@@ -298,3 +299,14 @@ def test_a_folder_for_a_model_is_answered_with_the_file_in_it(files, tmp_path):
         said = armid(*asked, '--out', tmp_path / 'x', code=2).output
         assert f'{tmp_path / "monday"}: a folder' in said
         assert hint in said
+
+
+def test_a_description_without_masses_is_no_model_to_compare_with(files, tmp_path):
+    urdf, _, bags = files
+    bare = tmp_path / 'bare.urdf'
+    text = urdf.read_text(encoding='utf-8')
+    bare.write_text(re.sub(r'<inertial>.*?</inertial>', '', text, flags=re.DOTALL))
+    said = armid('diagnose', bags[0], '--robot', bare, '--out', tmp_path / 'x', code=2).stderr
+    assert f'{bare}: no link has a mass (' in said and 'name its model.yaml with --model' in said
+    assert said.strip().count('\n') == 0
+    assert not (tmp_path / 'x').exists()

@@ -6,8 +6,15 @@ import re
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError
-from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
+from armid_ros.identification import (
+    grade,
+    IdentificationSettings,
+    identify,
+    Score,
+    SignalSettings,
+)
 from armid_ros.model import random_motion
+from armid_ros.robots import robot_from_urdf
 import numpy as np
 import pytest
 
@@ -172,3 +179,20 @@ def test_payload_is_found_against_a_known_arm(arm, motion):
     normal = columns[:, :4].T @ weights @ columns[:, :4]
     found = np.linalg.solve(normal, columns[:, :4].T @ weights @ change)
     assert abs(found[0] - 0.3) < 0.01
+
+
+@pytest.mark.parametrize(
+    ('described', 'left'),
+    [(r'<inertial>.*?</inertial>', ''), (r'<mass value="[^"]*"', '<mass value="0"')],
+)
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_an_arm_described_without_masses_is_identified(arm, motion, recording, described, left):
+    """First moments that are found stand on masses that no motion tells."""
+    text = re.sub(described, left, arm.robot.urdf, flags=re.DOTALL)
+    bare = robot_from_urdf(text, joints=arm.robot.joints)
+    assert not np.any(bare.rigid_parameters[::10])
+    result = run(ArmModel(bare, arm.effects), recording)
+    other = multisine(arm.robot.joints, 5.0, 200.0, seed=7)
+    error = result.arm.torque(other) - arm.torque(other)
+    assert np.linalg.norm(error) < 0.05 * np.linalg.norm(arm.torque(other))
+    grade(result, ArmModel(bare, arm.effects), [recording], {})

@@ -31,6 +31,7 @@ from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, value_of
 from armid_ros.residual import require_libraries, TABLE_FILE
 from armid_ros.robots import Robot
+from armid_ros.simulation.bodies import require_any_mass
 import click
 import numpy as np
 
@@ -160,6 +161,7 @@ def diagnose(
     staged = options.stage(out, SCHEMA, robot.robot_source)
     loaded = robot.load(data.bags)
     arm = ArmModel(loaded) if asked.model is None else _model_of(asked.model, loaded)
+    require_any_mass(arm.robot)
     arm = options.with_effects(arm, asked.effects)
     beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
     settings = asked.settings(filters)

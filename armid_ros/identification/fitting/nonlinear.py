@@ -20,7 +20,7 @@ from armid_ros.identification.fitting.excited import bounds
 from armid_ros.identification.fitting.least_squares import Method, Solution, solve
 from armid_ros.identification.rows.regression import predictions, Regression, regressions
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.model import BaseParameters
+from armid_ros.model import BaseParameters, LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
@@ -48,6 +48,8 @@ _STUCK = 0.5
 _DAMPINGS = tuple(10.0 ** np.arange(-8.0, 3.0))
 #: A step keeps its promise if it leaves at most so many times the squares.
 _KEPT = 2.0
+#: Where the centre of a link is taken to be whose mass nothing tells [m].
+_REACH = 0.2
 
 Torques = tuple[FloatArray, ...]
 
@@ -184,7 +186,25 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     change[base.independent] = values - base.values(arm.theta)
     rigid = _rigid(arm)
     change[:rigid] -= free @ (free.T @ change[:rigid])
-    return arm.with_theta(arm.theta + change)
+    theta = arm.theta + change
+    return arm.with_theta(np.concatenate([_carried(theta[:rigid], free), theta[rigid:]]))
+
+
+def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
+    """
+    Return rigid parameters with a mass where a first moment has none, shape (10 n,).
+
+    A link that a description leaves without a mass has got a moment from the data, which tell no
+    mass apart: any changes no torque where those of links before it change along with it.
+
+    """
+    links = rigid.reshape(-1, len(LINK_PARAMETERS))
+    lacking = (links[:, 0] == 0.0) & np.any(links[:, 1:4] != 0.0, axis=1)
+    if not np.any(lacking):
+        return rigid
+    mass = np.zeros_like(links)
+    mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
+    return np.asarray(rigid + free @ (free.T @ mass.ravel()))
 
 
 def linearised(
