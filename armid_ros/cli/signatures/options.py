@@ -87,7 +87,13 @@ validate = click.option(
     help='A bag to predict and not to fit; may be given several times.',
 )
 topic = click.option('--topic', help='JointState topic, where a bag has several.')
-seed = click.option('--seed', default=0, show_default=True, help='Of every random number.')
+seed = click.option(
+    '--seed',
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help='Of every random number.',
+)
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
 
