@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,7 +31,7 @@ from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
 from armid_ros.simulation import simulate as run
-from armid_ros.simulation.bodies import require_masses
+from armid_ros.simulation.bodies import NoBodyError, require_masses
 import numpy as np
 
 
@@ -112,7 +114,7 @@ def simulate(
     if rotorless:
         say(no_rotor(rotorless))
     sensors = noise.sensors()
-    with progress('designing a trajectory') as tick:
+    with progress('designing a trajectory') as tick, _blaming(arm.texts, loaded):
         reference = _reference(loaded, trajectory, rng)
         tick(0.0, 'simulating')
         if springs and not rotorless:
@@ -125,6 +127,25 @@ def simulate(
             write_recording(out, measured, robot_description=loaded.urdf)
             samples, sides = len(measured.t), ''
     say(f'{out}: {samples} samples of {loaded.n_joints} joints{sides}, {reference.duration:.1f} s')
+
+
+@contextmanager
+def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
+    """Name the --effect that adds to a body where links turn out to be none."""
+    try:
+        yield
+    except NoBodyError as error:
+        for text in texts:
+            effect, _ = parse_effect(text, robot)
+            moments = [q.name for q in effect.quantities if q.unit == 'kg m^2']
+            if effect.changes_body and moments:
+                where = ', '.join(effect.joints) or 'the last joint'
+                raise ModelError(
+                    f"--effect '{text}': with it what {where} moves is no body: a mass whose "
+                    'centre is off the joint has moments of inertia about it, mass times distance '
+                    f'squared; give {moments[0]} and the others too, or a smaller first moment'
+                ) from error
+        raise
 
 
 def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.excitation.search.criteria import CRITERIA
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -135,6 +136,12 @@ class DesignSettings:
         for name in ('time_budget', 'clearance', 'balance'):
             if not getattr(self, name) >= 0.0:
                 raise TrajectoryError(f'{name}: {getattr(self, name)}; it cannot be negative')
+        duration = self.n_periods * self.period + 2.0 * self.run_in
+        if not duration <= MAX_DURATION:
+            raise TrajectoryError(
+                f'{self.n_periods} periods of {self.period:g} s and run-ins of {self.run_in:g} s '
+                f'last {duration:.3g} s; a day is the most'
+            )
         if self.samples < 8 * self.harmonics:
             raise TrajectoryError(
                 f'{self.samples} samples of a period cannot show {self.harmonics} harmonics; '

@@ -16,6 +16,10 @@ NO_BODY = (
 )
 
 
+class NoBodyError(ModelError):
+    """An arm cannot be simulated, as links of it are no bodies."""
+
+
 def require_masses(robot: Robot) -> None:
     """
     Refuse a robot with links of negative mass.

@@ -14,9 +14,8 @@ zero, not a small one.
 
 from __future__ import annotations
 
-from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.bodies import no_body
+from armid_ros.simulation.bodies import no_body, NoBodyError
 from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
 from armid_ros.simulation.contacts import Contacts
 from armid_ros.simulation.plant import Plant, State
@@ -132,7 +131,7 @@ def _solve(plant: Plant, inertia: FloatArray, right: FloatArray) -> FloatArray:
     solution: FloatArray
     _, solution, failed = dposv(inertia, right, 0, 0, 1)
     if failed:
-        raise ModelError(no_body(plant.robot))
+        raise NoBodyError(no_body(plant.robot))
     return solution
 
 

@@ -13,7 +13,7 @@ from armid_ros.effects import Action, DryFriction, TorqueLaw
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
-from armid_ros.simulation.bodies import no_body
+from armid_ros.simulation.bodies import no_body, NoBodyError
 from armid_ros.simulation.box_complementarity import Modes
 from armid_ros.simulation.contacts import Contacts, split_constant
 from armid_ros.simulation.springs import Elasticity, ElasticJoints
@@ -338,7 +338,7 @@ def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: 
     try:
         rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
     except LinAlgError:
-        raise ModelError(no_body(robot)) from None
+        raise NoBodyError(no_body(robot)) from None
     z = dt * float(rates[-1])
     if z < 1e-3:
         return 0.5

@@ -16,6 +16,7 @@ from armid_ros.effects import CATALOGUE, make_effect, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
+from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.identification.estimators.names import ESTIMATORS
 from armid_ros.pair.exercises import EXERCISES
 from armid_ros.recording import read_joint_trajectory, read_recording
@@ -81,6 +82,7 @@ sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
         (choices.EFFECT_EXAMPLES, EXAMPLES),
         (choices.ESTIMATORS, ESTIMATORS),
         (choices.TIME_UNITS, tuple(TIME_UNITS)),
+        (choices.MAX_DURATION, MAX_DURATION),
         (choices.SPEED_CLASSES, tuple(SPEED_CLASSES)),
         (choices.CRITERIA, CRITERIA),
         (choices.TARGETS, TARGETS),
@@ -326,3 +328,20 @@ def test_an_effect_without_a_size_is_refused_with_what_it_takes(tmp_path, effect
     assert 'has no size' in text
     assert make_effect(effect, load_robot(ROBOT)).quantities[0].name in text
     assert not out.exists()
+
+
+@pytest.mark.parametrize('command', ['identify', 'diagnose', 'inspect', 'excite', 'simulate'])
+def test_a_seed_is_no_negative_number(command, tmp_path):
+    said = armid(command, '--seed', -1, '--robot', ROBOT, '--out', tmp_path / 'x', 'bag', code=2)
+    assert "Invalid value for '--seed': -1 is not in the range x>=0" in said.stderr
+
+
+def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
+    """The mass is as far from the joint as its first moment says, and has no inertia there."""
+    effect = 'payload@wrist_pitch:payload_m=0.4,payload_mz=0.4'
+    said = armid(
+        'simulate', '--robot', ROBOT, '--effect', effect, '--out', tmp_path / 'x', code=2
+    ).stderr
+    assert f"--effect '{effect}': with it what wrist_pitch moves is no body" in said
+    assert 'give payload_Ixx and the others too' in said and said.count('\n') == 1
+    assert not (tmp_path / 'x').exists()

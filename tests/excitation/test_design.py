@@ -13,6 +13,7 @@ from armid_ros.excitation import (
     design,
     design_speeds,
     DesignProblem,
+    DesignSettings,
     evaluate,
     Limits,
     Obstacle,
@@ -23,6 +24,11 @@ from armid_ros.excitation.search.parallel import search_all, Task
 from armid_ros.robots import collision_model
 import numpy as np
 import pytest
+
+
+def test_a_run_of_more_than_a_day_is_refused_before_it_is_searched_for():
+    with pytest.raises(TrajectoryError, match=r'last 1e\+09 s; a day is the most'):
+        DesignSettings(period=5e8)
 
 
 def coefficients(result):

@@ -12,6 +12,7 @@ from armid_ros.cli.signatures.choices import (
     COURSES,
     CRITERIA,
     FOURIER,
+    MAX_DURATION,
     SPEED_CLASSES,
     TARGETS,
 )
@@ -54,7 +55,13 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     show_default=True,
     help='Of the torque limits (multisine, rms) or of the velocity limits (steps).',
 )
-@click.option('--duration', default=44.0, show_default=True, help='From rest to rest [s].')
+@click.option(
+    '--duration',
+    type=click.FloatRange(0.0, MAX_DURATION, min_open=True),
+    default=44.0,
+    show_default=True,
+    help='From rest to rest [s].',
+)
 @click.option(
     '--periods',
     type=click.IntRange(min=2),

@@ -10,7 +10,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Regression
-from armid_ros.identification.rows.signals import Conditioning, segments
+from armid_ros.identification.rows.signals import Conditioning, no_stretch, segments
 from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
@@ -69,8 +69,10 @@ def check_motion(
     """
     for recording in recordings:
         check_positions(robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0))
-        if recording.duration < SHORTEST or not _outlasts(recording, used):
+        if recording.duration < SHORTEST:
             raise _too_short(recording)
+        if used is not None and not any(True for _ in segments(recording, used)):
+            raise no_stretch(recording, used)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
     return resting(robot, recordings[0].source, ranges)
 
@@ -95,7 +97,7 @@ def check_length(
     for recording in recordings:
         if recording.source not in left:
             check_stamps([recording], used)
-            raise _too_short(recording)
+            raise no_stretch(recording, used)
 
 
 def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
@@ -123,10 +125,6 @@ def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
     if names:
         return (f'at rest throughout: {", ".join(names)}; nothing of their own is identified',)
     return ()
-
-
-def _outlasts(recording: Recording, used: Conditioning | None) -> bool:
-    return used is None or any(True for _ in segments(recording, used))
 
 
 def _too_short(recording: Recording) -> IdentificationError:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.signals import Conditioning, decimated_samples, segments
@@ -14,7 +15,7 @@ from armid_ros.recording import Recording
 
 def check_decimation(recordings: Sequence[Recording], used: Conditioning, least: int) -> None:
     """
-    Refuse a decimation that leaves too few samples where a smaller one leaves enough.
+    Refuse recordings of which the decimation leaves too few samples, and a smaller one enough.
 
     Parameters
     ----------
@@ -28,11 +29,20 @@ def check_decimation(recordings: Sequence[Recording], used: Conditioning, least:
     Raises
     ------
     IdentificationError
-        Naming the option and the largest decimation that works.
+        Naming the largest decimation that works, and how long to record where nobody asked for
+        one.
 
     """
     left = _samples(recordings, used)
     largest = 0 if left >= least else _largest(recordings, used, least)
+    if largest and 'decimation' not in used.given:
+        duration = sum(one.duration for one in recordings)
+        needed = duration + (least - left) * used.decimation / used.rate_hz
+        raise IdentificationError(
+            f'{recordings[0].source}: {duration:.2f} s are too short, {left} samples are left '
+            f'behind the filters and {least} or more are needed: record '
+            f'{math.ceil(10 * needed) / 10:g} s or more, or ask for --decimation {largest}'
+        )
     if largest:
         raise IdentificationError(
             f'{recordings[0].source}: --decimation {used.decimation} leaves {left} samples, '

@@ -13,7 +13,7 @@ does to the other (parallel filtering; Gautier 1997).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from armid_ros.errors import IdentificationError
@@ -39,6 +39,8 @@ MODEL_BANDS = 10.0
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
 EDGE_PERIODS = 4.0
+#: Periods of the cut-off that a stretch has to have beside what the decimation takes of it.
+_CUTOFF_PERIODS = 10.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 SMOOTH_SAMPLES = 5.0
 #: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
@@ -95,12 +97,15 @@ class Conditioning:
         Cut-off of the position filter [Hz].
     decimation : int
         Factor of the decimation.
+    given : frozenset of {'cutoff', 'decimation'}
+        What somebody asked for; the others were chosen from recordings.
 
     """
 
     rate_hz: float
     cutoff_hz: float
     decimation: int
+    given: frozenset[str] = field(default=frozenset(), compare=False)
 
     @property
     def kept_hz(self) -> float:
@@ -162,7 +167,9 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
             f'{recordings[0].source}: a cut-off of {cutoff:g} Hz needs more than '
             f'{2 * cutoff:g} samples/s; the recording has {rate:g}'
         )
-    return Conditioning(rate, cutoff, decimation)
+    asked = {'cutoff': settings.cutoff_hz, 'decimation': settings.decimation}
+    given = frozenset(name for name, value in asked.items() if value is not None)
+    return Conditioning(rate, cutoff, decimation, given)
 
 
 def sampling_rate(recording: Recording) -> float:
@@ -244,13 +251,24 @@ def unbroken(recording: Recording, rate: float) -> list[npt.NDArray[np.intp]]:
 
 def _shortest(used: Conditioning) -> float:
     """Return how long a stretch has to be for the filters [s]."""
-    return 2 * _HALF_TAPS * used.decimation / used.rate_hz + 10 / used.cutoff_hz
+    return _decimated_edges(used) + _CUTOFF_PERIODS / used.cutoff_hz
+
+
+def _decimated_edges(used: Conditioning) -> float:
+    """Return what the decimation filter takes of both ends together [s]."""
+    return 2 * _HALF_TAPS * used.decimation / used.rate_hz
 
 
 def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     """Say that no stretch is long enough for the filters, and how long one has to be."""
     spans = [recording.t[part[[0, -1]]] for part in unbroken(recording, used.rate_hz)]
     longest = max(float(last - first) for first, last in spans)
+    left = longest - _decimated_edges(used)
+    if 'cutoff' in used.given and left > 0.0:
+        return IdentificationError(
+            f'{recording.source}: --cutoff {used.cutoff_hz:g} Hz is too low for {longest:.2f} s '
+            f'without a gap: take more than {_CUTOFF_PERIODS / left:.2g} Hz, or leave it out'
+        )
     return IdentificationError(
         f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
         f'the longest without a gap has {longest:.2f} s, more than {_shortest(used):.2f} s are '

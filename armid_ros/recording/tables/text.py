@@ -17,6 +17,13 @@ import numpy as np
 
 _SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', ' ': 'blanks'}
 _COMMENTS = ('#', '%')
+#: How text begins whose characters take two or four bytes.
+_WIDE = {
+    b'\xff\xfe\0\0': 'UTF-32',
+    b'\0\0\xfe\xff': 'UTF-32',
+    b'\xff\xfe': 'UTF-16',
+    b'\xfe\xff': 'UTF-16',
+}
 _EMPTY = ('', 'nan', 'na', 'n/a', 'null', 'none', '-')
 _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
 #: A column with fewer numbers than this share is one of words.
@@ -55,11 +62,32 @@ def read_text(path: Path) -> Table:
 
 def _lines(path: Path) -> list[str]:
     raw = read_content(path)
+    if not raw.strip():
+        raise RecordingError(f'{path}: the file is empty; record again, or name another file')
+    for start, coding in _WIDE.items():
+        if raw.startswith(start) and _decodes(raw, coding):
+            raise RecordingError(
+                f'{path}: text in {coding}, not in UTF-8; save it as CSV in UTF-8, or: '
+                f'iconv --from-code {coding} --to-code UTF-8 {path} > utf8.csv'
+            )
+    if b'\0' in raw:
+        raise RecordingError(
+            f'{path}: is no text, but binary; name the file with the ending of its kind '
+            '(.npz, .mat, .parquet, .mcap), or save it as CSV in UTF-8'
+        )
     try:
         text = raw.decode('utf-8-sig')
     except UnicodeDecodeError:
         text = raw.decode('latin-1')
     return text.rstrip().splitlines()
+
+
+def _decodes(raw: bytes, coding: str) -> bool:
+    try:
+        raw.decode(coding)
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
@@ -79,7 +107,10 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
             return (number, header, words[-1]) if header else (number, (words or [''])[-1], '')
         else:
             words.append(line)
-    raise RecordingError(f'{path}: no line of numbers in {len(lines)} lines')
+    raise RecordingError(
+        f'{path}: no line of numbers in {len(lines)} lines; a table has one row a line, values '
+        'with commas, semicolons, tabs or blanks between them'
+    )
 
 
 def _has_numbers(line: str) -> bool:

@@ -41,3 +41,22 @@ def test_what_is_no_gzip_is_said(tmp_path):
     path.write_bytes(b'a,b\n1,2\n')
     with pytest.raises(RecordingError, match=r'wrong.csv.gz: cannot be unpacked'):
         open_table(path)
+
+
+@pytest.mark.parametrize(
+    ('content', 'said'),
+    [
+        (b'', 'the file is empty'),
+        (b'\n \n', 'the file is empty'),
+        ('t,q\n0,1\n'.encode('utf-16'), 'text in UTF-16, not in UTF-8; save it as CSV in UTF-8'),
+        ('t,q\n0,1\n'.encode('utf-32'), 'text in UTF-32, not in UTF-8; save it as CSV in UTF-8'),
+        (b'\x93NUMPY\x01\x00v\x00', 'is no text, but binary; name the file with the ending'),
+        (b'\xff\xfe\x00\xd8\x00\xd8', 'is no text, but binary; name the file with the ending'),
+        (b'hello\nworld\n', 'no line of numbers in 2 lines; a table has one row a line'),
+    ],
+)
+def test_what_is_no_table_in_text_is_said_with_what_to_do(tmp_path, content, said):
+    path = tmp_path / 'log.csv'
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match=f'^{path}: {said}'):
+        open_table(path)
