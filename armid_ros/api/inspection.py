@@ -17,7 +17,7 @@ from armid_ros.api.arguments import (
     RobotLike,
 )
 from armid_ros.api.table import Shown, Summary
-from armid_ros.files import json_text, write_file
+from armid_ros.files import json_text, staged, write_file
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.recording import Recording
@@ -80,20 +80,22 @@ class InspectionResult(Shown):
 
     def save(self, folder: str | Path) -> Path:
         """Write inspection.json and inspection.html."""
-        out = Path(folder)
-        out.mkdir(parents=True, exist_ok=True)
-        write_file(out / 'inspection.json', json_text(self.document(), indent=1))
-        self.report(out / 'inspection.html')
-        return out
+        with staged(Path(folder)) as result:
+            text = json_text(self.document(), indent=1)
+            write_file(result.folder / 'inspection.json', text)
+            self.report(result.folder / 'inspection.html')
+            result.keep()
+        return result.out
 
     def summary(self) -> Summary:
         """Return the joints, and the worst of what was remarked."""
+        from armid_ros.report.notation import plain
         from armid_ros.report.sections.inspection import joint_heads, joint_rows
 
         sampling = self.core.sampling
         return Summary(
             f'{self.core.recording.source}: {sampling.duration:.1f} s at '
-            f'{sampling.rate_hz:.4g} Hz. {self.core.verdict}',
+            f'{plain(sampling.rate_hz, 4)} Hz. {self.core.verdict}',
             heads=_without_detail(joint_heads(self.core)),
             rows=[_without_detail(row) for row in joint_rows(self.core)],
             lines=self.remarks,

@@ -22,7 +22,7 @@ from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import is_table, measured, open_table, plan
 from armid_ros.report.inspection_report import inspection_report
-from armid_ros.report.notation import counted
+from armid_ros.report.notation import counted, plain
 from armid_ros.report.sections.inspection import joint_heads, joint_rows, repetition
 import click
 import numpy as np
@@ -108,12 +108,13 @@ def _print(found: Inspection) -> None:
         read = ' <- read' if topic.name == recording.topic else ''
         say(f'  {topic.name}  {topic.count} x {topic.type_name}{read}')
     say(
-        f'  {sampling.duration:.2f} s, {len(recording)} samples, {sampling.rate_hz:.4g} Hz, steps '
-        f'vary by {100 * sampling.jitter:.1f} %'
+        f'  {sampling.duration:.2f} s, {len(recording)} samples, {plain(sampling.rate_hz, 4)} Hz, '
+        f'steps vary by {100 * sampling.jitter:.1f} %'
     )
     gaps = counted(sampling.gaps, 'gap') if sampling.gaps else 'no gaps'
     say(
-        f'  {gaps}, longest step {1000 * sampling.longest_step:.3g} ms; motion {repetition(found)}'
+        f'  {gaps}, longest step {plain(1000 * sampling.longest_step)} ms; motion '
+        f'{repetition(found)}'
     )
     heads = joint_heads(found)
     rows = [dict(zip(heads, row, strict=True)) for row in joint_rows(found)]

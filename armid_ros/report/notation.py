@@ -35,6 +35,12 @@ def digits(value: float, count: int = 2) -> str:
     return f'{value:z#.{count}g}'.rstrip('.')
 
 
+def plain(value: float, count: int = 3) -> str:
+    """Return a number as short as its digits allow: '5', not '5.00'; 3000, not 3e+03."""
+    whole = 10.0**count - 0.5 <= abs(value) < 1e7
+    return f'{value:.0f}' if whole else f'{value:.{count}g}'
+
+
 def measured(value: float, reach: float) -> tuple[str, str]:
     """Return a value and the half width of its interval, to the digit that this leaves."""
     if not (math.isfinite(reach) and reach > 0.0):

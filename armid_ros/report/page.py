@@ -19,7 +19,7 @@ import re
 from typing import Any, ClassVar
 
 from armid_ros.files.own import GENERATOR
-from armid_ros.report.notation import counted, digits, pretty
+from armid_ros.report.notation import counted, digits, plain, pretty
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -107,6 +107,7 @@ def _environment() -> Environment:
     )
     environment.filters.update(digits=digits, pretty=pretty)
     environment.globals['counted'] = counted
+    environment.globals['plain'] = plain
     return environment
 
 

@@ -18,7 +18,7 @@ from armid_ros.report.diagnosis_report import (
     Extras,
     tone_of,
 )
-from armid_ros.report.notation import DASH, digits, percent, with_interval
+from armid_ros.report.notation import DASH, digits, percent, plain, with_interval
 from armid_ros.report.sections.candidates import CandidateTable
 from armid_ros.report.sections.diagnosed import EvidenceSection, NamedParameters, Shares
 from armid_ros.report.sections.forward import Forward
@@ -373,3 +373,11 @@ def test_steps_have_the_sign_that_the_sentence_has(found, recordings):
     extras = Extras(no_run='the load is 0.3 +- 0.1 kg')
     page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='r', extras=extras)
     assert 'The load is 0.3 ± 0.1 kg.' in page
+
+
+@pytest.mark.parametrize(
+    ('value', 'text'),
+    [(5.0, '5'), (12.34, '12.3'), (0.0071, '0.0071'), (999.7, '1000'), (3000.0, '3000')],
+)
+def test_large_numbers_have_no_exponent(value, text):
+    assert plain(value) == text

@@ -6,13 +6,21 @@ from dataclasses import fields, replace
 from html.parser import HTMLParser
 import re
 
-from armid_ros.identification import IdentificationSettings, identify, PhysicalSettings, verify
+from armid_ros.identification import (
+    Fit,
+    IdentificationSettings,
+    identify,
+    PhysicalSettings,
+    verify,
+)
 from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.motion import Motion
+from armid_ros.recording import Recording
 from armid_ros.report import hash_files, identification_report, Provenance, versions
 from armid_ros.report.identification_report import Assessment
 from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.assessment import EncoderNoise
+from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
 from armid_ros.report.sections.fit import FitSection
 from armid_ros.report.sections.parameters import ParameterSection
 import numpy as np
@@ -238,6 +246,20 @@ def test_periods_show_what_of_the_residual_repeats(case):
     assert found.repeating_share[0] > 0.8
     assert found.repeating_share[1:].max() < 0.4
     assert Repeatability.of([fit]) is None
+
+
+def test_a_page_has_the_period_of_the_recording_and_not_of_its_rows(case):
+    robot = case.result.arm.robot
+    t = 0.005 * np.arange(4000)
+    angle = 2.0 * np.pi * t[:, np.newaxis] / 8.0 + np.arange(robot.n_joints)
+    recording = Recording(joints=robot.joints, t=t, q=np.sin(angle) + 0.4 * np.sin(3.0 * angle))
+    rest = np.zeros_like(recording.q[::11])
+    rows = Motion(robot.joints, t[::11], recording.q[::11], rest, rest, rest)
+    fit = Fit('run', rows, rest, np.ones(rest.shape, dtype=bool))
+    quality = RecordingQuality.of(recording, 'training', [fit])
+    assert quality.repeatability.period == pytest.approx(8.0, abs=1e-3)
+    html = DataQuality([quality], robot).html()
+    assert 'repeats after 8.00 s' in html and '5 ms' in html
 
 
 def test_nothing_is_loaded(page, html):

@@ -117,7 +117,7 @@ class PhysicalCertificate:
             f'{least.eigenvalues[0]:.3g} ({least.link})',
             f'constraints cost {100.0 * (self.misfit_ratio - 1.0):.2f} % of torque error on the '
             f'training data and {100.0 * (self.held_out_ratio - 1.0):+.2f} % on blocks left out; '
-            f'weight of the description {self.weight:.0e}',
+            f'weight of the description {self.weight:g}',
             *(self.activity or ('no constraint is active',)),
             *self.notes,
         )

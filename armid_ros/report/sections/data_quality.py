@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from armid_ros.identification import Fit
+from armid_ros.identification.rows.period import exact_period
 from armid_ros.recording import Recording
 from armid_ros.report.notation import digits, torque_unit
 from armid_ros.report.page import Section
@@ -72,7 +73,7 @@ class RecordingQuality:
             clock=recording.clock,
             description=recording.report.describe(),
             clean=recording.report.unharmed,
-            repeatability=Repeatability.of(fits) if fits else None,
+            repeatability=_repeatability(recording, fits),
         )
 
 
@@ -109,6 +110,14 @@ class DataQuality(Section):
             for recording in self.recordings
             if recording.repeatability is not None
         ]
+
+
+def _repeatability(recording: Recording, fits: Sequence[Fit]) -> Repeatability | None:
+    """Compare periods of the rows of a fit; how long one is, the recording tells better."""
+    found = Repeatability.of(fits) if fits else None
+    if found is None:
+        return None
+    return replace(found, period=exact_period(recording, found.period))
 
 
 def _rows(recording: RecordingQuality, robot: Robot) -> list[tuple[str, str, str, float]]:

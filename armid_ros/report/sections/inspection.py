@@ -10,7 +10,7 @@ from typing import ClassVar
 from armid_ros.inspection import Inspection, JointFacts
 from armid_ros.motion import FloatArray
 from armid_ros.report.charts import Chart, Level, Series, thinned
-from armid_ros.report.notation import digits
+from armid_ros.report.notation import digits, plain
 from armid_ros.report.page import Section
 import numpy as np
 
@@ -34,10 +34,14 @@ class ContentsSection(Section):
     def facts(self) -> list[tuple[str, str]]:
         """Return what is to be said of its time."""
         sampling, recording = self.found.sampling, self.found.recording
+        rate = plain(sampling.rate_hz, 4)
         facts = [
             ('Duration', f'{sampling.duration:.2f} s, {len(recording)} samples'),
-            ('Rate', f'{sampling.rate_hz:.4g} Hz, steps vary by {100 * sampling.jitter:.1f} %'),
-            ('Longest step', f'{1000 * sampling.longest_step:.3g} ms'),
+            (
+                'Rate',
+                f'{rate} Hz, steps vary by {100 * sampling.jitter:.1f} %',
+            ),
+            ('Longest step', f'{plain(1000 * sampling.longest_step)} ms'),
             ('Gaps', str(sampling.gaps) if sampling.gaps else 'none'),
             ('Motion', repetition(self.found)),
             ('Clock', recording.clock),
