@@ -18,7 +18,6 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
-from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     Hypothesis,
@@ -179,10 +178,10 @@ def _mistaken(
     if now is None or then is None:
         return []
     wrong = _unit_since(arm, recordings, used, now, then)
-    if not wrong and all([type(one) for one in some] == [OtherUnit] for some in shown):
-        wrong = _gain_since(now / then)
-    apart = factors_apart(arm, *(slow_motions_of(some, used) for some in (recordings, before)))
-    return [apart or wrong] if wrong else []
+    if not wrong:
+        return []
+    days = (slow_motions_of(some, used) for some in (recordings, before))
+    return [factors_apart(arm, *days) or wrong]
 
 
 def _unit_since(
@@ -197,16 +196,6 @@ def _unit_since(
     if not found:
         return ''
     return f'torques are in {" or ".join(found)} if those of the baseline are in N m: convert them'
-
-
-def _gain_since(factor: float) -> str:
-    """Say that a factor of all torques is no unit, where nothing that happens to an arm is it."""
-    if 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor:
-        return ''
-    return (
-        f'torques of all joints are {factor:.3g} times those of the baseline, which is no unit '
-        '(currents?): convert them'
-    )
 
 
 def mistaken_recordings(

@@ -235,9 +235,7 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
         positions = np.hstack([positions, recording.partner.q])
     period = 1.0 / used.rate_hz
     for part in unbroken(recording, used.rate_hz):
-        if len(part) >= _LEAST_SAMPLES and recording.t[part[-1]] - recording.t[
-            part[0]
-        ] > _shortest(used):
+        if len(part) >= _LEAST_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
             t, q, tau = _even(recording.t[part], period, positions[part], recording.tau[part])
             yield _differentiated(recording, t, q, tau, used)
 
@@ -447,7 +445,6 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
         signal.welch(q, fs=rate, window='blackmanharris', nperseg=length, axis=0)
         for q in long_enough
     ]
-    frequency = spectra[0][0]
     weights = [len(q) for q in long_enough]
-    power = np.average([power for _, power in spectra], axis=0, weights=weights)
+    frequency, power = (np.average(x, axis=0, weights=weights) for x in zip(*spectra, strict=True))
     return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)
