@@ -219,7 +219,8 @@ class Names:
         rest, shares = _large(found, unseen, settings, least, deny)
         names = cls(rest, rest, shares)
         if chosen.rest is not None and rest.steps:
-            names = _as_stated(names, unseen, arm, settings)
+            as_described = chosen.explanation if rest is found else in_model_as_given(rest)
+            names = _as_stated(names, as_described, unseen, arm, settings)
         steps = names.stated.steps
         if not (chosen.untested and steps):
             return names
@@ -231,10 +232,14 @@ class Names:
 
 
 def _as_stated(
-    names: Names, unseen: Evidence | None, arm: ArmModel, settings: DiagnosisSettings
+    names: Names,
+    as_described: Explanation,
+    unseen: Evidence | None,
+    arm: ArmModel,
+    settings: DiagnosisSettings,
 ) -> Names:
     """
-    Return the names that stay in the model as given.
+    Return the names that stay in the model as given, where they are `as_described`.
 
     Where they explain too little there, the explanation keeps the rigid body common to both days.
 
@@ -242,7 +247,6 @@ def _as_stated(
     rest, least = names.rest, settings.thresholds.headline
     if not rest.steps:
         return names
-    as_described = in_model_as_given(rest)
     alone = shares_of(as_described, unseen, settings)
     if alone.share(range(len(as_described.steps))) < least:
         bodily, remarks = as_bodies(rest, arm)
@@ -252,7 +256,7 @@ def _as_stated(
         return replace(names, stated=as_described, shares=alone)
     fewer = rest.without(small)
     kept = Names(fewer, fewer, shares_of(fewer, unseen, settings))
-    return _as_stated(kept, unseen, arm, settings)
+    return _as_stated(kept, in_model_as_given(fewer), unseen, arm, settings)
 
 
 def _large(

@@ -168,12 +168,16 @@ def _mistaken(
     if any(one.partner is not None for one in recordings):
         return []
     then = _baseline_factor(arm, before, used)
-    found = [find_mistake(arm.body, recording, used) for recording in recordings]
-    shown = [() if mistake is None else mistake.hypotheses for mistake in found]
-    said = {tuple(_fault(one, arm.robot, then) for one in some) for some in shown}
-    (first, *others) = said
-    if first and all(first) and not others:
-        return [', or '.join(first)]
+    said: set[tuple[str, ...]] = set()
+    for recording in recordings:
+        mistake = find_mistake(arm.body, recording, used)
+        if mistake is None:
+            break
+        said.add(tuple(_fault(one, arm.robot, then) for one in mistake.hypotheses))
+    else:
+        (first, *others) = said
+        if all(first) and not others:
+            return [', or '.join(first)]
     now = None if then is None else effort_factor(arm.body, recordings, used)
     if now is None or then is None:
         return []
