@@ -362,7 +362,7 @@ def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
         monkeypatch.setattr(attribution, name, stub)
     rest = Named(tuple(names))
     headline = attribution.Names(rest, rest, rest)
-    kept = attribution._as_stated(headline, None, None, DiagnosisSettings())
+    kept = attribution._as_stated(headline, rest, None, None, DiagnosisSettings())
     assert [share for share, _ in kept.rest.steps] == stay
     assert kept.stated.steps == kept.rest.steps
 
