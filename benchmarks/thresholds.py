@@ -55,6 +55,8 @@ _VERDICT = ('verdict/attribution.py', 'verdict/gap.py')
 _DECIDING = ('diagnose.py', 'data', 'search', *_VERDICT)
 #: What decides beside it, below armid_ros: whether data are at fault.
 _BESIDE = ('identification/assess/data_faults.py', 'identification/rows/stamps.py')
+#: Numbers that a class is made with as its module is imported, which cannot be changed later.
+_MADE_WITH = ('data/discrepancy.py _POSITIONS',)
 #: From here up to one a number is a level, of which what is beyond is changed.
 _LEVEL = 0.9
 
@@ -66,12 +68,13 @@ def of_modules() -> list[str]:
     """Return the numbers of the modules that decide, each by its file and its name."""
     root = _PACKAGE.parent
     own = [(_PACKAGE, path) for folder in _DECIDING for path in _files(folder)]
-    return [
+    found = [
         f'{path.relative_to(home).as_posix()} {name}'
         for home, path in [*own, *((root.parent, root / place) for place in _BESIDE)]
         for names, _, _ in constants(path.read_text(encoding='utf-8'))
         for name in names.split(', ')
     ]
+    return [name for name in found if name not in _MADE_WITH]
 
 
 def _files(place: str) -> list[Path]:
