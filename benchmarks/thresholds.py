@@ -52,7 +52,7 @@ _PACKAGE_NAME, _ROOT = 'armid_ros.diagnosis', 'armid_ros.'
 _PACKAGE = Path(armid_ros.diagnosis.__file__).parent
 #: Parts of it whose numbers decide; those of sentences and the next run decide no name.
 _VERDICT = ('verdict/attribution.py', 'verdict/gap.py')
-_DECIDING = ('diagnose.py', 'data', 'search', *_VERDICT)
+_DECIDING = ('diagnose.py', 'prepare.py', 'data', 'search', *_VERDICT)
 #: What decides beside it, below armid_ros: whether data are at fault.
 _BESIDE = ('identification/assess/data_faults.py', 'identification/rows/stamps.py')
 #: Numbers that a class is made with as its module is imported, which cannot be changed later.
