@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
@@ -129,6 +130,11 @@ class Explanation:
             beside=None,
         )
 
+    @cached_property
+    def beside_discrepancy(self) -> Explanation:
+        """The same names fitted beside the model discrepancy; itself where there is none."""
+        return self if self.beside is None else self.in_arm(self.beside)
+
     @property
     def chi2_per_row(self) -> FloatArray:
         """Mean weighted square of the residual of the patched model, shape (n,)."""
@@ -186,8 +192,7 @@ def in_model_as_given(found: Explanation) -> Explanation:
 
     """
     arm, evidence = found.given, found.evidence
-    if found.beside is not None:
-        found = found.in_arm(found.beside)
+    found = found.beside_discrepancy
     fitted = found.fitted
     if found.prior is not None and found.baseline is not None:
         fitted = as_change(fitted, evidence, found.prior, found.baseline)

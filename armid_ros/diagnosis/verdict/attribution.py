@@ -245,8 +245,6 @@ def _as_stated(
 
     """
     rest, least = names.rest, settings.thresholds.headline
-    if not rest.steps:
-        return names
     alone = shares_of(as_described, unseen, settings)
     if alone.share(range(len(as_described.steps))) < least:
         bodily, remarks = as_bodies(rest, arm)
@@ -256,6 +254,8 @@ def _as_stated(
         return replace(names, stated=as_described, shares=alone)
     fewer = rest.without(small)
     kept = Names(fewer, fewer, shares_of(fewer, unseen, settings))
+    if not fewer.steps:
+        return kept
     return _as_stated(kept, in_model_as_given(fewer), unseen, arm, settings)
 
 

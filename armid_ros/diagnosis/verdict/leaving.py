@@ -56,7 +56,7 @@ class Leaving:
         found = self._of_rest(names.rest)
         if names.rest.beside is None or max(one.ratio.max() for one in found) <= 1.0:
             return found
-        others = self._of_rest(names.rest.in_arm(names.rest.beside))
+        others = self._of_rest(names.rest.beside_discrepancy)
         return [
             replace(one, ratio=np.minimum(one.ratio, other.ratio))
             for one, other in zip(found, others, strict=True)

@@ -28,6 +28,7 @@ from armid_ros.identification.fitting.nonlinear import linearised
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Regression, regressions
 from armid_ros.identification.rows.signals import even_positions, sampling_rate, unbroken
+from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -38,7 +39,8 @@ from scipy.stats import chi2
 INSTRUMENT_SHARE = 0.2
 #: Noise is what lies above this share of the sampling rate.
 _NOISE_ABOVE = 0.3
-#: Samples that a stretch is continued by at its ends, as far as the smoothing reaches.
+#: Samples that a stretch is continued by at its ends at the most: three times the length of the
+#: filter, two sections of second order, as scipy does where nothing is said.
 _EDGE = 15
 #: A difference between the two fits of less than this share of a deviation does not matter, and
 #: counts little in the test: two fits of the same data are distinguishable to a thousandth.
@@ -274,16 +276,8 @@ def position_noise(recording: Recording) -> FloatArray:
 
     """
     rate = sampling_rate(recording)
-    stretches = even_positions(recording)
-    length = min(max(map(len, stretches)), int(8.0 * rate))
-    long_enough = [q for q in stretches if len(q) >= length]
-    levels = []
-    for q in long_enough:
-        frequency, power = signal.welch(
-            q, fs=rate, window='blackmanharris', nperseg=length, detrend='linear', axis=0
-        )
-        levels.append(np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0))
-    level = np.average(levels, axis=0, weights=[len(q) for q in long_enough])
+    frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
+    level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))
 
 

@@ -23,7 +23,8 @@ _SHORTEST = 1.5
 _STRETCH = 0.8
 #: In a stretch that tells, positions vary by this share of what they vary by in all.
 _MOVING = 0.3
-#: How far the time of a motion that repeats may be from what a coarser look found [s].
+#: How far the time of a motion that repeats may be from what a coarser look found: two of its
+#: steps, which are 0.05 s apart [s].
 _NEAR = 0.1
 #: Samples per second, and samples, at which it is looked at again at the most.
 _FINE_HZ, _MOST_SAMPLES = 200.0, 20_000

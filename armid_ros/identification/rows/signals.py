@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import PartnerMotion, Recording
@@ -39,8 +40,9 @@ MODEL_BANDS = 10.0
 NOISE_MARGIN = 3.0
 #: Periods of the cut-off that are cut off at both ends, where the filter has no neighbours.
 EDGE_PERIODS = 4.0
-#: Periods of the cut-off that a stretch has to have beside what the decimation takes of it.
-_CUTOFF_PERIODS = 10.0
+#: Periods of the cut-off that a stretch has to have beside what the decimation takes of it: those
+#: at both ends, and two that stay.
+_CUTOFF_PERIODS = 2.0 * EDGE_PERIODS + 2.0
 #: Samples per period of the cut-off that describe a smooth function of the filtered positions.
 SMOOTH_SAMPLES = 5.0
 #: No drive tells its torque to more than this share of it, which is 13 bits; what a simulation
@@ -438,13 +440,5 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
 
     """
     rate = sampling_rate(recording)
-    parts = _unbroken_positions(recording, rate)
-    length = min(max(map(len, parts)), int(8.0 * rate))
-    long_enough = [q for q in parts if len(q) >= length]
-    spectra = [
-        signal.welch(q, fs=rate, window='blackmanharris', nperseg=length, axis=0)
-        for q in long_enough
-    ]
-    weights = [len(q) for q in long_enough]
-    frequency, power = (np.average(x, axis=0, weights=weights) for x in zip(*spectra, strict=True))
+    frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
     return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)
