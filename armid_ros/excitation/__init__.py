@@ -10,10 +10,12 @@ from rest to rest.
 """
 
 from armid_ros.excitation.design import Design, design, design_speeds, DesignProgress, evaluate
+from armid_ros.excitation.ending import Ending
 from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
 from armid_ros.excitation.fitness import Fitness, fitness, not_checked
 from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.gate import MotionGate
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.geometry.environment import Obstacle, obstacles_alone, with_obstacles
 from armid_ros.excitation.geometry.environment_file import load_environment
@@ -27,6 +29,7 @@ from armid_ros.excitation.limits import (
     used_shares,
     Violation,
 )
+from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.rehearsal import Rehearsal, RehearsalReport
@@ -35,8 +38,6 @@ from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import CRITERIA, Information
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
 from armid_ros.excitation.supervision import (
-    brought_to_rest,
-    Halt,
     held,
     jump_fault,
     MeasuredPose,
@@ -46,7 +47,6 @@ from armid_ros.excitation.supervision import (
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
-    'Halt',
     'Rehearsal',
     'RehearsalReport',
     'held',
@@ -63,17 +63,20 @@ __all__ = [
     'Information',
     'Limits',
     'LowestPoint',
+    'JointState',
     'MeasuredPose',
+    'MotionGate',
+    'PoseMonitor',
     'Obstacle',
     'DesignProblem',
     'DesignProgress',
+    'Ending',
     'Run',
     'SPEED_CLASSES',
     'TARGETS',
     'Transfer',
     'TransferPlanner',
     'Violation',
-    'brought_to_rest',
     'check_limits',
     'design',
     'design_speeds',

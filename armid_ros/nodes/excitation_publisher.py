@@ -4,30 +4,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import wraps
 import math
 import time
 from typing import Any
 
 from armid_ros.errors import ArmidError, TrajectoryError
 from armid_ros.excitation import (
-    brought_to_rest,
+    Ending,
     Excitation,
-    MeasuredPose,
+    MotionGate,
     plan_run,
     Rehearsal,
-    Run,
-    slowed,
     tracking_fault,
     TransferPlanner,
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
-from armid_ros.excitation.supervision import HANDOVER, Speedometer
-from armid_ros.motion import Motion
+from armid_ros.excitation.pose_monitor import AGREEING
+from armid_ros.excitation.supervision import HANDOVER
+from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.messages.measured_pose import efforts, PoseReader
-from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.excitation import (
     checked,
     EXCITATION_PARAMETERS,
@@ -38,20 +36,16 @@ from armid_ros.nodes.parameters.run import RUN_PARAMETERS, SIMULATION
 from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from armid_ros.nodes.trajectory.halting import HaltWatch
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
+import numpy as np
 from rclpy.clock import Clock, ClockType
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from trajectory_msgs.msg import JointTrajectory
 
 #: How often a subscriber is looked for, and whether the arm is still heard of [s].
 _LOOK_PERIOD = 0.05
-#: How often it is looked whether the arm follows [s].
-_TRACKING_PERIOD = 0.02
-#: How often it is looked at at all, whatever the rate of joint_states [s].
-_POSE_PERIOD = 0.005
+#: How often the arm is compared with the run, whatever the rate of joint_states [s].
+_TRACKING_PERIOD = 0.005
 #: How long the last message may take to arrive when the node ends [s].
 _FAREWELL = 1.0
 
@@ -60,12 +54,13 @@ class ExcitationPublisherNode(ArmidNode):
     """
     Has a trajectory controller, real or simulated, run an excitation.
 
-    It is a goal of the action follow_joint_trajectory where a controller has that, else a message.
-    It begins where joint_states say that the arm is, and goes from there to the excitation slowly,
-    past what stands around. The arm is stopped when the node is told to, when it ends, when the
-    arm does not follow, and when nothing is heard of it or of its controller any more. A message
-    is latched and stamped with the time it begins, so that a controller that comes up later does
-    not set the arm in motion.
+    The run is a goal of the action follow_joint_trajectory where a controller offers it, else a
+    message. It begins where joint_states place the arm at rest, and goes from there to the
+    excitation slowly, past what stands around. The arm is stopped on the path it is on: by the
+    service, when the node ends, when the arm does not follow or takes an unforeseen effort, when
+    joint states are missing or contradict each other, and when the controller is gone. Every
+    motion that is sent passes one `MotionGate`. No message is latched, so that a controller that
+    starts later does not move the arm.
 
     """
 
@@ -104,30 +99,26 @@ class ExcitationPublisherNode(ArmidNode):
             raise TrajectoryError('a planner needs an excitation to plan the way to')
         self._planner = planner
         self._excitation = excitation.for_joints(planner.arm.robot.joints)
-        self._measured = PoseReader(self._excitation.joints)
-        self._speed = Speedometer.unknown(len(self._excitation.joints))
-        self._stamps = StampDifference(self.get_clock())
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._run: Run | None = None
-        self._begun_ns, self._sent_at = 0, -math.inf
-        self._looked_at = self._tracked = -math.inf
+        self._gate: MotionGate | None = None
+        self._ending: Ending | None = None
+        self._begun_ns, self._begun, self._tracked = 0, -math.inf, -math.inf
+        self._overloads = 0
         self._trouble = self._rehearsed = ''
         self._runs, self._outcome = 0, 'ready'
         self._rehearsal: Rehearsal | None = None
-        self._halting = HaltWatch(lambda m: self._controller.insist(self._stamped(m, HANDOVER)))
         self._waiting = bool(self.value('start'))
         self._deadline = time.monotonic() + self.value('subscriber_timeout')
         self._controller = TrajectorySenders(self, self._on_goal_ended)
-        self._states = self.create_subscription(
-            JointState, 'joint_states', self._on_joint_states, 10, raw=True
-        )
+        tolerance = self.value('tracking_tolerance')
+        self._arm = ArmWatch(self, planner.arm.robot, tolerance, self._on_state)
         self._experiments = self.create_subscription(
             String, 'experiment', self._on_experiment, LATCHED
         )
         self.offer('~/start', self.start)
         self.offer('~/rehearse', self.rehearse)
         self.offer('~/stop', self.stop)
-        self._timer = self.create_timer(_LOOK_PERIOD, self.look, clock=self._steady)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters; those of a simulation have defaults of their own."""
@@ -137,14 +128,14 @@ class ExcitationPublisherNode(ArmidNode):
         if not self._simulated:
             return table
         # nothing breaks in a simulation, but it is silent while it works on a long trajectory
-        lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0}
+        lively = {'speed': 'fast', 'start': True, 'state_timeout': 5.0, 'effort_factor': 0.0}
         return [replace(p, default=lively.get(p.name, p.default)) for p in table]
 
     @property
     def duration(self) -> float:
         """Time from the message to the end of the run, approach included [s]."""
-        if self._run is not None:
-            return self._run.duration
+        if self._gate is not None:
+            return self._gate.run.duration
         return float(self.value('approach') + self._excitation.sampled_duration(self._rate))
 
     @property
@@ -153,13 +144,9 @@ class ExcitationPublisherNode(ArmidNode):
         return self._controller.readers
 
     @property
-    def _pose(self) -> MeasuredPose:
-        return self._measured.pose
-
-    @property
     def last_stamp_ns(self) -> int:
-        """Stamp of the oldest position that the pose of the arm is made of [ns]."""
-        return min(self._pose.stamps)
+        """Stamp of the oldest believed position of a joint [ns]."""
+        return min(self._arm.monitor.pose.stamps)
 
     @property
     def elapsed(self) -> float | None:
@@ -169,25 +156,28 @@ class ExcitationPublisherNode(ArmidNode):
         A goal is under way until the controller says how it ended, whatever the time.
 
         """
-        if self._run is None:
+        if self._gate is None:
             return None
-        elapsed = (self.get_clock().now().nanoseconds - self._begun_ns) * 1e-9
-        on_the_way = elapsed < self._run.duration or self._controller.under_way
+        elapsed = self._arm.now() - self._begun
+        on_the_way = elapsed < self._gate.run.duration or self._controller.under_way
         return elapsed if on_the_way else None
 
     def look(self) -> None:
-        """Begin when somebody listens and the arm is heard of; stop it when it is not any more."""
+        """Begin when a controller and the arm are there; stop the arm when one is lost."""
         self._controller.look()
+        now, patience = self._arm.now(), self.value('state_timeout')
         if self.elapsed is not None:
             # while the way was planned nothing was received, whatever the arm sent
-            patience = self.value('state_timeout')
-            lost = self._staleness() if self._now() - self._sent_at > patience else ''
+            lost = self._arm.staleness(patience) if now - self._begun > patience else ''
+            lost = lost or self._arm.monitor.contradiction(now)
             lost = lost or self._controller.trouble(patience)
             if lost:
                 self._give_up(lost)
             return
-        if self._run is not None:
-            self._end_complete(self._run)
+        if self._gate is not None:
+            self._end_complete(self._gate)
+        if self._ending is not None:
+            self._watch_ending(self._ending)
         if self._rehearsal is not None:
             self._end_rehearsal(self._rehearsal)
         elif self._waiting:
@@ -201,54 +191,71 @@ class ExcitationPublisherNode(ArmidNode):
         """Run the excitation slowly; afterwards the status says how the arm followed."""
         speed = min(self.value('rehearsal_speed'), self.value('speed_scaling'))
         text = self._start(speed)
-        assert self._run is not None
-        self._rehearsal = Rehearsal(self._run, self._planner.arm)
+        assert self._gate is not None
+        self._rehearsal = Rehearsal(self._gate.run, self._planner.arm)
         return f'rehearsal at {100.0 * speed:.0f} % of the speed: {text}'
 
     def _start(self, speed: float) -> str:
         self._waiting = False
         if self.elapsed is not None:
             raise TrajectoryError('the excitation is under way; ~/stop ends it')
-        self._require_ready()
+        fault = self._fault_at_start()
+        if fault:
+            raise TrajectoryError(f'{fault}; the arm is not started')
         planned = plan_run(
             self._excitation.at_speed(speed, self._rate),
             self._planner,
-            self._pose.q,
+            self._arm.monitor.pose.q,
             self._rate,
             shortest=self.value('approach'),
             back=False,
         )
+        gate = MotionGate.of(planned, self._planner, self._rate)
         motion = planned.motion()
         first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
-        message = self._stamped(motion.select(slice(first, None)), first / self._rate)
+        message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
+        now = self.get_clock().now()
+        if not self.value('zero_stamp'):
+            message.header.stamp = now.to_msg()
         receiver = self._controller.begin(message)
+        # the controller begins when its own clock has the stamp
+        late = self._arm.stamps.late if not (self.value('zero_stamp') or self._simulated) else 0.0
+        self._begun_ns, self._begun = now.nanoseconds, self._arm.now() + late
+        self._gate, self._ending, self._rehearsal = gate, None, None
+        self._overloads = 0
         self._trouble, self._rehearsed = '', ''
-        self._halting.forget()
-        self._run, self._rehearsal = planned, None
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
         return self._tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
         )
 
-    def _require_ready(self) -> None:
-        """Refuse to start an arm that cannot be watched, moves, or has another clock."""
-        robot, topic = self._planner.arm.robot, self._states.topic_name
-        lost = self._staleness() or self._speed.fault(robot.joints, robot.position_units)
-        lost = self.missing_clock or (lost and f'{topic}: {lost}')
-        if not (lost or self.value('zero_stamp')):
-            lost = self._stamps.of_start(topic, self.value('state_timeout'), self._simulated)
-        if lost:
-            raise TrajectoryError(f'{lost}; the arm is not started')
+    def _fault_at_start(self) -> str:
+        """Return why the arm must not be started, by its joint states; empty when it may."""
+        patience = self.value('state_timeout')
+        difference = patience if self.value('simulation') else 0.1 * self.value('stopping')
+        difference = math.inf if self.value('zero_stamp') else difference
+        return self._arm.fault_at_start(patience, difference, self._simulated)
 
     def stop(self) -> str:
         """Bring the arm to rest on the path it is on."""
         self._waiting = False
-        elapsed = self.elapsed
-        if elapsed is None or self._run is None:
+        if self._gate is not None:
+            elapsed = self._arm.now() - self._begun
+            self._end_run('stopped by ~/stop')
+            return self._tell(f'stopped {elapsed:.2f} s after the start')
+        ending = self._ending
+        if ending is None:
             raise TrajectoryError('nothing is under way')
-        self._end_run(slowed(self._run, elapsed, self.value('stopping'), self._rate))
-        return self._tell(f'stopped {elapsed:.2f} s after the start')
+        if ending.last is None:
+            raise TrajectoryError(f'{ending.reason}; stop the arm there')
+        now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
+        motion = ending.stopped_again(self._arm.monitor, now, *limits)
+        if motion is None:
+            return self._tell('the stop was sent before')
+        self._ending = replace(ending, last=motion, sent=now)
+        self._controller.insist(write_trajectory(motion, float(motion.t[0])))
+        return self._tell('the arm was still on its path, and was stopped again')
 
     @property
     def activity(self) -> str:
@@ -260,6 +267,7 @@ class ExcitationPublisherNode(ArmidNode):
         elapsed = self.elapsed
         values = {
             'running': int(elapsed is not None),
+            'rejected_states': self._arm.monitor.rejected,
             'elapsed': elapsed or 0.0,
             'duration': self.duration,
             'runs': self._runs,
@@ -295,11 +303,11 @@ class ExcitationPublisherNode(ArmidNode):
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
-        """Stop the arm, and see to it that the message arrives."""
-        if self.elapsed is None or not self.context.ok():
-            return
-        self.stop()
-        self._controller.settle(_FAREWELL)
+        """Stop an arm that is not seen at rest, and see to it that the message arrives."""
+        sent = self._gate is not None or (self._ending is not None and self._ending.last)
+        if sent and self.context.ok():
+            self.stop()
+            self._controller.settle(_FAREWELL)
 
     def destroy_node(self) -> None:
         """Stop the arm before the node is gone, whoever destroys it."""
@@ -307,43 +315,52 @@ class ExcitationPublisherNode(ArmidNode):
         self._controller.close()
         super().destroy_node()
 
-    def _on_joint_states(self, data: bytes) -> None:
-        now = self._now()
-        message = self._measured.take(data, now)
-        if 0.0 <= now - self._looked_at < _POSE_PERIOD:
-            return
-        self._looked_at = now
-        stamp = message.sec * 10**9 + message.nanosec
-        self._speed = self._speed.looked(now, self._pose.q)
-        self._stamps.take(stamp)
-        elapsed = self.elapsed
-        stopping, patience = self.value('stopping'), self.value('state_timeout')
-        going_on = self._halting.look(now, self._pose, stopping, patience)
-        if going_on:
-            self._say_trouble(going_on)
-        if elapsed is None or self._run is None or now - self._tracked < _TRACKING_PERIOD:
+    def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
+        """Stop the arm where a callback fails: nobody knows what it leaves undone."""
+
+        @wraps(callback)
+        def stopping(*args: Any) -> Any:
+            try:
+                return callback(*args)
+            except ArmidError:
+                raise
+            except Exception as error:
+                if self.context.ok() and getattr(self, '_gate', None) is not None:
+                    self._give_up(f'{what}: {type(error).__name__}: {error}')
+                raise
+
+        return super()._surviving(stopping, what)
+
+    def _on_state(self) -> None:
+        """Compare the arm with its run."""
+        now = self._arm.now()
+        if 0.0 <= now - self._tracked < _TRACKING_PERIOD:
             return
         self._tracked = now
-        phase = (stamp - self._begun_ns) * 1e-9
+        if self._ending is not None:
+            self._watch_ending(self._ending)
+        elapsed = self.elapsed
+        if elapsed is None or self._gate is None:
+            return
+        monitor, robot = self._arm.monitor, self._planner.arm.robot
+        pose, effort = monitor.pose, self._arm.effort
+        phase = (min(pose.stamps) - self._begun_ns) * 1e-9
         strange = abs(phase - elapsed) > self.value('state_timeout')
-        if not stamp or (strange and not self._simulated):
+        if not min(pose.stamps) or (strange and not self._simulated):
             phase = elapsed  # the stamp is of another clock; a simulation may just be slow
         if self._rehearsal is not None:
-            self._rehearsal.add(phase, self._pose.q, efforts(message, self._pose.joints))
-        fault = tracking_fault(
-            self._pose.joints,
-            self._planner.arm.robot.position_units,
-            self._run.at([phase]).q[0],
-            self._pose.q,
-            self.value('tracking_tolerance'),
-        )
-        if fault:
-            self._give_up(fault, follows=False)
+            self._rehearsal.add(phase, pose.q, effort)
+        tolerance = self.value('tracking_tolerance')
+        wanted = self._gate.run.at([phase]).q[0]
+        fault = tracking_fault(pose.joints, robot.position_units, wanted, pose.q, tolerance)
+        contradiction = monitor.contradiction(now)
+        overload = self._gate.overload(effort, self.value('effort_factor'))
+        self._overloads = self._overloads + 1 if overload else 0
+        if contradiction or fault or self._overloads >= AGREEING:
+            self._give_up(contradiction or fault or overload, blocked=not contradiction)
 
     def _look_for_partners(self) -> None:
-        lost = self._staleness()
-        missing = self.missing_clock or (lost and f'{self._states.topic_name}: {lost}')
-        missing = missing or self._controller.missing
+        missing = self._fault_at_start() or self._controller.missing
         if not missing:
             try:
                 self.start()
@@ -353,46 +370,48 @@ class ExcitationPublisherNode(ArmidNode):
             self._waiting = False
             self.get_logger().warning(f'{missing}; call ~/start when that has changed')
 
-    def _give_up(self, reason: str, *, follows: bool = True) -> None:
-        """Stop the arm: on its path where it follows, else where it was measured."""
-        elapsed, stopping = self.elapsed, self.value('stopping')
-        if elapsed is None or self._run is None:
-            return
-        if follows or self._staleness():
-            motion = slowed(self._run, elapsed, stopping, self._rate)
-        else:
-            robot, wanted = self._planner.arm.robot, self._run.at([elapsed])
-            measured, velocity = self._pose.q, self._speed.velocity
-            motion = brought_to_rest(wanted, measured, velocity, robot, stopping, self._rate)
-        self._end_run(motion)
+    def _give_up(self, reason: str, *, blocked: bool = False) -> None:
+        """Stop the arm on its path; a blocked one is afterwards held where it stands."""
+        elapsed = self._arm.now() - self._begun
+        self._end_run(reason, blocked)
         self._say_trouble(f'stopped {elapsed:.2f} s after the start: {reason}')
 
-    def _end_run(self, motion: Motion) -> None:
-        self._run = self._rehearsal = None
+    def _end_run(self, reason: str, blocked: bool = False) -> None:
+        gate, now = self._gate, self._arm.now()
+        self._gate = self._rehearsal = None
         self._outcome = 'stopped'
-        self._controller.bring_to_rest(self._stamped(motion, float(motion.t[0])))
-        self._expect_rest(float(motion.t[-1]))
+        self._ending = Ending(gate, self._begun, None, now, reason, blocked)
+        motion = gate.stop(now - self._begun, self.value('stopping'))
+        self._ending = replace(self._ending, last=motion)
+        self._controller.bring_to_rest(write_trajectory(motion, float(motion.t[0])))
 
-    def _end_complete(self, planned: Run) -> None:
-        self._run = None
-        self._tell(f'run complete: {planned.duration:.1f} s, approach included')
+    def _watch_ending(self, ending: Ending) -> None:
+        """See to it that the arm comes to rest; hold it where it stands if it is blocked."""
+        names = ('state_timeout', 'tracking_tolerance', 'stopping')
+        limits = map(self.value, names)
+        self._ending, motion, report = ending.looked(self._arm.monitor, self._arm.now(), *limits)
+        if motion is not None:
+            self._controller.insist(write_trajectory(motion, float(motion.t[0])))
+        if report:
+            self._say_trouble(report)
+
+    def _end_complete(self, gate: MotionGate) -> None:
+        self._gate, end = None, gate.run.at([gate.run.duration])
+        self._ending = Ending(gate, self._begun, replace(end, t=np.zeros(1)), self._arm.now(), '')
+        self._tell(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
         """Take what a controller says of the run: that it is at its end, or why it is not."""
-        elapsed = self.elapsed
-        if self._run is None:
+        gate, now = self._gate, self._arm.now()
+        if gate is None:
             return  # it was stopped, and whether the arm is at rest is seen
         if not reason:
-            self._end_complete(self._run)
+            self._end_complete(gate)
             return
-        self._run = None
-        self._rehearsal, self._outcome = None, 'stopped'
-        self._expect_rest(HANDOVER)
-        self._say_trouble(f'stopped {elapsed or 0.0:.2f} s after the start: {reason}')
-
-    def _expect_rest(self, duration: float) -> None:
-        """Look from then on whether the arm is at rest that was told to stop."""
-        self._halting.expect(self._now() + duration + self.value('state_timeout'), self._pose)
+        self._gate = self._rehearsal = None
+        self._outcome = 'stopped'
+        self._ending = Ending(gate, self._begun, None, now, reason)
+        self._say_trouble(f'stopped {now - self._begun:.2f} s after the start: {reason}')
 
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
         """Say how the rehearsal went, and what to do next."""
@@ -416,25 +435,6 @@ class ExcitationPublisherNode(ArmidNode):
     def _say_trouble(self, text: str) -> None:
         self._trouble = text
         self.get_logger().error(text)
-
-    def _staleness(self) -> str:
-        return self._pose.staleness(self._now(), self.value('state_timeout'))
-
-    def _now(self) -> float:
-        """Return the time that ages are measured in: simulated, or steady [s]."""
-        clock = self.get_clock()
-        if not clock.ros_time_is_active:
-            clock = self._steady
-        return float(clock.now().nanoseconds * 1e-9)
-
-    def _stamped(self, motion: Motion, lead: float) -> JointTrajectory:
-        """Return the message of a motion that begins now."""
-        message = write_trajectory(motion, lead)
-        now = self.get_clock().now()
-        if not self.value('zero_stamp'):
-            message.header.stamp = now.to_msg()
-        self._begun_ns, self._sent_at = now.nanoseconds, self._now()
-        return message
 
     def _tell(self, text: str) -> str:
         self.get_logger().info(text)

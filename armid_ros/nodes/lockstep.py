@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+import math
 import os
 from pathlib import Path
 import time
@@ -22,6 +23,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
 from armid_ros.estimate import Estimate
 from armid_ros.excitation import Excitation, TransferPlanner
+from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
@@ -49,6 +51,8 @@ PATIENCE = 20.0
 _REST = 0.5
 #: Begin of time where nobody says otherwise: a stamp of zero would mean that there is none [ns].
 EPOCH_NS = 1_000 * 10**9
+#: How long the arm is at rest before it is started [s]: what the publisher has to see.
+_SEEN = 0.26
 #: What is recorded unless told otherwise.
 TOPICS = ('joint_states', 'robot_description', 'joint_trajectory', 'online_identifier/estimate')
 
@@ -145,8 +149,9 @@ def run_lockstep(
         learner = stage.add(OnlineIdentifierNode, identifier)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
         publisher = stage.add_publisher(arm, excitation, approach)
-        stage.start(plant, publisher, recorder, learner)
-        watch = _Watch(learner, publisher.duration + _REST, on_progress, period)
+        begun = stage.start(plant, publisher, recorder, learner)
+        duration = publisher.duration + (begun - start_ns) * 1e-9 + _REST
+        watch = _Watch(learner, duration, on_progress, period)
         while watch.t < watch.duration:
             watch.see(stage.step(plant, recorder, learner) - start_ns)
         return watch.progress()
@@ -185,8 +190,8 @@ def record_lockstep(
         plant = stage.add_plant(arm, EPOCH_NS, rate)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
         publisher = stage.add_publisher(arm, excitation, approach)
-        stage.start(plant, publisher, recorder)
-        duration, t = publisher.duration + _REST, 0.0
+        begun = stage.start(plant, publisher, recorder)
+        duration, t = publisher.duration + (begun - EPOCH_NS) * 1e-9 + _REST, 0.0
         while t < duration:
             t = (stage.step(plant, recorder) - EPOCH_NS) * 1e-9
             if on_progress is not None:
@@ -322,13 +327,15 @@ class Stage:
         publisher: ExcitationPublisherNode,
         recorder: RecorderNode,
         learner: OnlineIdentifierNode | None = None,
-    ) -> None:
-        """Start an excitation, and wait until the arm moves."""
+    ) -> int:
+        """Start an excitation, wait until the arm moves, and return when it began [ns]."""
         self.connect(plant, recorder, publisher, learner)
-        stamp = self.step(plant, recorder, learner)
-        self.spin_until(lambda: publisher.last_stamp_ns == stamp, 'joint_states')
+        for _ in range(max(math.ceil(_SEEN * plant.value('rate')), AGREEING) + 1):
+            stamp = self.step(plant, recorder, learner)
+            self.spin_until(lambda stamp=stamp: publisher.last_stamp_ns == stamp, 'joint_states')
         publisher.start()
         self.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
+        return stamp
 
     def connect(
         self,

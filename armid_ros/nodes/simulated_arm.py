@@ -132,7 +132,7 @@ class SimulatedArmNode(ArmidNode):
         self._keep_pace()
         description = self.create_publisher(String, 'robot_description', LATCHED)
         description.publish(String(data=self._arm.plant.robot.urdf))
-        self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, LATCHED)
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_trajectory, STREAM)
         self.create_subscription(String, 'model', self._on_model, LATCHED)
         self.offer('~/reset', self.reset)
 

@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import gc
 import sys
 
 from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
 from armid_ros.errors import TrajectoryError
 from armid_ros.nodes.trajectory.action import beside
-from armid_ros.nodes.trajectory.messages import read_trajectory
+from armid_ros.nodes.trajectory.messages import read_trajectory, write_trajectory
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
 import pytest
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 
 from tests.ros.controller import Controller, NAME
 from tests.ros.test_controller import begun, excitation, HOME, publisher, ROBOT, set_parameter
@@ -175,13 +177,27 @@ def test_a_controller_that_replaces_nothing_is_told_to_cancel(bench, excitation,
     assert node.elapsed is None
 
 
-def test_a_goal_that_somebody_else_cancels_is_said(bench, arm, excitation):
+@pytest.mark.parametrize('how', ['cancelled', 'replaced'])
+def test_a_controller_that_another_client_takes_over_is_let_go(bench, arm, excitation, how):
     node = begun(bench, arm, excitation)
     arm.run(101.0)
-    node._controller.action.cancel_all()
+    client = ActionClient(bench.probe, FollowJointTrajectory, NAME)
+    if how == 'cancelled':
+        canceller = bench.probe.create_client(CancelGoal, f'{NAME}/_action/cancel_goal')
+        bench.spin_until(canceller.service_is_ready, 'the service')
+        canceller.call_async(CancelGoal.Request())
+    else:
+        bench.spin_until(client.server_is_ready, 'the action')
+        away = node._gate.run.at([3.0])
+        goal = write_trajectory(replace(away, dq=0 * away.dq, ddq=0 * away.ddq), 2.0)
+        client.send_goal_async(FollowJointTrajectory.Goal(trajectory=goal))
     bench.spin_until(lambda: arm.ends, 'the end')
-    bench.spin_until(lambda: node.condition()[0], 'what is said')
-    assert 'was cancelled by somebody else' in node.condition()[0]
+    bench.spin_until(lambda: node.condition()[0], 'the reason')
+    sent = len(arm.goals)
+    arm.run(104.0)
+    assert len(arm.goals) == sent == (1 if how == 'cancelled' else 2)
+    assert 'was cancelled or replaced by /probe' in node.condition()[0]
+    client.destroy()
 
 
 def test_a_controller_that_is_gone_is_said(bench, arm, excitation):
@@ -209,7 +225,7 @@ def test_a_controller_that_goes_on_is_told_again(bench, arm, excitation):
     arm.run(102.4)
     arm.faults.deaf = False
     arm.run(103.4)
-    assert 'goes on moving though it was stopped once' in node.condition()[0]
+    assert 'goes on moving though it was stopped' in node.condition()[0]
     np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
 
 

@@ -4,12 +4,16 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 from rclpy.clock import ROSClock
 
 #: How old results may be when they are published [s]: tf2, and so RViz, keeps ten seconds, and
 #: nothing that was measured is drawn of what is older. What waits while a node is busy, 1000
 #: messages at most, is younger.
 SHOWN = 10.0
+#: Messages of which the one that waited least shows the difference of the clocks.
+_RECENT = 20
 
 
 class StampDifference:
@@ -26,11 +30,18 @@ class StampDifference:
     def __init__(self, clock: ROSClock) -> None:
         self._clock = clock
         self._late = 0.0
+        self._recent: deque[float] = deque(maxlen=_RECENT)
+
+    @property
+    def late(self) -> float:
+        """Smallest difference of the last stamps from the clock [s]: a message may wait."""
+        return min(self._recent, key=abs, default=0.0)
 
     def take(self, stamp_ns: int) -> None:
         """Take note of the stamp of a message that came now [ns]; 0: it has none."""
         now = self._clock.now().nanoseconds
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
+        self._recent.append(self._late)
 
     def fault(self, topic: str, allowed: float) -> str:
         """Say that the last stamp is further from the clock than is allowed [s]; empty: not."""
@@ -43,11 +54,10 @@ class StampDifference:
 
     def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
         """
-        Say why a trajectory that is stamped with the time of the node must not be sent.
+        Return why a trajectory that is stamped with the time of the node must not be sent.
 
-        Its sender and its controller are in different times: it would begin later or further on
-        by the difference, where the controller takes it at all. Up to what is allowed the stamps
-        are taken for where on the path the arm should be, so that the difference does no harm.
+        A controller with another clock begins it later or further on by the difference. A small
+        difference is compensated.
 
         Parameters
         ----------
@@ -59,11 +69,18 @@ class StampDifference:
             Whether the arm is.
 
         """
-        fault = self.fault(topic, allowed)
+        late, now = self.late, self._clock.now().nanoseconds * 1e-9
+        if not abs(late) > allowed:
+            return ''
         advice = 'set the clocks, or zero_stamp:=true'
         if simulated:
             advice = 'use_sim_time on both nodes or on neither'
-        return f'{fault}: {advice}' if fault else ''
+        clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
+        side = 'behind' if late > 0.0 else 'ahead of'
+        return (
+            f'stamps of {topic} are {abs(late):.3g} s {side} {clock} ({now - late:.3f} s and '
+            f'{now:.3f} s), more than {allowed:.3g} s: {advice}'
+        )
 
     def of_results(self, topic: str) -> str:
         """Say what follows for results, which carry the stamps of what they were made of."""

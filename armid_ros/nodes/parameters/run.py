@@ -85,14 +85,14 @@ RUN_PARAMETERS = (
     NodeParameter(
         'zero_stamp',
         False,
-        'Stamp trajectories with zero, which a controller takes for now: where the clocks of '
-        'this computer and of the robot differ. They are not latched then, so that a controller '
-        'that comes up later does not begin; simulated_arm does not hear them.',
+        'Stamp the run with zero, which a controller takes for now: where the clocks of this '
+        'computer and of the robot differ. Stops are always stamped with zero.',
     ),
     NodeParameter(
         'stopping',
         0.5,
-        'Time in which the arm is brought to rest.',
+        'Time in which the arm is brought to rest; longer where its limits require it. Without '
+        'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
         's',
         lower=0.1,
         upper=10.0,
@@ -110,11 +110,20 @@ RUN_PARAMETERS = (
         read_only=False,
     ),
     NodeParameter(
+        'effort_factor',
+        3.0,
+        'The arm is stopped when the effort of a joint is, in 5 messages in a row, larger by this '
+        'factor than what is foreseen for the run and than 10 % of its limit; 0: never, the '
+        'default in a simulation.',
+        lower=0.0,
+        upper=1000.0,
+        read_only=False,
+    ),
+    NodeParameter(
         'state_timeout',
         0.5,
-        'The arm is stopped, and not started, without a joint state for so long, and not started '
-        'where stamps differ from the clock by more, without zero_stamp; 5 s by default in a '
-        'simulation.',
+        'The arm is stopped, and not started, without a joint state for so long; 5 s by default '
+        'in a simulation.',
         's',
         lower=0.01,
         upper=10.0,

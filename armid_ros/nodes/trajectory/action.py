@@ -11,7 +11,6 @@ import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
-from action_msgs.srv import CancelGoal
 from armid_ros.nodes.running.surviving import surviving
 from builtin_interfaces.msg import Duration
 from rclpy.action import ActionClient
@@ -102,7 +101,6 @@ class TrajectoryAction:
         self._node, self._action, self._tolerance = node, action, tolerance
         self._on_end = on_end
         self._client = ActionClient(node, action, self.name)
-        self._canceller = node.create_client(CancelGoal, f'{self.name}/_action/cancel_goal')
         self._goal: _Goal | None = None
         self._requests: list[Future] = []
         self._seen = -math.inf
@@ -144,11 +142,6 @@ class TrajectoryAction:
         self._ask(future, lambda handle: self._on_answer(goal, handle))
         if before is not None:
             self._cancel(before)
-
-    def cancel_all(self) -> None:
-        """Cancel every goal that the controller has, whoever sent it."""
-        if self._canceller.service_is_ready():
-            self._ask(self._canceller.call_async(CancelGoal.Request()), lambda _: None)
 
     def trouble(self, patience: float) -> str:
         """Say that the controller has been gone for a time [s], or is silent; empty: neither."""
@@ -213,11 +206,25 @@ class TrajectoryAction:
         if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
             self._end(goal, '')
         elif status == GoalStatus.STATUS_CANCELED:
-            self._end(goal, f'the goal of {self.name} was cancelled by somebody else')
+            self._end(
+                goal, f'the goal of {self.name} was cancelled or replaced by {self._others()}'
+            )
         else:
             why = _ERRORS.get(result.error_code, 'it says no reason')
             detail = f' ({result.error_string})' if result.error_string else ''
             self._end(goal, f'{self.name} gave up the trajectory: {why}{detail}')
+
+    def _others(self) -> str:
+        """Return the names of the other nodes that have a client of the action."""
+        node, service = self._node, f'{self.name}/_action/send_goal'
+        found = []
+        for name, space in node.get_node_names_and_namespaces():
+            if (name, space) == (node.get_name(), node.get_namespace()):
+                continue
+            clients = node.get_client_names_and_types_by_node(name, space)
+            if any(client == service for client, _ in clients):
+                found.append(f'{space.rstrip("/")}/{name}')
+        return ', '.join(sorted(found)) or 'another client'
 
     def _end(self, goal: _Goal, reason: str) -> None:
         if goal is self._goal:

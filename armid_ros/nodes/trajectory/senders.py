@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.nodes.qos import LATCHED, STREAM
+from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.trajectory.action import (
     ANYWHERE,
     beside,
@@ -54,8 +54,7 @@ class TrajectorySenders:
             If the action is asked for and control_msgs is not installed.
 
         """
-        quality = STREAM if node.value('zero_stamp') else LATCHED  # a late one must not begin then
-        self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', quality)
+        self._publisher = node.create_publisher(JointTrajectory, 'joint_trajectory', STREAM)
         self.topic = str(self._publisher.topic_name)
         self._node, self._on_end = node, on_end
         self._kind = node.value('interface')
@@ -130,10 +129,10 @@ class TrajectorySenders:
             self._publisher.publish(trajectory)
 
     def insist(self, trajectory: JointTrajectory) -> None:
-        """Send it to a controller that goes on, on all ways that there are."""
-        if self._has_action:
-            self.action.cancel_all()
+        """Send it to a controller that goes on with the own run, and publish it as well."""
         self.bring_to_rest(trajectory)
+        if self._by_action:
+            self._publisher.publish(trajectory)
 
     def trouble(self, patience: float) -> str:
         """Say what is wrong with the controller for longer than a time [s]; empty: nothing."""

@@ -1,0 +1,191 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The one check that every motion passes before it is sent to an arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation.geometry.clearance import ClearanceModel
+from armid_ros.excitation.geometry.paths import clear_line
+from armid_ros.excitation.limits import check_limits, Limits
+from armid_ros.excitation.run import Run
+from armid_ros.excitation.supervision import HANDOVER, held, slowed
+from armid_ros.excitation.transfer import TransferPlanner
+from armid_ros.motion import FloatArray, Motion
+import numpy as np
+
+#: A stop that exceeds an acceleration limit is planned again in this many times its duration, so
+#: often at most: the last one takes 4.8 times the duration.
+_LONGER, _TRIES = 1.25, 8
+#: Largest velocity of a quintic from rest to rest, in units of its mean velocity.
+_TOP_VELOCITY = 1.875
+#: Interval with which the proof of clearance begins [s].
+_INTERVAL = 0.1
+#: Effort of a joint that is expected at least, as a share of its limit: dry friction of a wrist.
+_LEAST_EFFORT = 0.1
+
+
+@dataclass(frozen=True)
+class MotionGate:
+    """
+    What every motion that is sent during a run has to keep.
+
+    Attributes
+    ----------
+    run : Run
+        Run that was planned.
+    rate : float
+        Samples per second [Hz].
+    limits : Limits
+        Limits of the robot; the acceleration is that of the run where the run has more than a
+        description without acceleration limits would allow.
+    clearance : ClearanceModel or None
+        Bodies to keep apart, the floor among them.
+    margin : float
+        Clearance to keep [m].
+    effort : ndarray, shape (n,)
+        Largest foreseen effort of each joint, and at least 10 % of its limit [N m or N].
+
+    """
+
+    run: Run
+    rate: float
+    limits: Limits
+    clearance: ClearanceModel | None
+    margin: float
+    effort: FloatArray
+
+    @classmethod
+    def of(cls, run: Run, planner: TransferPlanner, rate: float) -> MotionGate:
+        """
+        Check a run at all its samples, and return the gate for what follows it.
+
+        Parameters
+        ----------
+        run : Run
+            What is to be sent.
+        planner : TransferPlanner
+            Arm, limits and bodies. Without limits none are checked.
+        rate : float
+            Samples per second [Hz].
+
+        Raises
+        ------
+        TrajectoryError
+            If the run exceeds a limit or comes too near to something; names the joint or the
+            bodies.
+
+        """
+        motion, arm = run.motion(), planner.arm
+        torque = arm.joint_torque(motion)
+        peak = np.abs(motion.ddq).max(axis=0)
+        robot = arm.robot
+        none = np.full(robot.n_joints, np.inf)
+        limits = Limits(robot.joints, robot.lower, robot.upper, none, none, none, robot.prismatic)
+        if planner.limits is not None:
+            limits = Limits.of(robot, speed=1.0, torque_fraction=1.0, position_margin=0.0)
+        limits = replace(limits, acceleration=np.maximum(limits.acceleration, 1.001 * peak))
+        room = np.where(np.isfinite(robot.torque_limit), _LEAST_EFFORT * robot.torque_limit, 0.0)
+        effort = np.maximum(np.abs(torque).max(axis=0), room)
+        gate = cls(run, rate, limits, planner.clearance, planner.margin, effort)
+        if planner.limits is not None:
+            gate._require(motion, torque, 'the run')
+        times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / _INTERVAL)) + 1)
+        if planner.clearance is not None:
+            near = planner.clearance.first_fault(run.at, 1.5 * peak, times, planner.margin)
+            if near is not None:
+                raise TrajectoryError(f'the run is not sent: {near}')
+        return gate
+
+    def stop(self, phase: float, duration: float) -> Motion:
+        """
+        Return the way to rest along the run, which was checked as a whole.
+
+        Parameters
+        ----------
+        phase : float
+            Where on the run the arm is [s].
+        duration : float
+            Time to come to rest [s]; longer where the acceleration limits require it.
+
+        Raises
+        ------
+        TrajectoryError
+            If no stop keeps the limits; the run has to exceed them itself for that.
+
+        """
+        phase = float(np.clip(phase, 0.0, self.run.duration))
+        for _ in range(_TRIES):
+            motion = slowed(self.run, phase, duration, self.rate)
+            if not check_limits(self.limits, motion):
+                return motion
+            duration *= _LONGER
+        self._require(motion, None, 'the stop')
+        return motion
+
+    def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
+        """
+        Return the small straight step from the set point to where the arm stands.
+
+        Parameters
+        ----------
+        set_point, measured : ndarray, shape (n,)
+            Where the controller holds the arm, and where the arm is [rad or m].
+        largest : float
+            Largest step of a joint [rad or m].
+
+        Raises
+        ------
+        TrajectoryError
+            If the step is larger, leaves the limits or comes too near to something.
+
+        """
+        step = np.abs(measured - set_point)
+        if not step.max() <= largest:
+            joint = self.limits.joints[int(np.argmax(step))]
+            raise TrajectoryError(
+                f"joint '{joint}' stands {step.max():.3g} from its set point, over {largest:g}"
+            )
+        inside = np.clip(measured, self.limits.lower, self.limits.upper)
+        near = clear_line(self.clearance, self.margin, set_point, inside)
+        if near is not None:
+            raise TrajectoryError(
+                f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
+            )
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0)
+        needed = max(
+            float((_TOP_VELOCITY * step / velocity).max()),
+            float(np.sqrt(6.0 * step / np.minimum(self.limits.acceleration, 1e3)).max()),
+            HANDOVER,
+        )
+        motion = held(self.limits.joints, inside, HANDOVER)
+        return replace(motion, t=motion.t - motion.t[0] + needed)
+
+    def overload(self, effort: FloatArray, factor: float) -> str:
+        """
+        Return which joint takes more effort than is foreseen.
+
+        Parameters
+        ----------
+        effort : ndarray, shape (n,)
+            Measured effort [N m or N]; NaN: none.
+        factor : float
+            Multiple of the foreseen effort that is allowed; 0: any.
+
+        """
+        beyond = np.nan_to_num(np.abs(effort)) - factor * self.effort
+        j = int(np.argmax(beyond))
+        if factor == 0.0 or self.effort[j] == 0.0 or beyond[j] <= 0.0:
+            return ''
+        return (
+            f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "
+            f'{self.limits.unit("torque", j)}, and at most {self.effort[j]:.3g} were foreseen: '
+            f'more than effort_factor {factor:g} allows'
+        )
+
+    def _require(self, motion: Motion, torque: FloatArray | None, what: str) -> None:
+        violations = check_limits(self.limits, motion, torque)
+        if violations:
+            raise TrajectoryError(f'{what} is not sent: {violations[0]}')

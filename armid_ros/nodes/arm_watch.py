@@ -1,0 +1,146 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the joint states of an arm say of it: where it is, since when, and by which clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Any
+
+from armid_ros.excitation import JointState as State
+from armid_ros.excitation import PoseMonitor
+from armid_ros.excitation.pose_monitor import AGREEING
+from armid_ros.motion import FloatArray
+from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.messages.stamp_difference import StampDifference
+from armid_ros.recording.joint_state.message import JointStateMessages
+from armid_ros.robots import Robot
+import numpy as np
+from rclpy.clock import Clock, ClockType, JumpThreshold
+from rclpy.duration import Duration
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+#: Time that an arm has to be seen at rest before it is started [s].
+_REST = 0.25
+#: A simulated clock that advances by more at once was set; as for simulated_arm [s].
+_CLOCK_STEP = 60.0
+
+
+class ArmWatch:
+    """
+    Subscription to joint_states, and the time that their ages are measured in.
+
+    Attributes
+    ----------
+    monitor : PoseMonitor
+        Decides which positions are believed.
+    stamps : StampDifference
+        Between stamps and the node's clock.
+    effort : ndarray, shape (n,)
+        Efforts of the last message, in the order of the joints; NaN: none.
+
+    """
+
+    def __init__(
+        self, node: ArmidNode, robot: Robot, tolerance: float, on_state: Callable[[], None]
+    ) -> None:
+        """
+        Subscribe.
+
+        Parameters
+        ----------
+        node : ArmidNode
+            Gets the subscription.
+        robot : Robot
+            States the limits.
+        tolerance : float
+            Distance beyond a position limit at which a position is believed [rad or m].
+        on_state : callable
+            Called after every message.
+
+        """
+        self.monitor = PoseMonitor(robot, tolerance)
+        self.stamps = StampDifference(node.get_clock())
+        self.effort: FloatArray = np.full(robot.n_joints, np.nan)
+        self._node, self._joints, self._on_state = node, robot.joints, on_state
+        self._messages = JointStateMessages()
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._stepped_ns = 0
+        self._jumps = node.get_clock().create_jump_callback(
+            JumpThreshold(
+                min_forward=Duration(seconds=_CLOCK_STEP),
+                min_backward=Duration(nanoseconds=-1),
+                on_clock_change=False,
+            ),
+            post_callback=self._on_clock_step,
+        )
+        self._states = node.create_subscription(
+            JointState, 'joint_states', self._on_joint_states, qos_profile_sensor_data, raw=True
+        )
+
+    def now(self) -> float:
+        """Return the time of ages [s]: simulated without the steps of its clock, or steady."""
+        clock = self._node.get_clock()
+        if not clock.ros_time_is_active:
+            return float(self._steady.now().nanoseconds * 1e-9)
+        return float((clock.now().nanoseconds - self._stepped_ns) * 1e-9)
+
+    def staleness(self, timeout: float) -> str:
+        """Return which joint had no new position for longer than a time [s]; empty: none."""
+        fault = self.monitor.pose.staleness(self.now(), timeout)
+        topic = self._states.topic_name
+        if (
+            not fault
+            or self._states.get_publisher_count()
+            or not self._node.count_publishers(topic)
+        ):
+            return fault
+        return f'{fault}; {topic} has a publisher of an incompatible quality of service'
+
+    def fault_at_start(self, timeout: float, difference: float, simulated: bool) -> str:
+        """
+        Return why an arm must not be started; empty when it may.
+
+        Parameters
+        ----------
+        timeout : float
+            Age of a position that is too old [s].
+        difference : float
+            Largest difference between the stamps and the node's clock [s]; infinite: any.
+        simulated : bool
+            Whether the arm is simulated, for the advice.
+
+        """
+        topic = self._states.topic_name
+        fault = self._node.missing_clock
+        if fault:
+            return fault
+        now, monitor = self.now(), self.monitor
+        fault = monitor.contradiction(now, 1) or self.staleness(timeout) or monitor.unsteady(_REST)
+        if fault is None:
+            fault = (
+                f'fewer than {AGREEING} new joint states, or less than {_REST:g} s of them, were '
+                'received: it is not known whether the arm is at rest'
+            )
+        if fault:
+            return f'{topic}: {fault}'
+        senders = self._node.get_publishers_info_by_topic(topic)
+        if len(senders) > self.monitor.sources:
+            names = ', '.join(sorted(s.node_name for s in senders))
+            return f'{topic}: {len(senders)} publishers for the same joints ({names}): stop one'
+        return self.stamps.of_start(topic, difference, simulated)
+
+    def _on_clock_step(self, jump: Any) -> None:
+        self._stepped_ns += jump.delta.nanoseconds
+
+    def _on_joint_states(self, data: bytes) -> None:
+        message = self._messages.read(data)
+        stamp = message.sec * 10**9 + message.nanosec
+        state = State(message.names, message.position, message.velocity, stamp)
+        self.monitor.update(state, self.now())
+        self.stamps.take(stamp)
+        known = dict(zip(message.names, message.effort, strict=False))
+        self.effort = np.array([known.get(joint, math.nan) for joint in self._joints])
+        self._on_state()
