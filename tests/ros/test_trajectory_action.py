@@ -177,9 +177,10 @@ def test_a_controller_that_replaces_nothing_is_told_to_cancel(bench, excitation,
     assert node.elapsed is None
 
 
-@pytest.mark.parametrize('how', ['cancelled', 'replaced'])
+@pytest.mark.parametrize('how', ['cancelled', 'replaced', 'replaced, with an overdue result'])
 def test_a_controller_that_another_client_takes_over_is_let_go(bench, arm, excitation, how):
     node = begun(bench, arm, excitation)
+    arm.faults.overdue = 'overdue' in how
     arm.run(101.0)
     client = ActionClient(bench.probe, FollowJointTrajectory, NAME)
     if how == 'cancelled':
@@ -191,7 +192,6 @@ def test_a_controller_that_another_client_takes_over_is_let_go(bench, arm, excit
         away = node._gate.run.at([3.0])
         goal = write_trajectory(replace(away, dq=0 * away.dq, ddq=0 * away.ddq), 2.0)
         client.send_goal_async(FollowJointTrajectory.Goal(trajectory=goal))
-    bench.spin_until(lambda: arm.ends, 'the end')
     bench.spin_until(lambda: node.condition()[0], 'the reason')
     sent = len(arm.goals)
     arm.run(104.0)

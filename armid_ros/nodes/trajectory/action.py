@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import math
 import time
 from typing import Any
+from uuid import uuid4
 
-from action_msgs.msg import GoalStatus
+from action_msgs.msg import GoalStatus, GoalStatusArray
+from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.surviving import surviving
 from builtin_interfaces.msg import Duration
 from rclpy.action import ActionClient
@@ -19,6 +21,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory
+from unique_identifier_msgs.msg import UUID
 
 #: What a tolerance is that lets a joint be wherever it is; zero leaves it to the controller.
 ANYWHERE = -1.0
@@ -26,9 +29,11 @@ ANYWHERE = -1.0
 _GLANCE = 0.005
 #: How long an answer to a goal may take [s]: a controller checks every waypoint before.
 _ANSWER = 5.0
+#: Error code of a goal that another one replaced, once it was accepted.
+_REPLACED = -1
 #: What control_msgs/action/FollowJointTrajectory calls its error codes.
 _ERRORS = {
-    -1: 'the goal is not valid',
+    _REPLACED: 'the goal is not valid',
     -2: 'the joints are not those of the controller',
     -3: 'the stamp is in the past: where clocks differ, use zero_stamp',
     -4: 'a joint was outside its path tolerance',
@@ -101,7 +106,11 @@ class TrajectoryAction:
         self._node, self._action, self._tolerance = node, action, tolerance
         self._on_end = on_end
         self._client = ActionClient(node, action, self.name)
+        node.create_subscription(
+            GoalStatusArray, f'{self.name}/_action/status', self._on_status, LATCHED
+        )
         self._goal: _Goal | None = None
+        self._known: set[bytes] = set()
         self._requests: list[Future] = []
         self._seen = -math.inf
 
@@ -135,8 +144,11 @@ class TrajectoryAction:
         """
         before, self._goal = self._goal, _Goal(time.monotonic())
         goal, self.error, self._seen = self._goal, math.nan, time.monotonic()
+        identifier = uuid4().bytes
+        self._known.add(identifier)
         future = self._client.send_goal_async(
             self._message(trajectory, tolerances),
+            goal_uuid=UUID(uuid=list(identifier)),
             feedback_callback=self._guarded(lambda message: self._on_feedback(goal, message)),
         )
         self._ask(future, lambda handle: self._on_answer(goal, handle))
@@ -205,17 +217,27 @@ class TrajectoryAction:
         status, result = response.status, response.result
         if status == GoalStatus.STATUS_SUCCEEDED and not result.error_code:
             self._end(goal, '')
-        elif status == GoalStatus.STATUS_CANCELED:
-            self._end(
-                goal, f'the goal of {self.name} was cancelled or replaced by {self._others()}'
-            )
+        elif status == GoalStatus.STATUS_CANCELED or result.error_code == _REPLACED:
+            self._end(goal, self._taken_over())
         else:
             why = _ERRORS.get(result.error_code, 'it says no reason')
             detail = f' ({result.error_string})' if result.error_string else ''
             self._end(goal, f'{self.name} gave up the trajectory: {why}{detail}')
 
-    def _others(self) -> str:
-        """Return the names of the other nodes that have a client of the action."""
+    def _on_status(self, message: GoalStatusArray) -> None:
+        """End the goal under way where the controller has accepted another one since."""
+        active = (GoalStatus.STATUS_ACCEPTED, GoalStatus.STATUS_EXECUTING)
+        goals = {
+            bytes(s.goal_info.goal_id.uuid) for s in message.status_list if s.status in active
+        }
+        goal = self._goal
+        if goal is None or goal.handle is None:
+            self._known |= goals
+        elif goals - self._known:
+            self._end(goal, self._taken_over())
+
+    def _taken_over(self) -> str:
+        """Return that the controller is another client's, and whose."""
         node, service = self._node, f'{self.name}/_action/send_goal'
         found = []
         for name, space in node.get_node_names_and_namespaces():
@@ -224,7 +246,8 @@ class TrajectoryAction:
             clients = node.get_client_names_and_types_by_node(name, space)
             if any(client == service for client, _ in clients):
                 found.append(f'{space.rstrip("/")}/{name}')
-        return ', '.join(sorted(found)) or 'another client'
+        who = ', '.join(sorted(found)) or 'another client'
+        return f'the goal of {self.name} was cancelled or replaced by {who}'
 
     def _end(self, goal: _Goal, reason: str) -> None:
         if goal is self._goal:
