@@ -19,6 +19,9 @@ import numpy as np
 #: A stop that exceeds an acceleration limit is planned again in this many times its duration, so
 #: often at most: the last one takes 4.8 times the duration.
 _LONGER, _TRIES = 1.25, 8
+#: Time to get back to the path, in units of what it takes at the velocity limit: a quintic is
+#: 1.875 times as fast as its mean, and the rest is for the speed of the path itself.
+_CATCHING = 3.0
 #: Largest velocity of a quintic from rest to rest, in units of its mean velocity.
 _TOP_VELOCITY = 1.875
 #: Interval with which the proof of clearance begins [s].
@@ -99,7 +102,7 @@ class MotionGate:
                 raise TrajectoryError(f'the run is not sent: {near}')
         return gate
 
-    def stop(self, phase: float, duration: float) -> Motion:
+    def stop(self, phase: float, duration: float, measured: FloatArray) -> Motion:
         """
         Return the way to rest along the run, which was checked as a whole.
 
@@ -109,6 +112,9 @@ class MotionGate:
             Where on the run the arm is [s].
         duration : float
             Time to come to rest [s]; longer where the acceleration limits require it.
+        measured : ndarray, shape (n,)
+            Where the arm is [rad or m]; NaN: unknown. A controller that begins there needs time
+            to get to the path.
 
         Raises
         ------
@@ -120,10 +126,18 @@ class MotionGate:
         for _ in range(_TRIES):
             motion = slowed(self.run, phase, duration, self.rate)
             if not check_limits(self.limits, motion):
-                return motion
+                break
             duration *= _LONGER
         self._require(motion, None, 'the stop')
-        return motion
+        away = np.nan_to_num(np.abs(measured - self.run.at([phase]).q[0]) / self._velocity)
+        lead = min(_CATCHING * float(away.max()), float(motion.t[-2]))
+        return motion.select(slice(int(np.searchsorted(motion.t, lead)), None))
+
+    @property
+    def _velocity(self) -> FloatArray:
+        """Velocity limits, shape (n,), a turn a second where there is none."""
+        limit = self.limits.velocity
+        return np.where(np.isfinite(limit), limit, 2.0 * np.pi)
 
     def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
         """
@@ -154,9 +168,8 @@ class MotionGate:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
             )
-        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, 1.0)
         needed = max(
-            float((_TOP_VELOCITY * step / velocity).max()),
+            float((_TOP_VELOCITY * step / self._velocity).max()),
             float(np.sqrt(6.0 * step / np.minimum(self.limits.acceleration, 1e3)).max()),
             HANDOVER,
         )

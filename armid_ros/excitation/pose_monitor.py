@@ -130,8 +130,9 @@ class PoseMonitor:
             self._reject(fault, now)
             return
         last = source.states[-1] if source.states else None
-        if last is not None and last.stamp_ns and last.stamp_ns == state.stamp_ns:
-            return  # the same message once more
+        if last is not None and last.stamp_ns == state.stamp_ns and np.array_equal(last.q, q):
+            if state.stamp_ns:
+                return  # the same message once more
         seen = self.pose.seen[source.joints].max()
         before = self.pose.q[source.joints]
         fault = self._unreachable(source.joints, state, last or _State(seen, 0, before, dq))
@@ -212,9 +213,12 @@ class PoseMonitor:
 
     def _unreachable(self, joints: npt.NDArray[np.int_], state: _State, last: _State) -> str:
         """Return which position cannot be reached from the last one, or that a stamp is older."""
-        if state.stamp_ns and state.stamp_ns < last.stamp_ns:
+        if state.stamp_ns and state.stamp_ns <= last.stamp_ns:
             back = (last.stamp_ns - state.stamp_ns) * 1e-9
-            return f'a joint state is stamped {back:.3g} s before the one that came before it'
+            return (
+                f'different joint states are stamped alike, or {back:.3g} s back in time: is '
+                'there another publisher?'
+            )
         passed = state.arrived - last.arrived
         if state.stamp_ns and last.stamp_ns:
             between = (state.stamp_ns - last.stamp_ns) * 1e-9

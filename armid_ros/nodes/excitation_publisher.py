@@ -381,14 +381,14 @@ class ExcitationPublisherNode(ArmidNode):
         self._gate = self._rehearsal = None
         self._outcome = 'stopped'
         self._ending = Ending(gate, self._begun, None, now, reason, blocked)
-        motion = gate.stop(now - self._begun, self.value('stopping'))
+        measured = self._arm.monitor.pose.q
+        motion = gate.stop(now - self._begun, self.value('stopping'), measured)
         self._ending = replace(self._ending, last=motion)
         self._controller.bring_to_rest(write_trajectory(motion, float(motion.t[0])))
 
     def _watch_ending(self, ending: Ending) -> None:
         """See to it that the arm comes to rest; hold it where it stands if it is blocked."""
-        names = ('state_timeout', 'tracking_tolerance', 'stopping')
-        limits = map(self.value, names)
+        limits = map(self.value, ('state_timeout', 'tracking_tolerance', 'stopping'))
         self._ending, motion, report = ending.looked(self._arm.monitor, self._arm.now(), *limits)
         if motion is not None:
             self._controller.insist(write_trajectory(motion, float(motion.t[0])))

@@ -1,0 +1,355 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever comes on joint_states, clocks and services, the commanded set point is safe."""
+
+from __future__ import annotations
+
+import os
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    Excitation,
+    Limits,
+    random_feasible,
+    transfer_limits,
+    TransferPlanner,
+)
+from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
+from armid_ros.robots import load_robot
+import numpy as np
+import pytest
+from rclpy.clock import ClockType
+from rclpy.serialization import serialize_message
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+
+from tests.ros.controller import Controller, SECOND
+
+ROBOT = load_robot('humanoid_arm')
+HOME = (ROBOT.lower + ROBOT.upper) / 2.0
+STEP = 0.01
+EPOCH = 10_000
+TOLERANCE = 0.1
+HISTORIES = int(os.environ.get('ARMID_HISTORIES', '60'))
+
+
+class FakeClock:
+    """A clock that a test sets."""
+
+    def __init__(self, seconds, kind):
+        self.seconds, self.kind = seconds, kind
+        self.ros_time_is_active = False
+
+    def now(self):
+        return Time(nanoseconds=round(self.seconds() * SECOND), clock_type=self.kind)
+
+
+class Bed:
+    """The real node in front of a controller, message by message, on clocks that a test sets."""
+
+    def __init__(self, bench, excitation, **parameters):
+        self.displaced = False  # whether the arm seems to stand a little off its path
+        self.offset, self.changes, self.paths, self.violations = 0.0, [], [], []
+        self.arm = Controller(bench, ROBOT, HOME)
+        planner = TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+        options = {'start': False, 'approach': 1.0, 'tracking_tolerance': TOLERANCE}
+        self.node = node = bench.add(
+            ExcitationPublisherNode, excitation, planner, **(options | parameters)
+        )
+        bench.spin_until(lambda: node.readers, 'a subscriber')
+        bench.executor.remove_node(node)  # nothing is delivered but by the test
+        steady = FakeClock(lambda: self.arm.now + 5.0, ClockType.STEADY_TIME)
+        wall = FakeClock(lambda: self.arm.now + self.offset + EPOCH, ClockType.ROS_TIME)
+        node._arm._steady, node._arm.stamps._clock, node._executor_of = steady, wall, None
+        node.get_clock = lambda: wall
+        node._controller._publisher.publish = self._command
+        self.arm._publisher = self
+        self.limit = 1.01 * ROBOT.velocity_limit
+        self._before = self.arm.state(self.arm.now).q[0]
+
+    def _command(self, message):
+        if message.header.stamp.sec:
+            message.header.stamp.sec -= EPOCH
+        self.arm._on_trajectory(message)
+
+    def get_subscription_count(self):
+        return 1
+
+    def publish(self, message):
+        """Deliver what the arm publishes, changed as the history has it."""
+        message.header.stamp.sec += EPOCH
+        messages = [message]
+        for change in list(self.changes):
+            messages = change(messages)
+        for one in messages:
+            self.node._arm._states.callback(serialize_message(one))
+
+    def step(self):
+        """Let a hundredth of a second go by, and check the set point."""
+        arm = self.arm
+        arm.now = round(arm.now + STEP, 6)
+        arm._publish()
+        if round(arm.now / STEP) % 5 == 0:
+            self.node._timer.callback()
+        state = arm.state(arm.now)
+        q, dq = state.q[0], state.dq[0]
+        if np.any(q < ROBOT.lower - 1e-6) or np.any(q > ROBOT.upper + 1e-6):
+            self.violations.append(f'{arm.now:.2f} s: outside the limits: {q}')
+        moved = np.abs(q - self._before)
+        if arm.faults.stuck is not None:
+            moved[arm.faults.stuck] = (
+                0.0  # a controller begins where the arm is, not its set point
+            )
+        if np.any(np.abs(dq) > self.limit) or np.any(moved > self.limit * STEP + 1e-4):
+            self.violations.append(f'{arm.now:.2f} s: too fast: {dq}, {moved / STEP}')
+        if self.paths:
+            away = min(np.abs(path - q).max(axis=1).min() for path in self.paths)
+            allowed = 3.0 * TOLERANCE if self.displaced or arm.faults.stuck is not None else 0.02
+            if away > allowed:
+                self.violations.append(f'{arm.now:.2f} s: {away:.3f} from every planned path')
+        self._before = q
+
+    def run(self, seconds):
+        for _ in range(round(seconds / STEP)):
+            self.step()
+
+    def call(self, name):
+        """Call a service; what it refuses is no violation."""
+        try:
+            getattr(self.node, name)()
+        except TrajectoryError as error:
+            return str(error)
+        if self.node._gate is not None and name != 'stop':
+            self.paths.append(self.node._gate.run.motion().q)
+        return ''
+
+    def close(self):
+        """End the node as a signal does; the arm has to come to rest."""
+        self.node._controller.settle = lambda patience: None
+        self.node.close()
+        self.run(2.0)
+        if self.arm.faults.stuck is None:
+            speed = np.abs(self.arm.state(self.arm.now).dq).max()
+            if speed > 1e-3:
+                self.violations.append(f'not at rest after the end: {speed}')
+
+
+@pytest.fixture(scope='module')
+def excitation():
+    rng = np.random.default_rng(3)
+    limits = Limits.of(ROBOT, speed='fast')
+    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
+
+
+def other(message, joint, value, *, add=False):
+    """Return a copy of a message with another position of a joint."""
+    copy = JointState(header=message.header, name=message.name, velocity=message.velocity)
+    position = list(message.position)
+    j = message.name.index(ROBOT.joints[joint])
+    position[j] = position[j] + value if add else value
+    copy.position = position
+    return copy
+
+
+def glitched(joint, value, count, *, add):
+    """Return a change of so many messages."""
+    left = [count]
+
+    def change(messages):
+        if left[0] <= 0:
+            return messages
+        left[0] -= 1
+        return [other(m, joint, value, add=add) for m in messages]
+
+    return change
+
+
+def joined_by(joint, value):
+    """Return a second sender, which has another pose."""
+    return lambda messages: [x for m in messages for x in (m, other(m, joint, value, add=True))]
+
+
+def repeated():
+    """Return a driver that repeats two old messages for ever."""
+    kept = []
+
+    def change(messages):
+        kept.extend(messages)
+        return [kept[len(kept) % min(len(kept), 2)]] if kept else []
+
+    return change
+
+
+VALUES = {
+    'elbow - 2 rad': (3, -2.0, True),
+    'shoulder + 4 rad': (0, 4.0, True),
+    'a wrapped encoder': (2, -2.0 * np.pi, True),
+    'degrees': (3, 143.0, False),
+    '1e6': (1, 1e6, False),
+    '4e9': (1, 4e9, False),
+    '1e300': (1, 1e300, False),
+    'not a number': (0, np.nan, False),
+    'infinite': (0, np.inf, False),
+    'within limits, elsewhere': (0, 0.6, True),
+    'just beyond the tolerance': (4, 0.15, True),
+}
+
+
+@pytest.mark.parametrize('count', [1, 3, 8, 10**6])
+@pytest.mark.parametrize('value', VALUES)
+def test_wrong_positions_do_not_move_the_arm(bench, excitation, value, count):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.7)
+    joint, number, add = VALUES[value]
+    bed.displaced = value == 'just beyond the tolerance'
+    bed.changes.append(glitched(joint, number, count, add=add))
+    bed.run(2.0)
+    assert not bed.violations
+    if count > 4:
+        assert bed.node.elapsed is None
+        assert np.abs(bed.arm.state(bed.arm.now).dq).max() < 1e-3
+    if count == 1 and value != 'just beyond the tolerance':
+        assert bed.node.elapsed is not None
+
+
+@pytest.mark.parametrize('offset', [3600.0, -3600.0, -0.6, -0.3, 0.45])
+def test_a_step_of_the_clock_disables_nothing(bench, excitation, offset):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.5)
+    bed.offset = offset
+    bed.run(0.3)
+    assert bed.node.elapsed == pytest.approx(1.8, abs=0.02)
+    assert not bed.call('stop')
+    bed.run(1.0)
+    assert np.abs(bed.arm.state(bed.arm.now).dq).max() < 1e-3
+    assert not bed.violations
+
+
+def vibration(messages, count=[0]):  # noqa: B006
+    """Return messages of an arm that vibrates with 10 Hz."""
+    count[0] += 1
+    return [other(m, 3, 0.01 * np.sin(2.0 * np.pi * 0.1 * count[0]), add=True) for m in messages]
+
+
+def moving(messages, count=[0]):  # noqa: B006
+    """Return messages of an arm that moves."""
+    count[0] += 1
+    return [other(m, 3, 0.1 * STEP * count[0], add=True) for m in messages]
+
+
+def said_to_move(messages):
+    """Return messages with frozen positions and a velocity."""
+    for message in messages:
+        message.velocity = [2.0] * len(message.name)
+    return messages
+
+
+@pytest.mark.parametrize(
+    ('change', 'seconds'),
+    [
+        (lambda messages: [], 0.6),
+        (None, 0.01),
+        (moving, 0.6),
+        (moving, 0.09),
+        (vibration, 0.6),
+        (said_to_move, 0.6),
+        (repeated(), 0.6),
+        (joined_by(0, 1.0), 0.6),
+        (glitched(0, 9.0, 10**6, add=False), 0.6),
+    ],
+    ids='silent,one,moving,moving for 90 ms,vibration,velocity,repeats,two senders,'
+    'beyond a limit'.split(','),
+)
+def test_an_arm_that_is_not_known_to_be_at_rest_is_not_started(bench, excitation, change, seconds):
+    bed = Bed(bench, excitation)
+    if change is not None:
+        bed.changes.append(change)
+    bed.run(seconds)
+    assert 'the arm is not started' in bed.call('start')
+    assert not bed.arm.accepted
+
+
+@pytest.mark.parametrize('offset', [0.45, -0.45, 0.06])
+def test_clocks_apart_are_refused_with_both_times(bench, excitation, offset):
+    bed = Bed(bench, excitation)
+    bed.offset = offset
+    bed.run(0.6)
+    refusal = bed.call('start')
+    assert f'{EPOCH + bed.arm.now + offset:.3f} s' in refusal
+    assert f'{EPOCH + bed.arm.now:.3f} s' in refusal
+
+
+def test_a_callback_that_fails_stops_the_arm(bench, excitation, monkeypatch):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    bed.call('start')
+    bed.run(1.5)
+    monkeypatch.setattr(bed.node._arm.monitor, 'update', lambda *_: 1 / 0)
+    bed.run(1.0)
+    assert len(bed.arm.accepted) == 2 and bed.node.elapsed is None
+    assert np.abs(bed.arm.state(bed.arm.now).dq).max() < 1e-3
+    assert not bed.violations
+    assert bed.node.complaints.defects
+    bed.node.complaints.defects = 0
+
+
+def test_an_effort_that_is_not_foreseen_stops_the_arm_and_is_named(bench, excitation):
+    bed = Bed(bench, excitation, effort_factor=2.0)
+    bed.run(0.6)
+    bed.call('start')
+    bed.run(1.5)
+    assert bed.node.elapsed is not None
+    begun, bed.arm.faults.torque = bed.arm.now, 50.0
+    while len(bed.arm.accepted) < 2:
+        bed.step()
+    assert bed.arm.now - begun < 0.1
+    assert 'were foreseen' in bed.node.condition()[0]
+    bed.run(1.0)
+    assert not bed.violations
+
+
+def event(bed, rng):
+    """Let something happen that nobody planned."""
+    joint = int(rng.integers(6))
+    kind = rng.integers(11)
+    name = list(VALUES)[rng.integers(len(VALUES))]
+    value, bed.displaced = VALUES[name], bed.displaced or name == 'just beyond the tolerance'
+    if kind < 3:
+        bed.changes.append(glitched(*value[:2], int(rng.integers(1, 30)), add=value[2]))
+    elif kind == 3:
+        bed.changes.append(joined_by(joint, rng.normal()))
+    elif kind == 4:
+        bed.changes.append(repeated())
+    elif kind == 5:
+        bed.changes.append(lambda messages: [])
+    elif kind == 6:
+        bed.offset += rng.choice([3600.0, -3600.0, -0.6, -0.3, 0.45, 0.03])
+    elif kind == 7:
+        bed.arm.faults.stuck = joint
+    elif kind == 8:
+        bed.changes.clear()
+        bed.offset = 0.0
+    else:
+        bed.call(rng.choice(['start', 'stop', 'rehearse']))
+
+
+@pytest.mark.parametrize('first', range(0, HISTORIES, 20))
+def test_random_histories(bench, excitation, first):
+    for seed in range(first, min(first + 20, HISTORIES)):
+        rng = np.random.default_rng(seed)
+        bed = Bed(bench, excitation, zero_stamp=bool(seed % 2))
+        bed.run(0.6)
+        bed.call('start')
+        for _ in range(int(rng.integers(1, 7))):
+            bed.run(rng.uniform(0.02, 1.2))
+            event(bed, rng)
+        bed.run(0.5)
+        bed.close()
+        bed.node.destroy_node()
+        assert not bed.violations, f'history {seed}: {bed.violations[:3]}'
+        assert not bed.node.complaints.defects, f'history {seed}: {bed.node.complaints.latest}'
