@@ -19,11 +19,12 @@ import numpy as np
 #: A stop that exceeds an acceleration limit is planned again in this many times its duration, so
 #: often at most: the last one takes 4.8 times the duration.
 _LONGER, _TRIES = 1.25, 8
-#: Time to get back to the path, in units of what it takes at the velocity limit: a quintic is
-#: 1.875 times as fast as its mean, and the rest is for the speed of the path itself.
-_CATCHING = 3.0
-#: Largest velocity of a quintic from rest to rest, in units of its mean velocity.
-_TOP_VELOCITY = 1.875
+#: Time of a small step, in units of what it takes at the velocity limit, and of the root of the
+#: step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest, and the rest is
+#: for the speed that the arm has.
+_STEP = 3.0
+#: Velocity of a joint without a limit [rad/s or m/s].
+_UNSTATED = 1.0
 #: Interval with which the proof of clearance begins [s].
 _INTERVAL = 0.1
 #: Effort of a joint that is expected at least, as a share of its limit: dry friction of a wrist.
@@ -129,15 +130,9 @@ class MotionGate:
                 break
             duration *= _LONGER
         self._require(motion, None, 'the stop')
-        away = np.nan_to_num(np.abs(measured - self.run.at([phase]).q[0]) / self._velocity)
-        lead = min(_CATCHING * float(away.max()), float(motion.t[-2]))
+        step = np.nan_to_num(np.abs(measured - self.run.at([phase]).q[0]))
+        lead = min(self._time_of(step), float(motion.t[-2]))
         return motion.select(slice(int(np.searchsorted(motion.t, lead)), None))
-
-    @property
-    def _velocity(self) -> FloatArray:
-        """Velocity limits, shape (n,), a turn a second where there is none."""
-        limit = self.limits.velocity
-        return np.where(np.isfinite(limit), limit, 2.0 * np.pi)
 
     def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
         """
@@ -168,11 +163,7 @@ class MotionGate:
             raise TrajectoryError(
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
             )
-        needed = max(
-            float((_TOP_VELOCITY * step / self._velocity).max()),
-            float(np.sqrt(6.0 * step / np.minimum(self.limits.acceleration, 1e3)).max()),
-            HANDOVER,
-        )
+        needed = max(self._time_of(step), HANDOVER)
         motion = held(self.limits.joints, inside, HANDOVER)
         return replace(motion, t=motion.t - motion.t[0] + needed)
 
@@ -196,6 +187,13 @@ class MotionGate:
             f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "
             f'{self.limits.unit("torque", j)}, and at most {self.effort[j]:.3g} were foreseen: '
             f'more than effort_factor {factor:g} allows'
+        )
+
+    def _time_of(self, step: FloatArray) -> float:
+        """Return the time that a small step of each joint takes within the limits [s]."""
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, _UNSTATED)
+        return _STEP * float(
+            max((step / velocity).max(), np.sqrt(step / self.limits.acceleration).max())
         )
 
     def _require(self, motion: Motion, torque: FloatArray | None, what: str) -> None:

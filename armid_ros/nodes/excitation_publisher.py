@@ -22,7 +22,6 @@ from armid_ros.excitation import (
     TransferPlanner,
 )
 from armid_ros.excitation.files import load_excitation, read_excitation
-from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.excitation.supervision import HANDOVER
 from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
@@ -46,6 +45,8 @@ from std_msgs.msg import String
 _LOOK_PERIOD = 0.05
 #: How often the arm is compared with the run, whatever the rate of joint_states [s].
 _TRACKING_PERIOD = 0.005
+#: How often in a row an effort has to be too large: one spike is no collision.
+_OVERLOADS = 3
 #: How long the last message may take to arrive when the node ends [s].
 _FAREWELL = 1.0
 
@@ -356,7 +357,7 @@ class ExcitationPublisherNode(ArmidNode):
         contradiction = monitor.contradiction(now)
         overload = self._gate.overload(effort, self.value('effort_factor'))
         self._overloads = self._overloads + 1 if overload else 0
-        if contradiction or fault or self._overloads >= AGREEING:
+        if contradiction or fault or self._overloads >= _OVERLOADS:
             self._give_up(contradiction or fault or overload, blocked=not contradiction)
 
     def _look_for_partners(self) -> None:
@@ -408,8 +409,7 @@ class ExcitationPublisherNode(ArmidNode):
         if not reason:
             self._end_complete(gate)
             return
-        self._gate = self._rehearsal = None
-        self._outcome = 'stopped'
+        self._gate, self._rehearsal, self._outcome = None, None, 'stopped'
         self._ending = Ending(gate, self._begun, None, now, reason)
         self._say_trouble(f'stopped {now - self._begun:.2f} s after the start: {reason}')
 

@@ -112,7 +112,7 @@ RUN_PARAMETERS = (
     NodeParameter(
         'effort_factor',
         3.0,
-        'The arm is stopped when the effort of a joint is, in 5 messages in a row, larger by this '
+        'The arm is stopped when the effort of a joint is, three times in a row, larger by this '
         'factor than what is foreseen for the run and than 10 % of its limit; 0: never, the '
         'default in a simulation.',
         lower=0.0,
