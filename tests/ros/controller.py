@@ -1,14 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A trajectory controller as the documents of ros2_control describe it, with faults.
+Doubles of ros2_control's trajectory controller and joint state broadcaster, with faults.
 
-It begins a trajectory at its stamp, or at once where the stamp is zero; refuses one whose end is
-past, and leaves out the waypoints that are past; replaces what is under way by what comes;
-interpolates between waypoints; and stays at the last one. As an action it also refuses joints that
-are not its own and ends in motion, aborts a goal that is outside its tolerances or replaced, and
-holds the arm where it is when a goal is cancelled. The arm behind it is where it is told to be,
-and takes the torque of a model.
+They follow the sources of joint_trajectory_controller (JTC) and joint_state_broadcaster (JSB) of
+ROS 2 Jazzy with position commands. Each behaviour names its function in the repository
+ros-controls/ros2_controllers: JTC.x is a method of src/joint_trajectory_controller.cpp of
+joint_trajectory_controller, Trajectory.x of its src/trajectory.cpp, tolerances of its
+tolerances.hpp, and JSB.x of joint_state_broadcaster/src/joint_state_broadcaster.cpp.
+
+The arm behind them is where it is commanded to be, and takes the torque of a model.
 
 """
 
@@ -18,44 +19,51 @@ from dataclasses import dataclass
 import gc
 
 from armid_ros.arm import ArmModel
+from armid_ros.errors import ArmidError
 from armid_ros.motion import Motion
-from armid_ros.nodes.qos import LATCHED
+from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.trajectory.messages import read_trajectory
-from armid_ros.simulation import Reference
 from builtin_interfaces.msg import Time
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from scipy.interpolate import BPoly
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 SECOND = 10**9
 NAME = 'follow_joint_trajectory'
-#: Fastest that a trajectory may end [rad/s]: the resolution of a float.
+#: Fastest that a trajectory may end [rad/s]; JTC.validate_trajectory_msg: the epsilon of a float.
 AT_REST = 1.2e-7
+#: Time between results and feedback [s]; JTC.goal_accepted_callback: action_monitor_rate, 20 Hz.
+MONITOR = 0.05
+Result = FollowJointTrajectory.Result
 
 
 @dataclass
 class Faults:
     """
-    What is wrong with it.
+    Faults of the arm, of its driver and of the controller.
 
     Attributes
     ----------
     stuck : int or None
         A joint that stays where it is.
     deaf : bool
-        Whether it takes no trajectory any more, and goes on.
+        Whether no trajectory is taken any more, and the arm goes on.
     late : float
-        Age of the joint states that it publishes [s].
+        Age of the joint states that are published [s].
     lost : int
-        Every so many of its joint states get lost; 0: none.
+        Every so many joint states get lost; 0: none.
     silent : bool
         Whether no joint states come any more.
     torque : float
         Factor on the torques.
     lag : float
-        How far the arm is behind what it is told [s].
+        Delay of the arm behind its command [s].
+    overdue : bool
+        Whether a replaced goal gets its result with the end of the next one, as canceled: all
+        releases before the pull request 2422 of June 2026 (issue 1519 of ros2_controllers).
 
     """
 
@@ -66,48 +74,115 @@ class Faults:
     silent: bool = False
     torque: float = 1.0
     lag: float = 0.0
+    overdue: bool = False
 
 
 @dataclass
 class Goal:
-    """A goal of the action, its tolerances by joint, and what became of it."""
+    """A goal of the action, its tolerances by joint, and what the next monitoring sends."""
 
     handle: object
     path: np.ndarray
     goal: np.ndarray
     goal_time: float
+    feedback: object = None
+    result: tuple = ()
 
-    def ended(self, how, code=0, text=''):
-        """End it: 'succeed', 'abort' or 'canceled'."""
+    def send(self):
+        """Send the result: 'succeed', 'abort' or 'canceled', with a code and a text."""
+        how, code, text = self.result
 
         def finish(handle):
             getattr(handle, how)()
-            return FollowJointTrajectory.Result(error_code=code, error_string=text)
+            return Result(error_code=code, error_string=text)
 
         self.handle.execute(finish)
 
 
+@dataclass
+class Course:
+    """
+    A trajectory that is being followed; Trajectory.sample.
+
+    Attributes
+    ----------
+    t : ndarray, shape (m,)
+        Times of the waypoints on the clock of the controller [s].
+    points : list of list of ndarray, shape (n,)
+        Position, velocity and acceleration of each waypoint, as far as the message has them.
+
+    """
+
+    t: np.ndarray
+    points: list
+
+    @classmethod
+    def of(cls, message, robot, now, before):
+        """Take a message, from a state at a time on."""
+        reference = read_trajectory(message).for_robot(robot)
+        # Trajectory.sample: a stamp of zero is the time of the first sample
+        start = seconds_of(message.header.stamp) or now
+        rows = (x for x in (reference.q, reference.dq, reference.ddq) if x is not None)
+        points = [list(point) for point in zip(*rows, strict=True)]
+        t = start + reference.t
+        if now < t[0]:
+            # Trajectory.sample: one curve from the state before to the first waypoint, which
+            # begins now, however late the stamp is. A curve of which waypoints are past is
+            # entered between two of them, wherever the arm is.
+            return cls(np.append(now, t), [before, *points])
+        return cls(t, points)
+
+    def sample(self, t):
+        """Return position, velocity and acceleration at a time."""
+        k = int(np.searchsorted(self.t, t, side='right')) - 1
+        if not 0 <= k < len(self.t) - 1:
+            rest = self.points[0][:1] if k < 0 else self.points[-1]
+            return [*rest, *(3 - len(rest)) * [np.zeros(len(rest[0]))]]
+        # Trajectory.interpolate_between_points: linear, cubic or quintic, by what both ends have
+        order = min(len(self.points[k]), len(self.points[k + 1]))
+        ends = [point[:order] for point in self.points[k : k + 2]]
+        curve = BPoly.from_derivatives(self.t[k : k + 2], ends)
+        return [curve.derivative(m)(t) if m else curve(t) for m in range(3)]
+
+
 class Controller:
     """
-    The controller and the arm behind it, on the clock of a test bench.
+    The controller, the broadcaster and the arm behind them, on the clock of a test bench.
 
     Attributes
     ----------
     accepted, refused : list of JointTrajectory
-        What came.
+        Trajectories by topic and by action.
     goals : list of FollowJointTrajectory.Goal
-        What was accepted as a goal.
+        Accepted goals.
     ends : list of str
-        How goals ended.
+        How goals ended: 'succeed', 'abort' or 'canceled'.
+    active : bool
+        Whether the controller is active; JTC.on_deactivate.
+    from_desired : bool
+        The parameter interpolate_from_desired_state: a trajectory begins at the last command
+        instead of the measured state.
+    scaling : float
+        The state interface of speed scaling.
+    interfaces : set of str
+        State interfaces of the hardware.
+    path_tolerance, goal_tolerance, goal_time_tolerance : float
+        The parameters constraints.<joint>.trajectory and .goal [rad] and .goal_time [s].
 
     """
 
-    def __init__(self, bench, robot, q, quality=LATCHED, *, action=False):
+    def __init__(self, bench, robot, q, quality=STREAM, *, action=False):
         self.faults = Faults()
         self.accepted, self.refused, self.goals, self.ends = [], [], [], []
+        self.active, self.from_desired, self.scaling = True, False, 1.0
+        self.interfaces = {'position', 'velocity', 'effort'}
+        self.path_tolerance = self.goal_tolerance = self.goal_time_tolerance = 0.0
         self.now, self.q = 100.0, np.array(q, dtype=float)
         self._bench, self._robot, self._model = bench, robot, ArmModel(robot)
-        self._begun, self._curve, self._count, self._goal = 0.0, None, 0, None
+        self._course, self._count, self._goal = None, 0, None
+        self._begun, self._held, self._behind = self.now, True, 0.0
+        self._tolerances = (np.zeros(len(self.q)), np.zeros(len(self.q)), 0.0)
+        self._results, self._replaced, self._monitored = [], [], self.now
         self._publisher = bench.probe.create_publisher(JointState, 'joint_states', 10)
         bench.probe.create_subscription(
             JointTrajectory, 'joint_trajectory', self._on_trajectory, quality
@@ -125,35 +200,50 @@ class Controller:
             )
 
     def restart(self):
-        """Forget what is under way, and stay where the arm is."""
-        self._curve = self._goal = None
+        """Forget the trajectory, and hold the arm where it is; JTC.on_activate."""
+        self._hold()
+        self._goal, self.active = None, True
+
+    def deactivate(self):
+        """Abort the goal, and take nothing any more; JTC.on_deactivate."""
+        self.active = False
+        self._hold()
+        if self._goal is not None:
+            self._end('abort', Result.INVALID_GOAL, 'cancelled during deactivate transition')
+            self._monitor()
 
     def leave(self):
-        """Take the action away, as a controller that is stopped does."""
+        """Take the action away, as a controller that is unloaded does."""
         if self._server is not None:
             self._server.destroy()
         self._server = self._goal = None
+        self._results, self._replaced = [], []
         gc.collect()  # server and goals hold each other, and the action lives as long
 
     def state(self, t):
-        """Return where the arm should be at a time, at rest before and after a trajectory."""
-        if self._curve is None:
-            n = len(self._robot.joints)
-            still = np.zeros((1, n))
-            return Motion(self._robot.joints, [t], [self.q], still, still)
-        return self._curve.sample(np.array([t - self._begun]))
+        """Return where the arm should be at a time."""
+        if self._course is None:
+            rows = [self.q, *2 * [np.zeros(len(self.q))]]
+        else:
+            rows = self._course.sample(t - self._behind)
+        return Motion(self._robot.joints, [t], *(row[None] for row in rows))
 
     def run(self, until, step=0.1):
         """Let time go on, and publish joint states."""
         self._bench.spin_until(self._publisher.get_subscription_count, 'a subscriber')
         while self.now < until - 1e-9:
             self.now = round(self.now + step, 6)
+            # JTC.update: the time of the trajectory advances by the period times the scaling
+            self._behind += (1.0 - self.scaling) * step
             self._bench.tick(round(self.now * SECOND))
             self._publish()
             self._watch()
+            if self.now >= self._monitored + MONITOR - 1e-9:
+                self._monitor()
             self._bench.settle()
 
     def _publish(self):
+        """Publish a joint state; JSB.update."""
         self._count += 1
         self.q = self._where(self.now, self.q)
         if self.faults.silent or (self.faults.lost and self._count % self.faults.lost == 0):
@@ -161,8 +251,18 @@ class Controller:
         t = self.now - self.faults.late
         state, q = self.state(t - self.faults.lag), self._where(t, self.q)
         motion = Motion(self._robot.joints, state.t, q[None], state.dq, state.ddq)
-        message = JointState(name=list(self._robot.joints), position=q.tolist())
-        message.effort = (self.faults.torque * self._model.joint_torque(motion)[0]).tolist()
+        values = {
+            'position': q,
+            'velocity': self._velocity(t),
+            'effort': self.faults.torque * self._model.joint_torque(motion)[0],
+        }
+        # joints in alphabetical order, all with the three fields
+        order = np.argsort(self._robot.joints)
+        message = JointState(name=[self._robot.joints[k] for k in order])
+        for name, value in values.items():
+            # JSB.get_value: what has no state interface is not a number
+            has = name in self.interfaces
+            setattr(message, name, (value[order] if has else np.full(len(q), np.nan)).tolist())
         message.header.stamp = stamp_of(t)
         self._publisher.publish(message)
 
@@ -173,95 +273,159 @@ class Controller:
             q[self.faults.stuck] = before[self.faults.stuck]
         return q
 
+    def _velocity(self, t):
+        dq = np.array(self.state(t - self.faults.lag).dq[0])
+        if self.faults.stuck is not None:
+            dq[self.faults.stuck] = 0.0
+        return dq
+
     def _watch(self):
-        """Hold the goal under way against its tolerances, as at every update."""
-        goal = self._goal
-        if goal is None:
+        """Compare the arm with its trajectory; JTC.update."""
+        if self._course is None or self._held:
             return
+        path, goal, goal_time = self._tolerances
         error = self.state(self.now).q[0] - self.q
-        feedback = FollowJointTrajectory.Feedback(joint_names=list(self._robot.joints))
-        feedback.header.stamp = stamp_of(self.now)
-        feedback.error.positions = error.tolist()
-        goal.handle.publish_feedback(feedback)
-        left = self._begun + self._curve.duration - self.now
-        allowed = goal.path if left > 0.0 else goal.goal
+        past_end = self.now - self._behind - self._course.t[-1]
+        allowed = path if past_end < 0.0 else goal
+        # tolerances: zero is not enforced
         outside = (np.abs(error) > allowed) & (allowed > 0.0)
-        joint = self._robot.joints[int(np.argmax(outside))]
-        if left > 0.0:
-            if outside.any():
-                self._abort(FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED, joint)
-        elif not outside.any():
-            self._end('succeed')
-        elif 0.0 < goal.goal_time < -left:
-            self._abort(FollowJointTrajectory.Result.GOAL_TOLERANCE_VIOLATED, joint)
+        name = self._robot.joints[int(np.argmax(outside))]
+        if past_end < 0.0 and outside.any():
+            self._finish('abort', Result.PATH_TOLERANCE_VIOLATED, f'{name} is too far away')
+        elif past_end >= 0.0 and not outside.any():
+            if self._goal is not None:
+                self._held = True  # JTC.set_success_trajectory_point: without tolerances
+                self._end('succeed')
+        elif 0.0 < goal_time < past_end:
+            self._finish('abort', Result.GOAL_TOLERANCE_VIOLATED, f'{name} is too far away')
+        if self._goal is not None:
+            feedback = FollowJointTrajectory.Feedback(joint_names=list(self._robot.joints))
+            feedback.header.stamp = stamp_of(self.now)
+            feedback.error.positions = error.tolist()
+            self._goal.feedback = feedback
 
-    def _abort(self, code, joint):
-        self._curve = None  # the arm is held where it is
-        self._end('abort', code, f'{joint} is too far away')
+    def _finish(self, *why):
+        """Hold the arm where it is, and end the goal if there is one."""
+        self._hold()
+        if self._goal is not None:
+            self._end(*why)
 
-    def _end(self, how, *why):
-        self.ends.append(how)
+    def _hold(self):
+        """Command the measured position at once, without a ramp; JTC.set_hold_position."""
+        self._course, self._held = None, True
+
+    def _end(self, how, code=Result.SUCCESSFUL, text=''):
         goal, self._goal = self._goal, None
-        goal.ended(how, *why)
+        goal.result = (how, code, text)
+        self._results += [goal, *self._replaced]
+        self._replaced = []
+
+    def _monitor(self):
+        """Send results and feedback; realtime_tools, RealtimeServerGoalHandle.runNonRealtime."""
+        self._monitored = self.now
+        if self._goal is not None and self._goal.feedback is not None:
+            self._goal.handle.publish_feedback(self._goal.feedback)
+        while self._results:
+            goal = self._results.pop(0)
+            self.ends.append(goal.result[0])
+            goal.send()
 
     def _on_goal(self, goal):
-        joints, points = goal.trajectory.joint_names, goal.trajectory.points
-        fits = set(joints) == set(self._robot.joints) and points
-        fits = fits and not np.any(np.abs(points[-1].velocities) > AT_REST)
-        if self.faults.deaf or not fits or not self._take(goal.trajectory):
+        if self.faults.deaf or not self.active or not self._valid(goal.trajectory):
+            self.refused.append(goal.trajectory)
             return GoalResponse.REJECT
-        self.goals.append(goal)
         return GoalResponse.ACCEPT
 
     def _on_accepted(self, handle):
-        if self._goal is not None:
-            self._end('abort', FollowJointTrajectory.Result.INVALID_GOAL, 'replaced')
+        """Replace the goal; JTC.goal_accepted_callback and JTC.preempt_active_goal."""
         request = handle.request
-        order = [request.trajectory.joint_names.index(j) for j in self._robot.joints]
-        path, goal = (
-            np.array([tolerances[k].position for k in order])
-            for tolerances in (request.path_tolerance, request.goal_tolerance)
+        if self._goal is not None and self.faults.overdue:
+            self._goal.result = ('canceled', Result.SUCCESSFUL, '')
+            self._replaced.append(self._goal)
+        elif self._goal is not None:
+            self._end('abort', Result.INVALID_GOAL, 'cancelled due to new incoming action')
+            self._monitor()
+        self.goals.append(request)
+        self._take(request.trajectory)
+        self._tolerances = self._resolved(request)
+        self._goal = Goal(handle, *self._tolerances)
+
+    def _resolved(self, request):
+        """Return the tolerances of a goal; tolerances.get_segment_tolerances."""
+        joints = list(self._robot.joints)
+        default = (
+            np.full(len(joints), self.path_tolerance),
+            np.full(len(joints), self.goal_tolerance),
+            self.goal_time_tolerance,
         )
-        time = request.goal_time_tolerance
-        self._goal = Goal(handle, path, goal, time.sec + 1e-9 * time.nanosec)
+        path, goal = default[0].copy(), default[1].copy()
+        asked = [
+            (into, joints.index(t.name) if t.name in joints else None, t.position)
+            for into, tolerances in (
+                (path, request.path_tolerance),
+                (goal, request.goal_tolerance),
+            )
+            for t in tolerances
+        ]
+        time = np.array([self.goal_time_tolerance])
+        asked.append((time, 0, seconds_of(request.goal_time_tolerance)))
+        for into, k, value in asked:
+            if k is None or (value < 0.0 and value != -1.0):
+                return default  # an unknown joint or an illegal value: none of the goal's holds
+            if value != 0.0:  # resolve_tolerance_source: 0 is the default, -1 is none
+                into[k] = max(value, 0.0)
+        return path, goal, float(time[0])
 
     def _on_cancel(self, handle):
-        if self.faults.deaf or self._goal is None or handle.goal_id != self._goal.handle.goal_id:
+        """Hold the arm where it is; JTC.goal_cancelled_callback, which accepts all requests."""
+        if self.faults.deaf:
             return CancelResponse.REJECT
-        self._curve = None
-        goal, self._goal = self._goal, None
-        self.ends.append('canceled')
-        # once the answer has made it one that is being cancelled
-        self._bench.executor.create_task(lambda: goal.ended('canceled'))
+        if self._goal is not None and handle.goal_id == self._goal.handle.goal_id:
+            self._hold()
+            self._end('canceled')
+            # the result follows once the answer has made it a goal that is being cancelled
+            self._bench.executor.create_task(self._monitor)
         return CancelResponse.ACCEPT
 
     def _on_trajectory(self, message):
-        if not self.faults.deaf:
+        """Take a trajectory of the topic; JTC.topic_callback, which ends no goal."""
+        if self.faults.deaf or not self.active or not self._valid(message):
+            self.refused.append(message)
+        else:
             self._take(message)
 
-    def _take(self, message):
-        reference = read_trajectory(message).for_robot(self._robot)
-        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        begin = stamp or self.now
-        if begin + reference.duration < self.now:
-            self.refused.append(message)
+    def _valid(self, message):
+        """Judge a trajectory; JTC.validate_trajectory_msg."""
+        joints, points = message.joint_names, message.points
+        if len(joints) != len(self._robot.joints) or set(joints) != set(self._robot.joints):
             return False
-        before = self.state(self.now)
+        if not points or np.any(np.abs(points[-1].velocities) > AT_REST):
+            return False
+        start = seconds_of(message.header.stamp)
+        t = [seconds_of(point.time_from_start) for point in points]
+        if (start and start + t[-1] < self.now) or np.any(np.diff(t) <= 0.0):
+            return False
+        try:
+            return read_trajectory(message).tau is None  # no efforts
+        except ArmidError:
+            return False
+
+    def _take(self, message):
+        """Begin a trajectory instead of the one before; JTC.update and Trajectory.update."""
         self.accepted.append(message)
-        self._curve = left(reference, self.now - begin).after(
-            before.q[0], before.dq[0], before.ddq[0]
-        )
-        self._begun = max(begin, self.now)
-        return True
+        if self.from_desired and self._course is not None:
+            before = self._course.sample(self.now - self._behind)
+        else:
+            before = [self.q]
+            if 'velocity' in self.interfaces:
+                before.append(self._velocity(self.now))
+        self._course = Course.of(message, self._robot, self.now, before)
+        self._held, self._behind = False, 0.0
 
 
-def left(reference, late):
-    """Return what is still to come of waypoints, counted from now, or all of a later start."""
-    future = reference.t > late
-    parts = (None if x is None else x[future] for x in (reference.dq, reference.ddq))
-    return Reference(
-        reference.joints, reference.t[future] - max(late, 0.0), reference.q[future], *parts
-    )
+def seconds_of(stamp):
+    """Return a stamp or a duration in seconds."""
+    return stamp.sec + 1e-9 * stamp.nanosec
 
 
 def stamp_of(seconds):
