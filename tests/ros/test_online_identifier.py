@@ -137,6 +137,21 @@ def test_joints_are_matched_by_name_and_others_left_out(bench, arm, samples, exp
     )
 
 
+@pytest.mark.parametrize('columns', [slice(None), [1]], ids=['all', 'one'])
+def test_velocities_that_are_not_numbers_are_absent(bench, arm, samples, expected, columns):
+    """The joint state broadcaster fills what has no state interface with NaN."""
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    dq = dq.copy()
+    dq[:, columns] = np.nan
+    publish(bench, node, publisher, messages(arm, (t, q, dq, tau)))
+    np.testing.assert_allclose(
+        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
+    )
+    assert not node.complaints.latest
+
+
 @pytest.mark.parametrize(
     ('clock', 'said'), [(1004.0, ''), (4600.0, 'behind'), (400.0, 'ahead of')]
 )
