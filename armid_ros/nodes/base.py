@@ -129,7 +129,7 @@ class ArmidNode(Node):
     def look_for_trouble(self) -> None:
         """Log once what keeps the node from its work: not everybody looks at /diagnostics."""
         trouble = '' if self.missing_clock else self.condition()[0]
-        if trouble and not self._trouble_said:
+        if trouble and not self._trouble_said and not self.complaints.has_logged(trouble):
             self.get_logger().info(trouble)
         self._trouble_said = bool(trouble)
 

@@ -220,7 +220,9 @@ class SimulatedArmNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
-        self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
+        skipped = self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
+        if self._clock_publisher is None:  # stamps stay those of the computer
+            self._origin_ns = (self._origin_ns or 0) + round(skipped * 1e9)
 
     def follow_reference(self, reference: Reference) -> None:
         """
@@ -251,7 +253,7 @@ class SimulatedArmNode(ArmidNode):
         return trouble, {
             'simulated_time': self._arm.state.t,
             'moving': int(self.moving),
-            'behind_real_time': self.real_time.given_up,
+            'skipped_real_time': self.real_time.given_up,
         }
 
     def objection(self, values: Mapping[str, Any]) -> str:
@@ -271,8 +273,6 @@ class SimulatedArmNode(ArmidNode):
         if 'effects' in names:
             self._become(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
-            if self._clock_publisher is None:  # stamps are of now again
-                self._origin_ns = (self._origin_ns or 0) + round(self.real_time.given_up * 1e9)
             self.real_time.given_up = 0.0
             self._keep_pace()
         described = sensors_of(self.value, self._arm.plant.robot.n_joints)
