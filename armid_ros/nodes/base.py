@@ -38,6 +38,15 @@ EXECUTOR = NodeParameter(
     'at 1 kHz, but is experimental in Jazzy.',
     choices=('single', 'events'),
 )
+#: Parameters of every node.
+COMMON = (
+    EXECUTOR,
+    NodeParameter(
+        'end_with_parent',
+        False,
+        'End in order when the process that has started the node ends, as a launch by SIGTERM.',
+    ),
+)
 
 
 class ArmidNode(Node):
@@ -75,7 +84,7 @@ class ArmidNode(Node):
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
-        return (*self.table, EXECUTOR)
+        return (*self.table, *COMMON)
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **more: Any

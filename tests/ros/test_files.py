@@ -10,7 +10,7 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree
 
-from armid_ros.nodes.base import EXECUTOR
+from armid_ros.nodes.base import COMMON
 from armid_ros.robots import load_robot
 import pytest
 import yaml
@@ -19,7 +19,7 @@ from docsite.nodes import NODES
 
 ROOT = Path(__file__).parents[2]
 TABLES = {
-    name: {parameter.name: parameter for parameter in (*node.table, EXECUTOR)}
+    name: {parameter.name: parameter for parameter in (*node.table, *COMMON)}
     for name, node in NODES.items()
 }
 

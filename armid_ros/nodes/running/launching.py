@@ -106,6 +106,7 @@ def node(
     file = given.get('params_file', shipped)
     clock = {k: given[k] for k in ('use_sim_time',) if k in given}
     said = parameters_named(file, full_name(given, executable)) if file else set()
+    usual = {'end_with_parent': True, **usual}
     values = {k: v for k, v in usual.items() if k not in said} | clock | dict(chosen)
     # A later pattern of the parameter files overrules an earlier one that matches as well. With
     # name and namespace, launch writes the values under the full name, which comes last.
