@@ -160,7 +160,7 @@ class ArmidNode(Node):
 
     @property
     def activity(self) -> str:
-        """What the node does while all is well, in a word."""
+        """Return what the node does while all is well, in a word."""
         return 'running'
 
     @property
