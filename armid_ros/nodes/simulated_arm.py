@@ -117,6 +117,7 @@ class SimulatedArmNode(ArmidNode):
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
         self.real_time = RealTime(self._elapsed, self.step)
+        self._owed = 0.0
         self._states = self.create_publisher(
             JointState,
             'joint_states',
@@ -220,9 +221,11 @@ class SimulatedArmNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
-        skipped = self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
-        if self._clock_publisher is None:  # stamps stay those of the computer
-            self._origin_ns = (self._origin_ns or 0) + round(skipped * 1e9)
+        self._owed += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
+        # stamps become those of the computer again, but not amid a motion that is watched
+        if self._owed and self._clock_publisher is None and not self.moving:
+            self._origin_ns = (self._origin_ns or 0) + round(self._owed * 1e9)
+            self._owed = 0.0
 
     def follow_reference(self, reference: Reference) -> None:
         """

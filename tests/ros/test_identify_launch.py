@@ -11,6 +11,7 @@ import subprocess
 import sys
 
 from armid_ros.excitation import save_excitation
+from armid_ros.recording import topics
 import pytest
 import yaml
 
@@ -104,18 +105,9 @@ def test_torque_from_elsewhere_is_what_everybody_hears():
 
 
 @pytest.mark.slow
-def test_it_ends_by_itself_with_the_result_saved(bench, tmp_path):
-    """As `ros2 launch ... simulate:=true`, each node a process, but with an arm that is quick."""
+def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_path):
+    """As two `ros2 launch ... simulate:=true`, each node a process, with arms that are quick."""
     save_excitation(short_excitation(), tmp_path / 'run.yaml')
-    nodes = identify(
-        robot='humanoid_arm',
-        namespace='left',
-        simulate='true',
-        file=str(tmp_path / 'run.yaml'),
-        save_to=str(tmp_path / 'result'),
-        runs='1',
-        diagnose='false',
-    )
     environment = {
         **os.environ,
         'ROS_DOMAIN_ID': str(bench.context.get_domain_id()),
@@ -123,24 +115,39 @@ def test_it_ends_by_itself_with_the_result_saved(bench, tmp_path):
         'PYTHONPATH': os.pathsep.join(p for p in sys.path if p),
     }
     running = {}
-    for name, node in nodes.items():
-        command = [sys.executable, '-m', f'armid_ros.nodes.{name}', *node.arguments(tmp_path)]
-        with (tmp_path / f'{name}.log').open('w') as output:
-            running[name] = subprocess.Popen(
-                command, env=environment, stdout=output, stderr=subprocess.STDOUT
-            )
+    for arm in ('left', 'right'):
+        folder = tmp_path / arm
+        folder.mkdir()
+        nodes = identify(
+            robot='humanoid_arm',
+            namespace=arm,
+            simulate='true',
+            file=str(tmp_path / 'run.yaml'),
+            save_to=str(folder / 'result'),
+            runs='1',
+        )
+        for name, node in nodes.items():
+            command = [sys.executable, '-m', f'armid_ros.nodes.{name}', *node.arguments(folder)]
+            with (folder / f'{name}.log').open('w') as output:
+                running[arm, name] = subprocess.Popen(
+                    command, env=environment, stdout=output, stderr=subprocess.STDOUT
+                )
     try:
-        assert running.pop('identification_run').wait(300) == 0, (
-            tmp_path / 'identification_run.log'
-        ).read_text()
+        for arm in ('left', 'right'):
+            log = tmp_path / arm / 'identification_run.log'
+            assert running.pop((arm, 'identification_run')).wait(300) == 0, log.read_text()
     finally:
         for process in running.values():
             process.terminate()
-        codes = {name: process.wait(60) for name, process in running.items()}
-    assert set(codes.values()) == {0}
-    folder = tmp_path / 'result' / 'identification'
-    result = json.loads((folder / 'identification.json').read_text())
-    assert result['robot'] == 'humanoid_arm'
-    assert (folder / 'report.html').is_file()
-    assert (tmp_path / 'result' / 'live' / 'estimate.yaml').is_file()
-    assert 'identify: ' in (tmp_path / 'identification_run.log').read_text()
+        codes = {process.wait(60) for process in running.values()}
+    assert codes == {0}
+    for arm in ('left', 'right'):
+        folder = tmp_path / arm / 'result'
+        result = json.loads((folder / 'identification' / 'identification.json').read_text())
+        assert result['robot'] == 'humanoid_arm'
+        assert (folder / 'identification' / 'report.html').is_file()
+        diagnosis = json.loads((folder / 'diagnosis' / 'diagnosis.json').read_text())
+        assert diagnosis['verdict']
+        assert (folder / 'live' / 'estimate.yaml').is_file()
+        names = {topic.name for topic in topics(folder / 'run')}
+        assert names and all(name.startswith(f'/{arm}/') for name in names)

@@ -220,6 +220,20 @@ def test_in_real_time_there_is_no_clock_and_stamps_are_evenly_spaced(bench):
     assert not clock
 
 
+def test_an_arm_in_motion_skips_real_time_only_once_it_rests(bench, monkeypatch):
+    arm = still_arm(bench, real_time_factor=1.0)
+    send(bench, trajectory(HOME + 0.1))
+    arm.step()
+    before = arm.stamp_ns
+    busy(arm.real_time, monkeypatch)
+    arm.catch_up()
+    assert arm.moving and arm.stamp_ns - before < SECOND
+    while arm.moving:
+        arm.step()
+    arm.catch_up()
+    assert arm.stamp_ns - before > 9 * SECOND
+
+
 @pytest.mark.parametrize('factor', [1.0, 2.0])
 def test_who_falls_behind_real_time_says_so_and_goes_on_in_time(bench, factor, monkeypatch):
     arm = still_arm(bench, real_time_factor=factor)
