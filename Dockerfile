@@ -19,11 +19,14 @@ RUN apt-get update \
         python3-colcon-common-extensions \
         python3-dev \
         python3-venv \
+        ros-jazzy-control-msgs \
     && rm -rf /var/lib/apt/lists/*
 
-# Nothing here needs root, and files in mounted folders are to belong to a person.
-ARG UID=1001
-RUN useradd --create-home --shell /bin/bash --uid "$UID" armid
+# Nothing here needs root, and files in mounted folders are to belong to a person: the first one of
+# most computers. The image may have a user of that number.
+ARG UID=1000
+RUN if getent passwd "$UID"; then userdel --remove "$(getent passwd "$UID" | cut -d : -f 1)"; fi \
+    && useradd --create-home --shell /bin/bash --uid "$UID" armid
 USER $UID
 WORKDIR /home/armid/ws
 
@@ -40,7 +43,7 @@ RUN ln -s armid_ros/msg_schemas src/armid_msgs \
     && . /opt/ros/jazzy/setup.bash \
     && colcon build \
     && . install/setup.bash \
-    && ros2 pkg executables armid_ros
+    && src/armid_ros/docker/check
 
 # Every command finds ROS 2, the nodes and armid.
 ENTRYPOINT ["/home/armid/ws/src/armid_ros/docker/enter.sh"]

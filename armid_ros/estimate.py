@@ -39,7 +39,7 @@ class ParameterName:
 
     @property
     def words(self) -> str:
-        """What it is in words, without its joint: 'viscous coefficient', 'difference of mass'."""
+        """Return its words without the joint: 'viscous coefficient', 'difference of mass'."""
         found = _OF_BODY.fullmatch(self.name)
         if found is None:
             return self.name.replace('_', ' ').replace('coulomb', 'Coulomb')

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.nodes.bag_player import BagPlayerNode
-from armid_ros.nodes.base import ArmidNode, EXECUTOR
+from armid_ros.nodes.base import ArmidNode, COMMON
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.identification_run import IdentificationRunNode
 from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
@@ -41,7 +41,7 @@ def nodes_page(introduction: str) -> str:
     lines = [introduction]
     for name, node in NODES.items():
         lines += [f'## {name}', '', _told(node), '']
-        rows = [_row(parameter) for parameter in (*node.table, EXECUTOR)]
+        rows = [_row(parameter) for parameter in (*node.table, *COMMON)]
         lines += table(('parameter', 'default', 'range', 'what it is'), rows)
     return '\n'.join(lines)
 

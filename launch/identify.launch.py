@@ -10,13 +10,16 @@ controller and joint states are there. `simulate:=true` tries it on a simulated 
 
 from pathlib import Path
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
-from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from armid_ros.nodes.running.launching import (
+    Argument,
+    described,
+    full_name,
+    node,
+    parameters_named,
+)
+from launch.actions import Shutdown
 
-#: The simulated arm of `simulate:=true`.
+#: The simulated arm of `simulate:=true`, where the parameter file has no other.
 DRIVES = {
     'rate': 500.0,
     'torque_noise': [0.05],
@@ -25,112 +28,77 @@ DRIVES = {
         'coulomb_friction:coulomb_torque=0.2',
     ],
 }
-#: Name, default and description of every argument; without a default it has to be given.
 ARGUMENTS = (
-    ('robot', None, 'shipped name, URDF or xacro'),
-    ('gravity', 'earth', 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
-    ('joints', '', 'driven joints, with commas; empty: all but those of grippers'),
-    ('effects', '', 'beside the rigid body, with commas; empty: usual friction and offset'),
-    ('save_to', 'identification', 'folder for recordings, model and reports'),
-    ('namespace', '', 'of the nodes and of the topics of the robot'),
-    (
-        'controller',
-        'joint_trajectory_controller',
-        'of its topic and action; empty: neither',
+    Argument('robot', str, 'shipped name, URDF or xacro; empty: that of params_file'),
+    Argument('gravity', str, 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
+    Argument('joints', list, 'driven joints, with commas; empty: all but those of grippers'),
+    Argument('effects', list, 'beside the rigid body, with commas; empty: friction and offset'),
+    Argument('save_to', str, 'folder for recordings, model and reports; empty: identification'),
+    Argument('namespace', str, 'of the nodes and of the topics of the robot'),
+    Argument(
+        'controller', str, 'of its topic and action; empty: neither', 'joint_trajectory_controller'
     ),
-    ('joint_states', 'joint_states', 'topic of the robot'),
-    ('robot_description', 'robot_description', 'topic of the robot'),
-    ('effort_topic', '', 'topic with torques, where joint_states have none'),
-    ('params_file', '', 'parameters of the nodes; empty: those of config/real_robot.yaml'),
-    ('use_sim_time', 'false', 'take the time from /clock'),
-    ('file', '', 'excitation of armid excite; empty: design one'),
-    ('environment', '', 'what stands around the arm: YAML, MoveIt scene'),
-    ('floor', '', 'height above the origin of the base [m], or none; empty: that of the robot'),
-    ('duration', '44.0', 'of an excitation that is designed [s]'),
-    ('runs', '2', 'how often it is run; the last of several is held out'),
-    ('rehearse', 'false', 'run it slowly first, and go on only if that is as foreseen'),
-    ('diagnose', 'true', 'look for what the model lacks, too'),
-    ('simulate', 'false', 'have a simulated arm, with friction and noise, in place of a robot'),
+    Argument('joint_states', str, 'topic of the robot', 'joint_states'),
+    Argument('robot_description', str, 'topic of the robot', 'robot_description'),
+    Argument('effort_topic', str, 'topic with torques, where joint_states have none'),
+    Argument('params_file', str, 'parameters of the nodes; empty: config/real_robot.yaml'),
+    Argument('use_sim_time', bool, 'take the time from /clock'),
+    Argument('file', str, 'excitation of armid excite; empty: design one'),
+    Argument('environment', str, 'what stands around the arm: YAML, MoveIt scene'),
+    Argument('floor', str, 'height above the base [m], or none; empty: that of the robot'),
+    Argument('duration', float, 'of an excitation that is designed [s]; empty: 44.0'),
+    Argument('runs', int, 'how often it is run; the last of several is held out; empty: 2'),
+    Argument('rehearse', bool, 'run it slowly first, and go on only if that is as foreseen'),
+    Argument('diagnose', bool, 'look for what the model lacks, too; empty: true'),
+    Argument('simulate', bool, 'have a simulated arm, with friction and noise, for a robot'),
 )
 
 
 def generate_launch_description():
     """Describe what is started; `ros2 launch armid_ros identify.launch.py --show-args`."""
-    declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        for name, default, text in ARGUMENTS
-    ]
-    return LaunchDescription([*declared, OpaqueFunction(function=start)])
+    return described(ARGUMENTS, start)
 
 
-def start(context):
-    """Return the nodes, with what the arguments say on top of the parameter file."""
-    said = {name: LaunchConfiguration(name).perform(context) for name, _, _ in ARGUMENTS}
-    told = {name: text.lower() == 'true' for name, text in said.items()}
-    folder = Path(said['save_to']).expanduser()
-    topics = {name: said[name] for name in ('joint_states', 'robot_description')}
-    if said['effort_topic']:
+def start(given):
+    """Return the nodes."""
+
+    def some(*names):
+        return {name: given[name] for name in names if name in given}
+
+    def one(name, chosen, usual, remapped=(), **more):
+        remappings = list(dict(remapped).items())
+        return node(given, name, chosen, usual, shipped=shipped, remappings=remappings, **more)
+
+    simulate = given.get('simulate', False)
+    shipped = '' if simulate else str(Path(__file__).parents[1] / 'config' / 'real_robot.yaml')
+    if not simulate and 'robot' not in given:
+        publisher = full_name(given, 'excitation_publisher')
+        if 'robot' not in parameters_named(given.get('params_file', shipped), publisher):
+            raise RuntimeError('robot is missing: give robot:=URDF, or a params_file with robot')
+    topics = some('joint_states', 'robot_description')
+    own, simulation = dict(topics), {'simulation': True} if simulate else {}
+    if 'effort_topic' in given:
         topics['joint_states'] = 'joint_state_merger/joint_states'
-    if said['controller'] and not told['simulate']:
-        topics['joint_trajectory'] = f'{said["controller"]}/joint_trajectory'
-    arm = {**texts(said, 'robot', 'gravity'), **lists(said, 'joints')}
-    effects = lists(said, 'effects')
-    excitation = texts(said, 'file', 'environment', 'floor') | {
-        'duration': float(said['duration']),
-        'start': False,
-        'simulation': told['simulate'],
-    }
-    live = {'save_to': ParameterValue(str(folder / 'live'), value_type=str)}
-    run = {
-        'save_to': ParameterValue(str(folder), value_type=str),
-        'runs': int(said['runs']),
-        'rehearse': told['rehearse'],
-        'diagnose': told['diagnose'],
-    }
-    bag = {
-        'bag': ParameterValue(str(folder / 'run'), value_type=str),
-        'record': False,
-        'topics': list(topics.values()),
-    }
+    if 'controller' in given and not simulate:
+        topics['joint_trajectory'] = f'{given["controller"]}/joint_trajectory'
+    folder = Path(given.get('save_to', 'identification')).expanduser()
+    live, run = {'save_to': str(folder / 'live')}, {'save_to': str(folder)}
+    bag = {'bag': str(folder / 'run')}
+    saved = 'save_to' in given  # in one folder, whatever the parameter file has
+    arm, effects = some('robot', 'gravity', 'joints'), some('effects')
+    design = some('file', 'environment', 'floor', 'duration')
+    steps = some('runs', 'rehearse', 'diagnose')
+    recorded = {'record': False, 'topics': list(topics.values())}
+    excitation = arm | effects | design | simulation
+    chosen = arm | effects | steps | (run if saved else {})
     nodes = [
-        node(said, 'excitation_publisher', {**arm, **effects, **excitation}, topics),
-        node(said, 'online_identifier', {**arm, **effects, **live}, topics),
-        node(said, 'recorder', bag, {}),
-        node(said, 'identification_run', {**arm, **effects, **run}, {}, on_exit=Shutdown()),
+        one('excitation_publisher', excitation, {'start': False}, topics),
+        one('online_identifier', arm | effects | (live if saved else {}), live, topics),
+        one('recorder', bag if saved else {}, bag | recorded),
+        one('identification_run', chosen, run, on_exit=Shutdown()),
     ]
-    if said['effort_topic']:
-        own = {name: said[name] for name in ('joint_states', 'robot_description')}
-        torque = {**texts(said, 'effort_topic'), **lists(said, 'joints')}
-        nodes.append(node(said, 'joint_state_merger', torque, own))
-    if told['simulate']:
-        drives = {**texts(said, 'robot', 'gravity'), **DRIVES}
-        nodes.append(node(said, 'simulated_arm', drives, topics))
+    if 'effort_topic' in given:
+        nodes.append(one('joint_state_merger', some('effort_topic', 'joints'), {}, own))
+    if simulate:
+        nodes.append(one('simulated_arm', some('robot', 'gravity'), DRIVES, topics))
     return nodes
-
-
-def node(said, name, parameters, topics, **more):
-    """Return a node in the namespace, with parameters on top of those of the file."""
-    file = said['params_file']
-    if not file and said['simulate'].lower() != 'true':
-        file = str(Path(__file__).parents[1] / 'config' / 'real_robot.yaml')
-    clock = {'use_sim_time': said['use_sim_time'].lower() == 'true'}
-    return Node(
-        package='armid_ros',
-        executable=name,
-        namespace=said['namespace'],
-        parameters=[*([file] if file else []), clock, parameters],
-        remappings=list(topics.items()),
-        output='screen',
-        **more,
-    )
-
-
-def texts(said, *names):
-    """Return parameters that are texts, whatever they look like."""
-    return {name: ParameterValue(said[name], value_type=str) for name in names}
-
-
-def lists(said, name):
-    """Return a parameter that is a list of names, where there are any."""
-    values = [value.strip() for value in said[name].split(',') if value.strip()]
-    return {name: values} if values else {}

@@ -1,43 +1,34 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Identify online what a bag holds."""
+"""Identify online what a bag holds, save the estimate, and end with the bag."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
+from armid_ros.nodes.running.launching import Argument, described, node
+from launch.actions import Shutdown
+
+ARGUMENTS = (
+    Argument('bag', str, 'rosbag2 directory, .mcap or .db3 file', None),
+    Argument('robot', str, 'shipped name, URDF or xacro; empty: robot_description in the bag'),
+    Argument('gravity', str, 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
+    Argument('rate', float, 'bag time per real time'),
+    Argument('save_to', str, 'folder for the estimate; empty: online_identification'),
+    Argument('namespace', str, 'of the nodes and of the recorded topics of the robot'),
+    Argument('params_file', str, 'parameters of the nodes'),
+    Argument('use_sim_time', bool, 'follow /clock; empty: publish it from the bag'),
+)
 
 
 def generate_launch_description():
     """Describe what is started; `ros2 launch armid_ros replay.launch.py --show-args`."""
-    bag = ParameterValue(LaunchConfiguration('bag'), value_type=str)
-    robot = ParameterValue(LaunchConfiguration('robot'), value_type=str)
-    gravity = ParameterValue(LaunchConfiguration('gravity'), value_type=str)
-    rate = ParameterValue(LaunchConfiguration('rate'), value_type=float)
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument('bag', description='rosbag2 directory, .mcap or .db3 file'),
-            DeclareLaunchArgument(
-                'robot',
-                default_value='',
-                description='shipped name, URDF or xacro; empty: robot_description in the bag',
-            ),
-            DeclareLaunchArgument(
-                'gravity', default_value='earth', description='earth, moon, or x,y,z [m/s^2]'
-            ),
-            DeclareLaunchArgument(
-                'rate', default_value='1.0', description='bag time per real time'
-            ),
-            Node(
-                package='armid_ros',
-                executable='bag_player',
-                parameters=[{'bag': bag, 'rate': rate, 'clock_rate': 100.0}],
-            ),
-            Node(
-                package='armid_ros',
-                executable='online_identifier',
-                parameters=[{'robot': robot, 'gravity': gravity, 'use_sim_time': True}],
-            ),
-        ]
-    )
+    return described(ARGUMENTS, start)
+
+
+def start(given):
+    """Return the nodes."""
+    play = {name: given[name] for name in ('bag', 'rate') if name in given}
+    identify = {name: given[name] for name in ('robot', 'gravity', 'save_to') if name in given}
+    clock = {} if 'use_sim_time' in given else {'clock_rate': 100.0}
+    usual = {'use_sim_time': True, 'save_to': 'online_identification'}
+    return [
+        node(given, 'bag_player', play, clock, on_exit=Shutdown()),
+        node(given, 'online_identifier', identify, usual),
+    ]

@@ -120,7 +120,7 @@ class IdentificationResult(Shown):
 
     @property
     def misfit(self) -> Misfit:
-        """What the model leaves, with what the recordings tell of its parameters."""
+        """Return what the model leaves, with what the recordings tell of its parameters."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'

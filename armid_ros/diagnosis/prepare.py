@@ -70,7 +70,7 @@ class Prepared:
 
     @property
     def described(self) -> Evidence:
-        """The data in units of their noise in the residual of the arm as described."""
+        """Return the data in units of their noise in the residual of the arm as described."""
         return Evidence.over_noise(self.data, self.as_described)
 
     @property

@@ -38,6 +38,15 @@ EXECUTOR = NodeParameter(
     'at 1 kHz, but is experimental in Jazzy.',
     choices=('single', 'events'),
 )
+#: Parameters of every node.
+COMMON = (
+    EXECUTOR,
+    NodeParameter(
+        'end_with_parent',
+        False,
+        'End in order when the process that has started the node ends, as a launch by SIGTERM.',
+    ),
+)
 
 
 class ArmidNode(Node):
@@ -75,7 +84,7 @@ class ArmidNode(Node):
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
-        return (*self.table, EXECUTOR)
+        return (*self.table, *COMMON)
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], *args: Any, **more: Any
@@ -129,7 +138,7 @@ class ArmidNode(Node):
     def look_for_trouble(self) -> None:
         """Log once what keeps the node from its work: not everybody looks at /diagnostics."""
         trouble = '' if self.missing_clock else self.condition()[0]
-        if trouble and not self._trouble_said:
+        if trouble and not self._trouble_said and not self.complaints.has_logged(trouble):
             self.get_logger().info(trouble)
         self._trouble_said = bool(trouble)
 
@@ -151,7 +160,7 @@ class ArmidNode(Node):
 
     @property
     def activity(self) -> str:
-        """What the node does while all is well, in a word."""
+        """Return what the node does while all is well, in a word."""
         return 'running'
 
     @property

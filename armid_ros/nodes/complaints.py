@@ -56,6 +56,10 @@ class Complaints:
             said.add(text)
             self._logger.warning(text)
 
+    def has_logged(self, text: str) -> bool:
+        """Whether a text is in the log."""
+        return any(text in said for said in self._said.values())
+
     def defect(self, kind: str, error: Exception) -> None:
         """Count an input that led to an error which nobody had foreseen, and say where."""
         self.defects += 1

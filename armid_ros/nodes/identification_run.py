@@ -109,7 +109,8 @@ class IdentificationRunNode(ArmidNode):
         self._begun: list[str] = []
         self._farewells: list[Future] = []
         self._program: Any = None
-        self._done, self._failure, self._step = False, '', 'begins'
+        self._done, self._step = False, 'begins'
+        self._failure = self._refused = ''
         self._results: list[str] = []
         self._state: dict[str, str] = {}
         self._trigger_clients: dict[str, Client] = {}
@@ -150,7 +151,10 @@ class IdentificationRunNode(ArmidNode):
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say what is under way, and what has come of it."""
-        return self._failure, {'step': self._step, 'results': '; '.join(self._results)}
+        return self._failure or self._refused, {
+            'step': self._step,
+            'results': '; '.join(self._results),
+        }
 
     def close(self) -> None:
         """End the run, the recording and the program that are under way."""
@@ -235,10 +239,13 @@ class IdentificationRunNode(ArmidNode):
             future = self._call('publisher', service)
             yield f'{what} is planned', future.done
             answer = future.result()
+            self._refused = '' if answer.success else f'{what}: {answer.message}'
             if answer.success:
                 return
+            self.complaints.say('start', self._refused)
+            self.publish_diagnostics()
             if time.monotonic() > deadline:
-                raise TrajectoryError(f'{what}: {answer.message}')
+                raise TrajectoryError(self._refused)
             later = time.monotonic() + 1.0
             yield f'{what} is planned', lambda later=later: time.monotonic() > later
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import read_model
+from armid_ros.effects import Effect
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.change import Change
@@ -114,7 +115,7 @@ class OnlineIdentifierNode(ArmidNode):
         if identifier is None and self.value('robot'):
             identifier = make_identifier(self.value)
         if identifier is not None:
-            self._adopt(identifier)
+            self._begin(identifier)
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
         self.create_subscription(String, 'model', self._on_model, LATCHED)
@@ -289,12 +290,21 @@ class OnlineIdentifierNode(ArmidNode):
             self.complaints.say('robot_description', str(error))
             return
         self._description = message.data
-        self._adopt(identifier)
+        self._begin(identifier)
 
     def _on_model(self, message: String) -> None:
-        """Estimate the effects of a model from its values on, if it has others."""
+        """
+        Estimate the effects of a model from its values on, if it has others.
+
+        Effects of the parameters stay, as a model without friction is no reason to forget it.
+
+        """
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
+        kept = [e for e in self._own_effects if not any(_covers(m, e) for m in arm.effects)]
+        more = [e for e in arm.effects if not any(_covers(k, e) for k in kept)]
+        values = [before.arm.values_of(e) for e in kept] + [arm.values_of(e) for e in more]
+        arm = replace(arm, effects=(*kept, *more), values=tuple(values))
         if arm.effects != before.arm.effects:
             rng = np.random.default_rng(0)
             self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
@@ -345,6 +355,10 @@ class OnlineIdentifierNode(ArmidNode):
             message.header.stamp = self._last_sample_stamp
             publisher.publish(message)
 
+    def _begin(self, identifier: OnlineIdentifier) -> None:
+        self._own_effects = identifier.arm.effects
+        self._adopt(identifier)
+
     def _adopt(self, identifier: OnlineIdentifier) -> None:
         robot = identifier.arm.robot
         self.identifier = identifier
@@ -370,6 +384,10 @@ class OnlineIdentifierNode(ArmidNode):
         if self.identifier is None:
             raise IdentificationError('there is no robot yet: robot_description has not come')
         return self.identifier
+
+
+def _covers(one: Effect, other: Effect) -> bool:
+    return one.name == other.name and set(one.joints) >= set(other.joints)
 
 
 def main(args: Sequence[str] | None = None) -> None:

@@ -107,6 +107,7 @@ class RecorderNode(ArmidNode):
         self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
         self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
+        self._refused: dict[str, Sequence[str]] = {}  # types of topics that are not recorded
         self._held: list[tuple[Channel, bytes]] = []
         self._bags = 0
         self._count = 0
@@ -218,7 +219,12 @@ class RecorderNode(ArmidNode):
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say where the messages go and how many there are."""
-        trouble = f'nobody publishes {", ".join(self.missing)}' if self.missing else ''
+        refused = sorted(filter(self._is_wanted, self._refused))
+        absent = sorted(set(self.missing) - set(refused))
+        trouble = '; '.join(
+            [f'nobody publishes {", ".join(absent)}'] * bool(absent)
+            + [f'not recorded: {", ".join(refused)}'] * bool(refused)
+        )
         values: dict[str, object] = {
             'recording': int(self.recording),
             'messages': self.message_count,
@@ -241,7 +247,7 @@ class RecorderNode(ArmidNode):
 
     def _record(self, writer: BagWriter, topic: str, types: Sequence[str]) -> None:
         publishers = self.get_publishers_info_by_topic(topic)
-        if not publishers:
+        if not publishers or self._refused.get(topic) == types:
             return
         try:
             if len(types) > 1:
@@ -255,7 +261,9 @@ class RecorderNode(ArmidNode):
             )
         except ArmidError as error:
             self.complaints.say('topic', f'{topic} is not recorded: {error}')
+            self._refused[topic] = types
             return
+        self._refused.pop(topic, None)
         channel = Channel(topic, is_stamped(message_type))
         self._subscriptions_by_topic[topic] = MatchedSubscription(
             self, message_type, topic, partial(self._on_message, channel), raw=True

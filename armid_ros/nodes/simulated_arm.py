@@ -117,6 +117,7 @@ class SimulatedArmNode(ArmidNode):
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
         self.real_time = RealTime(self._elapsed, self.step)
+        self._owed = 0.0
         self._states = self.create_publisher(
             JointState,
             'joint_states',
@@ -220,7 +221,11 @@ class SimulatedArmNode(ArmidNode):
 
     def catch_up(self) -> None:
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
-        self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
+        self._owed += self.real_time.catch_up(self._factor, self._stride * self._arm.plant.dt)
+        # stamps become those of the computer again, but not amid a motion that is watched
+        if self._owed and self._clock_publisher is None and not self.moving:
+            self._origin_ns = (self._origin_ns or 0) + round(self._owed * 1e9)
+            self._owed = 0.0
 
     def follow_reference(self, reference: Reference) -> None:
         """
@@ -251,7 +256,7 @@ class SimulatedArmNode(ArmidNode):
         return trouble, {
             'simulated_time': self._arm.state.t,
             'moving': int(self.moving),
-            'behind_real_time': self.real_time.given_up,
+            'skipped_real_time': self.real_time.given_up,
         }
 
     def objection(self, values: Mapping[str, Any]) -> str:
@@ -271,8 +276,6 @@ class SimulatedArmNode(ArmidNode):
         if 'effects' in names:
             self._become(self._with_effects(self.value('effects')))
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
-            if self._clock_publisher is None:  # stamps are of now again
-                self._origin_ns = (self._origin_ns or 0) + round(self.real_time.given_up * 1e9)
             self.real_time.given_up = 0.0
             self._keep_pace()
         described = sensors_of(self.value, self._arm.plant.robot.n_joints)

@@ -114,7 +114,10 @@ class SimulatedPairNode(ArmidNode):
     def catch_up(self) -> None:
         """Move as far as real time has, times the factor; what cannot be made up is given up."""
         if not self.pair.fallen:
-            self.real_time.catch_up(self.value('real_time_factor'), 1.0 / self.value('rate'))
+            factor = self.value('real_time_factor')
+            skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
+            if factor == 1.0:  # stamps stay those of the computer
+                self._origin_ns += round(skipped * 1e9)
 
     def reset(self) -> str:
         """Put both back to where they began; time goes on."""
@@ -128,7 +131,7 @@ class SimulatedPairNode(ArmidNode):
         values = {
             'simulated_time': self.pair.t,
             'off_the_gait_deg': math.degrees(self.pair.deviation),
-            'behind_real_time': self.real_time.given_up,
+            'skipped_real_time': self.real_time.given_up,
         }
         if self.pair.fallen:
             return f'fell after {self.pair.t:.2f} s, as an open loop does: call ~/reset', values

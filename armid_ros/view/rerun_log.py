@@ -165,10 +165,15 @@ def shown(joints: Sequence[str], marked: Sequence[str] = ()) -> Any:
 
     first = [*marked, *(joint for joint in joints if joint not in marked)]
     tabs = layout.Tabs(
-        layout.Vertical(*plots('torque', first), name='torque'),
-        layout.Vertical(*plots('residual', first), name='residual'),
-        layout.Vertical(*plots('position', first), name='position'),
-        layout.Vertical(*plots('velocity', first), name='velocity'),
+        *(
+            layout.Vertical(*plots(kind, first), name=f'{kind} [{unit}]')
+            for kind, unit in (
+                ('torque', 'N m'),
+                ('residual', 'N m'),
+                ('position', 'rad'),
+                ('velocity', 'rad/s'),
+            )
+        )
     )
     arm = layout.Spatial3DView(origin='arm', name='arm')
     return layout.Blueprint(layout.Horizontal(arm, tabs), collapse_panels=True)

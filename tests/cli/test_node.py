@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Executables run the node of their name, and say in one line what is missing."""
 
+from importlib import import_module
 import os
 import subprocess
 import sys
@@ -30,6 +31,12 @@ def test_help_says_what_the_parameters_are_and_starts_nothing(monkeypatch, capsy
     ):
         assert f'\n  {parameter}:=' in said
     assert 'Attributes' not in said
+
+
+def test_help_names_the_executable_however_it_was_started(monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'argv', ['-c', '--help'])
+    import_module('armid_ros.nodes.recorder').main()
+    assert capsys.readouterr().out.startswith('Usage: recorder --ros-args')
 
 
 def without(module, root, lines, folder):

@@ -73,6 +73,9 @@ def test_build_installs_what_ros2_looks_for(built, root, request):
     libexec = install / 'armid_ros' / 'lib' / 'armid_ros'
     executables = {path.name for path in libexec.iterdir() if os.access(path, os.X_OK)}
     assert executables == {path.name for path in (root / 'scripts').iterdir()}
+    first = {(libexec / name).read_text().partition('\n')[0] for name in executables}
+    if built == 'install':  # the Python of the active environment, which has what pip installed
+        assert first <= {'#!/usr/bin/env python3', '#!/bin/sh'}
 
 
 def test_sourced_workspace_is_what_python_imports(install):

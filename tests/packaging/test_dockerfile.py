@@ -18,7 +18,9 @@ def test_what_it_names_in_the_tree_is_there(root):
     text = (root / 'Dockerfile').read_text()
     for path in re.findall(r'src/armid_ros/([\w./]+)', text):
         assert (root / path).exists(), path
-    assert (root / 'docker' / 'enter.sh').stat().st_mode & 0o111 == 0o111
+    for script in (root / 'docker').iterdir():
+        assert script.stat().st_mode & 0o111 == 0o111
+        assert subprocess.run(['bash', '-n', script]).returncode == 0
 
 
 def test_nothing_that_was_built_goes_into_the_image(root):

@@ -27,6 +27,7 @@ from builtin_interfaces.msg import Time
 from control_msgs.action import FollowJointTrajectory
 import numpy as np
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import GoalEvent
 from scipy.interpolate import BPoly
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -93,6 +94,9 @@ class Goal:
         how, code, text = self.result
 
         def finish(handle):
+            if how == 'canceled' and not handle.is_cancel_requested:
+                # rclcpp_action, ~ServerGoalHandle: cancelled although nobody asked for it
+                handle._update_state(GoalEvent.CANCEL_GOAL)
             getattr(handle, how)()
             return Result(error_code=code, error_string=text)
 

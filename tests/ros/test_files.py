@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-import ast
 from importlib import import_module
 import json
 from pathlib import Path
 import re
 from xml.etree import ElementTree
 
-from armid_ros.nodes.base import EXECUTOR
+from armid_ros.nodes.base import COMMON
 from armid_ros.robots import load_robot
 import pytest
 import yaml
@@ -20,7 +19,7 @@ from docsite.nodes import NODES
 
 ROOT = Path(__file__).parents[2]
 TABLES = {
-    name: {parameter.name: parameter for parameter in (*node.table, EXECUTOR)}
+    name: {parameter.name: parameter for parameter in (*node.table, *COMMON)}
     for name, node in NODES.items()
 }
 
@@ -43,30 +42,6 @@ def test_parameter_files_hold_parameters_of_the_right_type(path):
         for name, value in content['ros__parameters'].items():
             assert type(value) is type(table[name].default), name
             assert not table[name].objection(value)
-
-
-PLAIN = [path for path in sorted((ROOT / 'launch').glob('*.py')) if path.stem[:8] != 'identify']
-
-
-@pytest.mark.parametrize('path', PLAIN, ids=lambda p: p.name)
-def test_launch_files_start_nodes_with_parameters_they_have(path):
-    tree = ast.parse(path.read_text())
-    calls = [call for call in ast.walk(tree) if isinstance(call, ast.Call)]
-    started = [c for c in calls if getattr(c.func, 'id', '') == 'Node']
-    assert started
-    for call in started:
-        given = {keyword.arg: keyword.value for keyword in call.keywords}
-        assert given['package'].value == 'armid_ros'
-        table = TABLES[given['executable'].value]
-        for key in (k.value for d in given['parameters'].elts for k in d.keys):
-            assert key in table or key == 'use_sim_time', key
-    declared = {
-        c.args[0].value: c for c in calls if getattr(c.func, 'id', '') == 'DeclareLaunchArgument'
-    }
-    used = {c.args[0].value for c in calls if getattr(c.func, 'id', '') == 'LaunchConfiguration'}
-    assert used == set(declared)
-    for call in declared.values():
-        assert any(k.arg == 'description' for k in call.keywords)
 
 
 def test_layouts_show_joints_of_the_shipped_arm():

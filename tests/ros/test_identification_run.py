@@ -11,6 +11,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.nodes.identification_run import IdentificationRunNode
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.recording import read_recording
+from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 
 from tests.ros.controller import Controller
@@ -160,6 +161,20 @@ def test_nodes_that_do_not_come_up_are_named(bench, tmp_path):
     run = bench.add(IdentificationRunNode, Programs(), save_to=str(tmp_path), patience=1.0)
     bench.spin_until(lambda: run.finished, 'the end')
     assert run.failure == '/excitation_publisher and /recorder did not come up'
+
+
+def test_a_start_that_is_refused_is_in_log_and_status_at_once(bench, arm, excitation, tmp_path):
+    rosout, diagnostics = bench.rosout(), bench.diagnostics()
+    _, run = everything(bench, arm, excitation, tmp_path, Programs(), runs=1)
+    bench.tick(round(1e9 * (arm.now + 10.0)))  # the last joint state is old by now
+    bench.spin_until(lambda: run.complaints.counts.get('start', 0) > 1, 'two refusals')
+    run.look_for_trouble()
+    bench.settle()
+    status = next(s for d in diagnostics for s in d.status if 'run 1' in s.message)
+    assert status.level == DiagnosticStatus.WARN
+    assert 's ago' in status.message
+    assert sum(status.message in message.msg for message in rosout) == 1
+    assert run.condition()[0] == status.message
 
 
 def test_a_node_that_is_ended_stops_the_arm_and_the_recording(bench, arm, excitation, tmp_path):

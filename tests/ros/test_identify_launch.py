@@ -1,82 +1,36 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-One launch file has an arm identified, and ends.
-
-The package launch has no wheel; what the file uses of it stands in here, and takes the values
-that launch would take.
-
-"""
+"""One launch file has an arm identified, and ends."""
 
 from __future__ import annotations
 
 import json
 import os
 from pathlib import Path
-import runpy
 import subprocess
 import sys
-from types import ModuleType, SimpleNamespace
 
 from armid_ros.excitation import save_excitation
+from armid_ros.recording import topics
 import pytest
 import yaml
 
+from tests.ros.launching import declared, LAUNCH, launched, modules
 from tests.ros.test_files import TABLES
 from tests.ros.test_processes import short_excitation
 
-FILE = Path(__file__).parents[2] / 'launch' / 'identify.launch.py'
-CONFIG = FILE.parents[1] / 'config' / 'real_robot.yaml'
+CONFIG = LAUNCH.parent / 'config' / 'real_robot.yaml'
 
 
-def stand_in():
-    """Return modules that keep what they are called with."""
-
-    def keep(*args, **named):
-        return SimpleNamespace(args=args, **named)
-
-    class LaunchConfiguration:
-        """An argument by name, in a context that is a mapping."""
-
-        def __init__(self, name):
-            self._name = name
-
-        def perform(self, context):
-            return context[self._name]
-
-    names = {
-        'launch': {'LaunchDescription': list},
-        'launch.actions': dict.fromkeys(
-            ('DeclareLaunchArgument', 'OpaqueFunction', 'Shutdown'), keep
-        ),
-        'launch.substitutions': {'LaunchConfiguration': LaunchConfiguration},
-        'launch_ros': {},
-        'launch_ros.actions': {'Node': keep},
-        'launch_ros.parameter_descriptions': {
-            'ParameterValue': lambda value, value_type: value_type(value)
-        },
-    }
-    modules = {}
-    for name, content in names.items():
-        modules[name] = ModuleType(name)
-        vars(modules[name]).update(content)
-    return modules
-
-
-@pytest.fixture
-def launched(monkeypatch):
-    """Return what makes the nodes that a launch with arguments starts, by executable."""
-    for name, module in stand_in().items():
+@pytest.fixture(autouse=True)
+def launch(monkeypatch):
+    """Let launch files import the double of launch."""
+    for name, module in modules().items():
         monkeypatch.setitem(sys.modules, name, module)
-    (*declared, function) = runpy.run_path(str(FILE))['generate_launch_description']()
 
-    def launch(**arguments):
-        context = {one.args[0]: one.default_value for one in declared} | arguments
-        assert context.keys() == {one.args[0] for one in declared}
-        return {node.executable: node for node in function.function(context)}
 
-    launch.declared = {one.args[0]: one for one in declared}
-    return launch
+def identify(**arguments):
+    return launched('identify', **arguments)
 
 
 def parameters(node):
@@ -99,11 +53,11 @@ def parameters(node):
     ],
     ids=['robot', 'simulated', 'torque elsewhere'],
 )
-def test_every_node_gets_parameters_that_it_has(launched, arguments):
-    nodes = launched(robot='ur10.urdf', namespace='left', **arguments)
+def test_every_node_gets_parameters_that_it_has(arguments):
+    nodes = identify(robot='ur10.urdf', namespace='left', **arguments)
     for name, node in nodes.items():
         assert node.package == 'armid_ros'
-        assert node.namespace == 'left'
+        assert node.namespace == '/left'
         for key, value in parameters(node).items():
             if key == 'use_sim_time':
                 continue
@@ -111,21 +65,21 @@ def test_every_node_gets_parameters_that_it_has(launched, arguments):
             assert not TABLES[name][key].objection(value)
 
 
-def test_every_argument_is_described_and_robot_alone_is_asked_for(launched):
-    assert all(one.description for one in launched.declared.values())
-    asked = [name for name, one in launched.declared.items() if one.default_value is None]
-    assert asked == ['robot']
-    before = {k: (v.parameters, v.remappings) for k, v in launched(robot='a').items()}
-    for name, one in launched.declared.items():
-        other = {'true': 'false', 'false': 'true'}.get(one.default_value, '7')
-        nodes = launched(**{'robot': 'a', name: other})
+def test_every_argument_has_an_effect_and_the_robot_has_to_be_known():
+    with pytest.raises(RuntimeError, match='robot is missing'):
+        identify()
+    before = {k: (v.parameters, v.remappings) for k, v in identify(robot='a').items()}
+    for one in declared('identify'):
+        other = {'diagnose': 'false', 'rehearse': 'true', 'simulate': 'true'}.get(one.name, '7')
+        if one.name in ('namespace', 'params_file', 'use_sim_time'):
+            continue
+        nodes = identify(**{'robot': 'a', one.name: other})
         after = {k: (v.parameters, v.remappings) for k, v in nodes.items()}
-        spaced = {node.namespace for node in nodes.values()} != {''}
-        assert after != before or spaced, name
+        assert after != before, one.name
 
 
-def test_the_arm_begins_when_the_node_asks_and_all_end_with_it(launched, tmp_path):
-    nodes = launched(robot='arm.urdf', save_to=str(tmp_path), effects='a,b', controller='jtc')
+def test_the_arm_begins_when_the_node_asks_and_all_end_with_it(tmp_path):
+    nodes = identify(robot='arm.urdf', save_to=str(tmp_path), effects='a,b', controller='jtc')
     assert parameters(nodes['excitation_publisher'])['start'] is False
     assert parameters(nodes['recorder'])['record'] is False
     assert parameters(nodes['recorder'])['bag'] == str(tmp_path / 'run')
@@ -135,14 +89,14 @@ def test_the_arm_begins_when_the_node_asks_and_all_end_with_it(launched, tmp_pat
         ['a', 'b'],
         'arm.urdf',
     )
-    assert hasattr(nodes['identification_run'], 'on_exit')
+    assert nodes['identification_run'].on_exit
     assert nodes['excitation_publisher'].parameters[0] == str(CONFIG)
     remapped = dict(nodes['excitation_publisher'].remappings)
     assert remapped['joint_trajectory'] == 'jtc/joint_trajectory'
 
 
-def test_torque_from_elsewhere_is_what_everybody_hears(launched):
-    nodes = launched(robot='arm.urdf', effort_topic='currents', joint_states='arm/joint_states')
+def test_torque_from_elsewhere_is_what_everybody_hears():
+    nodes = identify(robot='arm.urdf', effort_topic='currents', joint_states='arm/joint_states')
     merged = 'joint_state_merger/joint_states'
     assert merged in parameters(nodes['recorder'])['topics']
     for name in ('excitation_publisher', 'online_identifier'):
@@ -151,18 +105,9 @@ def test_torque_from_elsewhere_is_what_everybody_hears(launched):
 
 
 @pytest.mark.slow
-def test_it_ends_by_itself_with_the_result_saved(bench, launched, tmp_path):
-    """As `ros2 launch ... simulate:=true`, each node a process, but with an arm that is quick."""
+def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_path):
+    """As two `ros2 launch ... simulate:=true`, each node a process, with arms that are quick."""
     save_excitation(short_excitation(), tmp_path / 'run.yaml')
-    nodes = launched(
-        robot='humanoid_arm',
-        namespace='left',
-        simulate='true',
-        file=str(tmp_path / 'run.yaml'),
-        save_to=str(tmp_path / 'result'),
-        runs='1',
-        diagnose='false',
-    )
     environment = {
         **os.environ,
         'ROS_DOMAIN_ID': str(bench.context.get_domain_id()),
@@ -170,30 +115,39 @@ def test_it_ends_by_itself_with_the_result_saved(bench, launched, tmp_path):
         'PYTHONPATH': os.pathsep.join(p for p in sys.path if p),
     }
     running = {}
-    for name, node in nodes.items():
-        file = tmp_path / f'{name}.yaml'
-        content = {'/**': {'ros__parameters': parameters(node)}}
-        file.write_text(yaml.safe_dump(content))
-        command = [sys.executable, '-m', f'armid_ros.nodes.{name}', '--ros-args']
-        command += ['--params-file', str(file), '-r', f'__ns:=/{node.namespace}']
-        for pair in node.remappings:
-            command += ['-r', ':='.join(pair)]
-        with (tmp_path / f'{name}.log').open('w') as output:
-            running[name] = subprocess.Popen(
-                command, env=environment, stdout=output, stderr=subprocess.STDOUT
-            )
+    for arm in ('left', 'right'):
+        folder = tmp_path / arm
+        folder.mkdir()
+        nodes = identify(
+            robot='humanoid_arm',
+            namespace=arm,
+            simulate='true',
+            file=str(tmp_path / 'run.yaml'),
+            save_to=str(folder / 'result'),
+            runs='1',
+        )
+        for name, node in nodes.items():
+            command = [sys.executable, '-m', f'armid_ros.nodes.{name}', *node.arguments(folder)]
+            with (folder / f'{name}.log').open('w') as output:
+                running[arm, name] = subprocess.Popen(
+                    command, env=environment, stdout=output, stderr=subprocess.STDOUT
+                )
     try:
-        assert running.pop('identification_run').wait(300) == 0, (
-            tmp_path / 'identification_run.log'
-        ).read_text()
+        for arm in ('left', 'right'):
+            log = tmp_path / arm / 'identification_run.log'
+            assert running.pop((arm, 'identification_run')).wait(300) == 0, log.read_text()
     finally:
         for process in running.values():
             process.terminate()
-        codes = {name: process.wait(60) for name, process in running.items()}
-    assert set(codes.values()) == {0}
-    folder = tmp_path / 'result' / 'identification'
-    result = json.loads((folder / 'identification.json').read_text())
-    assert result['robot'] == 'humanoid_arm'
-    assert (folder / 'report.html').is_file()
-    assert (tmp_path / 'result' / 'live' / 'estimate.yaml').is_file()
-    assert 'identify: ' in (tmp_path / 'identification_run.log').read_text()
+        codes = {process.wait(60) for process in running.values()}
+    assert codes == {0}
+    for arm in ('left', 'right'):
+        folder = tmp_path / arm / 'result'
+        result = json.loads((folder / 'identification' / 'identification.json').read_text())
+        assert result['robot'] == 'humanoid_arm'
+        assert (folder / 'identification' / 'report.html').is_file()
+        diagnosis = json.loads((folder / 'diagnosis' / 'diagnosis.json').read_text())
+        assert diagnosis['verdict']
+        assert (folder / 'live' / 'estimate.yaml').is_file()
+        names = {topic.name for topic in topics(folder / 'run')}
+        assert names and all(name.startswith(f'/{arm}/') for name in names)

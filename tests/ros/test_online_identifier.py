@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm import ArmModel
-from armid_ros.arm.model_file import load_model
+from armid_ros.arm.model_file import load_model, model_text
 from armid_ros.effects import parse_effect
 from armid_ros.errors import OutputError
 from armid_ros.identification.online.identifier import OnlineIdentifier
@@ -137,6 +137,21 @@ def test_joints_are_matched_by_name_and_others_left_out(bench, arm, samples, exp
     )
 
 
+@pytest.mark.parametrize('columns', [slice(None), [1]], ids=['all', 'one'])
+def test_velocities_that_are_not_numbers_are_absent(bench, arm, samples, expected, columns):
+    """The joint state broadcaster fills what has no state interface with NaN."""
+    node = identifying(bench)
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    t, q, dq, tau = samples
+    dq = dq.copy()
+    dq[:, columns] = np.nan
+    publish(bench, node, publisher, messages(arm, (t, q, dq, tau)))
+    np.testing.assert_allclose(
+        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
+    )
+    assert not node.complaints.latest
+
+
 @pytest.mark.parametrize(
     ('clock', 'said'), [(1004.0, ''), (4600.0, 'behind'), (400.0, 'ahead of')]
 )
@@ -254,6 +269,32 @@ def test_predictions_and_residuals_add_up_to_the_torque(bench, arm, samples):
     assert residuals[-1].header == predictions[-1].header
     late = np.array([r.effort for r in residuals[-500:]])
     assert np.sqrt(np.mean(late**2)) < 0.02 * np.sqrt(np.mean(samples[3] ** 2))
+
+
+@pytest.mark.parametrize(
+    ('effects', 'expected'),
+    [
+        ((), ['viscous_friction']),
+        (('viscous_friction@elbow:viscous_coefficient=1',), ['viscous_friction']),
+        (('viscous_friction:viscous_coefficient=1',), ['viscous_friction']),
+        (('torque_offset',), ['viscous_friction', 'torque_offset']),
+    ],
+)
+def test_a_model_leaves_the_effects_of_the_parameters(bench, arm, effects, expected):
+    node = identifying(bench)
+    before = node.identifier
+    publisher = bench.matched_publisher(String, 'model', LATCHED)
+    publisher.publish(
+        String(data=model_text(ArmModel.of(arm.robot, effects=list(effects)), 'pendulum'))
+    )
+    bench.settle()
+    found = node.identifier.arm.effects
+    assert [effect.name for effect in found] == expected
+    assert all(effect.joints == arm.robot.joints for effect in found)
+    assert (node.identifier is before) is (expected == ['viscous_friction'])
+    publisher.publish(String(data=model_text(ArmModel(arm.robot), 'pendulum')))
+    bench.settle()
+    assert node.identifier.arm.effects == before.arm.effects
 
 
 def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected):

@@ -13,11 +13,12 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import Excitation, Limits, random_feasible, save_excitation
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.recording import read_recording
+from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from tests.ros.controller import Controller
@@ -55,8 +56,11 @@ class Processes:
         return self.run(node, '--ros-args', *(part for p in parameters for part in ('-p', p)))
 
     def run(self, node, *arguments):
+        return self.run_command([sys.executable, '-m', f'armid_ros.nodes.{node}', *arguments])
+
+    def run_command(self, command):
         process = subprocess.Popen(
-            [sys.executable, '-m', f'armid_ros.nodes.{node}', *arguments],
+            command,
             env=self._environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -86,6 +90,22 @@ def processes(bench):
         if process.poll() is None:
             process.kill()
             process.communicate()
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL])
+def test_a_node_ends_in_order_with_the_process_that_started_it(bench, processes, tmp_path, number):
+    """As the nodes of a launch that gets SIGTERM, which it does not pass on."""
+    bag = tmp_path / 'bag'
+    node = (sys.executable, '-m', 'armid_ros.nodes.recorder', '--ros-args')
+    node += ('-p', f'bag:={bag}', '-p', 'topics:=[text]', '-p', 'end_with_parent:=true')
+    code = f'import subprocess; subprocess.run({node!r})'
+    launch = processes.run_command([sys.executable, '-c', code])
+    publisher = bench.matched_publisher(String, 'text', LATCHED)
+    publisher.publish(String(data='one'))
+    launch.send_signal(number)
+    bench.spin_until((bag / 'metadata.yaml').is_file, 'the end of the bag')
+    assert [topic.count for topic in topics(bag)] == [1]
+    launch.communicate(timeout=PATIENCE)  # until the node has let go of its output
 
 
 def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_path):

@@ -14,8 +14,9 @@ from builtin_interfaces.msg import Time
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Empty, String
 
 SECOND = 10**9
 JOINTS = ('a', 'b')
@@ -64,6 +65,38 @@ def test_without_names_all_topics_are_recorded_those_that_come_later_too(bench, 
     found = {topic.name: topic.count for topic in topics(tmp_path / 'bag')}
     assert found['/joint_states'] == 1 and found['/namespace/text'] == 1
     assert '/rosout' in found
+
+
+@pytest.mark.parametrize(
+    'error', [None, UnsupportedTypeSupport('std_msgs'), OSError('libx.so: no such file')]
+)
+@pytest.mark.parametrize('late', [False, True])
+def test_a_type_that_cannot_be_loaded_costs_its_topic_alone(
+    bench, tmp_path, monkeypatch, error, late
+):
+    """As the type support of a package that is built for another system."""
+
+    def load():
+        if error is not None:
+            raise error
+
+    publishers = [bench.probe.create_publisher(t, t.__name__, 10) for t in (Empty, String)]
+    monkeypatch.setattr(type(Empty), '_TYPE_SUPPORT', None)
+    monkeypatch.setattr(type(Empty), '__import_type_support__', load)
+    recorder = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), record=not late)
+    if late:
+        recorder.start()
+    bench.spin_until(publishers[1].get_subscription_count, 'the recorder')
+    for _ in range(3):
+        recorder.look()
+    publishers[1].publish(String(data='there'))
+    bench.settle()
+    said = recorder.condition()[0]
+    recorder.close()
+    found = {topic.name: topic.count for topic in topics(tmp_path / 'bag')}
+    assert found['/String'] == 1 and '/Empty' not in found
+    assert recorder.complaints.counts['topic'] == 1
+    assert '/Empty' in said and '/String' not in said
 
 
 def test_start_and_stop_make_one_bag_each_time(bench, tmp_path):

@@ -73,7 +73,7 @@ class Prior:
 
     @cached_property
     def of_change(self) -> NormalEquations:
-        """Normal equations of a change of the r base parameters."""
+        """Return the normal equations of a change of the r base parameters."""
         return NormalEquations.of_rows(self.columns, self.residual)
 
     def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:

@@ -70,7 +70,7 @@ class Evidence:
 
     @cached_property
     def count(self) -> FloatArray:
-        """Number of informative rows of each joint, shape (n,)."""
+        """Return the number of informative rows of each joint, shape (n,)."""
         parts = [part.informative.sum(axis=0) for part in self.data]
         return np.asarray(np.sum(parts, axis=0, dtype=float))
 

@@ -132,7 +132,7 @@ class Explanation:
 
     @cached_property
     def beside_discrepancy(self) -> Explanation:
-        """The same names fitted beside the model discrepancy; itself where there is none."""
+        """Return the names fitted with the model discrepancy; itself where there is none."""
         return self if self.beside is None else self.in_arm(self.beside)
 
     @property

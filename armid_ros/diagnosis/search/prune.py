@@ -92,7 +92,7 @@ class View:
 
     @property
     def fitted_columns(self) -> int:
-        """Number of the columns that were fitted."""
+        """Return the number of the columns that were fitted."""
         return int(self.fitted.columns[0].shape[2])
 
     def columns(self, name: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -211,7 +211,7 @@ class Retrial:
 
     @cached_property
     def reference(self) -> Fitted:
-        """The arm with nothing named."""
+        """Return the arm with nothing named."""
         return self.fitted((), None)
 
     @cached_property

@@ -165,12 +165,12 @@ class Trial:
 
     @property
     def freedom(self) -> float:
-        """Number of values that the data determine; those that the prior holds count in part."""
+        """Return the number of values that the data determine; the prior holds some in part."""
         return float(self.resolution.sum())
 
     @cached_property
     def deviation(self) -> FloatArray:
-        """Standard deviations of the values, for noise of any colour (jackknife), shape (p,)."""
+        """Return the standard deviations of the values, coloured noise included, shape (p,)."""
         coloured = jackknife(self.values, self.std, self.fold_values, self.fold_std)
         return np.asarray(np.sqrt(self.std**2 + coloured))
 
@@ -211,7 +211,7 @@ class Trial:
 
     @property
     def replicated(self) -> int:
-        """Number of folds with a gain."""
+        """Return the number of folds with a gain."""
         return int(np.sum(np.bincount(self.fold, self.gains) > 0.0))
 
     def left_out(

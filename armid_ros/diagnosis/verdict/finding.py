@@ -102,7 +102,7 @@ class Finding:
 
     @property
     def had(self) -> tuple[float, ...]:
-        """What each value is added to; zero where none is known."""
+        """Return what each value is added to; zero where none is known."""
         return self.added_to or (0.0,) * len(self.values)
 
     @property

@@ -261,7 +261,7 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     size = np.sqrt(np.diag(information).clip(PRIOR_STD**-2))
     ridge = _RIDGE * np.eye(len(size))
     yield
-    triangle = linalg.cholesky(information / np.outer(size, size) + ridge)
+    triangle = _triangle(information / np.outer(size, size) + ridge)
     inverse = linalg.solve_triangular(triangle, np.eye(len(size)))
     root = inverse / size[:, np.newaxis]
     covariance = root @ root.T
@@ -290,6 +290,17 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     known = all_shares**2 / uncertain.clip(_SMALLEST)
     student = stats.t.ppf(_LEVEL, np.maximum(known, _FEWEST))
     return half, student / stats.norm.ppf(_LEVEL)
+
+
+def _triangle(information: FloatArray) -> FloatArray:
+    """Return R of R^T R; eigenvalues that rounding has taken below the ridge are the ridge."""
+    try:
+        return np.asarray(linalg.cholesky(information))
+    except linalg.LinAlgError:
+        sizes, vectors = np.linalg.eigh(information)
+        root = np.sqrt(sizes.clip(_RIDGE))[:, np.newaxis] * vectors.T
+        triangle = np.linalg.qr(root, mode='r')
+        return np.asarray(np.where(np.diag(triangle) < 0.0, -1.0, 1.0)[:, np.newaxis] * triangle)
 
 
 def _each_joint(

@@ -10,6 +10,7 @@ import sys
 from typing import Any
 
 from armid_ros.errors import RecordingError
+from rclpy.type_support import check_for_type_support
 
 
 def message_class(type_name: str) -> type[Any]:
@@ -19,16 +20,19 @@ def message_class(type_name: str) -> type[Any]:
     Raises
     ------
     RecordingError
-        Its package is not installed, or has no such message.
+        Its package is not installed, has no such message, or cannot be loaded.
 
     """
     package, _, name = type_name.partition('/msg/')
     try:
-        return getattr(import_module(f'{package}.msg'), name)  # type: ignore[no-any-return]
-    except (ImportError, AttributeError) as error:
+        message_type: type[Any] = getattr(import_module(f'{package}.msg'), name)
+        check_for_type_support(message_type)
+    except Exception as error:  # a package that is built for another system raises anything
         raise RecordingError(
-            f"type {type_name} is not available: install or source the package '{package}'"
+            f'type {type_name} is not available ({error}): install or source the package '
+            f"'{package}'"
         ) from error
+    return message_type
 
 
 def is_stamped(message_type: type[Any]) -> bool:

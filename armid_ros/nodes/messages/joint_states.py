@@ -107,7 +107,9 @@ class JointStateReader:
             q = self._values(message.names, message.position, 'position')
             dq = None
             if len(message.velocity):
-                dq = self._values(message.names, message.velocity, 'velocity')
+                dq = self._ordered(message.names, message.velocity, 'velocity')
+                # a broadcaster fills the velocities of a hardware that has none with NaN
+                dq = dq if math.isfinite(np.add.reduce(dq)) else None
             tau = self._values(message.names, message.effort, 'effort')
         except RecordingError as error:
             self._complaints.say('joint_states', str(error))
@@ -172,13 +174,16 @@ class JointStateReader:
         joints = self._joints.joints
         return joints if self._merger is None else tuple(joints[k] for k in self._some)
 
-    def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
+    def _ordered(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
         if len(field) != len(names):
             hint = '; identification needs measured torque' if name == 'effort' else ''
             raise RecordingError(
                 f'joint states with {len(names)} names but {len(field)} of {name}{hint}'
             )
-        values = field[self._order]
+        return field[self._order]
+
+    def _values(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
+        values = self._ordered(names, field, name)
         # one sum instead of isfinite; joints left out may well be NaN
         if not math.isfinite(np.add.reduce(values)) and not np.all(np.isfinite(values)):
             joint = self._wanted[int(np.argmin(np.isfinite(values)))]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import faulthandler
+import os
 from pathlib import Path
 import signal
 import sys
@@ -58,10 +59,15 @@ class _Ending:
     """
 
     def __init__(self) -> None:
-        self.asked = False
-        self._at_once = False
+        self._asked = self._at_once = self.with_parent = False
+        self._parent = os.getppid()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
+
+    @property
+    def due(self) -> bool:
+        """Whether the process is to end, also as its parent has where it goes with that."""
+        return self._asked or (self.with_parent and os.getppid() != self._parent)
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
@@ -73,7 +79,7 @@ class _Ending:
             self._at_once = False
 
     def _on_signal(self, *_: object) -> None:
-        self.asked = True
+        self._asked = True
         if self._at_once:
             self._at_once = False  # `ros2 launch` sends a second one
             raise _EndedAtOnce
@@ -95,7 +101,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
 
     """
     if isinstance(make_node, type) and is_asked_for(sys.argv[1:] if args is None else args):
-        print(usage(Path(sys.argv[0]).name, make_node))
+        print(usage(make_node))
         return
     node: ArmidNode | None = None
     trouble: list[str] = []
@@ -106,8 +112,9 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
             node = _made(make_node, args)
         executor = make_executor(node.value('executor'))
         executor.add_node(node)
+        ending.with_parent = node.value('end_with_parent')
         with steady():
-            while rclpy.ok() and not (node.finished or ending.asked or hung_up):
+            while rclpy.ok() and not (node.finished or ending.due or hung_up):
                 executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: else it hangs
     except (_EndedAtOnce, ExternalShutdownException):
         pass

@@ -10,7 +10,7 @@ import time
 #: Longest stretch of work before services are answered, and backlog that is given up [s].
 _BURST = 0.005
 _BACKLOG = 0.2
-#: Time behind the clock of the computer from which on it is said [s]; a start may take as long.
+#: Time skipped from which on it is said [s]; a start may take as long.
 _BEHIND = 0.5
 
 
@@ -48,7 +48,7 @@ class RealTime:
         """Go on from now; what was given up is kept."""
         self._anchor = self._clock(), self._elapsed()
 
-    def catch_up(self, factor: float, period: float) -> None:
+    def catch_up(self, factor: float, period: float) -> float:
         """
         Move as far as real time has, times a factor; what cannot be made up is given up.
 
@@ -59,6 +59,11 @@ class RealTime:
         period : float
             What a step takes the simulation further by [s]; one that takes it nowhere ends it.
 
+        Returns
+        -------
+        float
+            Real time that is given up now [s].
+
         """
         now = self._clock()
         due = self._anchor[1] + (now - self._anchor[0]) * factor
@@ -67,14 +72,16 @@ class RealTime:
             self._step()
             if self._elapsed() <= before:
                 self.begin()
-                return
+                return 0.0
         behind = (due - self._elapsed()) / factor
-        if behind > _BACKLOG:
-            self.given_up += behind
-            self.begin()
+        if behind <= _BACKLOG:
+            return 0.0
+        self.given_up += behind
+        self.begin()
+        return behind
 
     def trouble(self, advice: str) -> str:
-        """Say how far it is behind, and what to do; empty where it keeps up."""
+        """Say how much was skipped, and what to do; empty where it keeps up."""
         if self.given_up <= _BEHIND:
             return ''
-        return f'{self.given_up:.1f} s behind real time: {advice}'
+        return f'{self.given_up:.1f} s of real time were skipped: {advice}'

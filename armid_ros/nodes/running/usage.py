@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import inspect
+from pathlib import Path
 import textwrap
 
-from armid_ros.nodes.base import ArmidNode, EXECUTOR
+from armid_ros.nodes.base import ArmidNode, COMMON
 from armid_ros.nodes.parameters.table import NodeParameter
 
 _WIDTH = 99
@@ -20,24 +21,23 @@ def is_asked_for(args: Sequence[str]) -> bool:
     return bool({'-h', '--help'} & set(own))
 
 
-def usage(program: str, node: type[ArmidNode]) -> str:
+def usage(node: type[ArmidNode]) -> str:
     """
     Return what a node is for, and its parameters.
 
     Parameters
     ----------
-    program : str
-        Name of the executable.
     node : type
-        Class of the node.
+        Class of the node, in the module that is named as its executable.
 
     """
+    program = Path(inspect.getfile(node)).stem
     purpose = inspect.getdoc(node) or ''
     parts = [
         f'Usage: {program} --ros-args -p NAME:=VALUE ... -r TOPIC:=OTHER_TOPIC ...',
         purpose.partition('\nAttributes\n')[0].strip(),
         'Parameters, with their defaults:',
-        '\n'.join(_line(parameter) for parameter in (*node.table, EXECUTOR)),
+        '\n'.join(_line(parameter) for parameter in (*node.table, *COMMON)),
     ]
     return '\n\n'.join(parts)
 

@@ -52,6 +52,23 @@ def test_residuals_are_those_of_the_latest_estimate():
     np.testing.assert_allclose(covariances[0], np.linalg.inv(root.T @ root), rtol=0.3, atol=3e-5)
 
 
+@pytest.mark.parametrize('seed', range(70, 80))
+def test_changes_of_what_is_hardly_excited_leave_a_covariance(seed):
+    """What rounding takes of the information when values are reopened is restored."""
+    rng = np.random.default_rng(seed)
+    size, rank = 12, rng.integers(2, 8)
+    scores = RobustCovariance(16, 0.99)
+    basis, scale = rng.normal(size=(rank, size)), 10.0 ** rng.uniform(-3, 3, size)
+    for k in range(400):
+        rows = rng.normal(size=(2, rank)) @ basis * scale
+        scores.add(rows, rng.normal(size=2), rng.normal(size=size))
+        if k % 50 == 40:
+            chosen = rng.choice(size, rng.integers(1, 6), replace=False)
+            scores.reopen(np.eye(size)[:, chosen], rng.normal(size=size))
+    covariance = scores.covariance(np.diag(scale))
+    assert np.all(np.isfinite(covariance)) and np.all(np.diag(covariance) >= 0.0)
+
+
 def test_after_a_change_the_noise_is_still_known():
     """The torques before do not fit the parameters now; that is no noise."""
     rng = np.random.default_rng(3)

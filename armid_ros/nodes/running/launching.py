@@ -1,0 +1,171 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Launch files: arguments that count only where they are given, and nodes that take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+import re
+from typing import Any, NamedTuple
+
+import yaml
+
+
+class Argument(NamedTuple):
+    """
+    An argument of a launch file.
+
+    Attributes
+    ----------
+    name, description : str
+        For `ros2 launch --show-args`.
+    kind : type
+        str, bool, int, float, or list for names with commas.
+    default : str or None
+        Text where none is given: empty for what is left to parameter files and nodes. None: it
+        has to be given.
+
+    """
+
+    name: str
+    kind: type
+    description: str
+    default: str | None = ''
+
+    def read(self, text: str) -> Any:
+        """Return the value of a text; RuntimeError, with the argument, where it is none."""
+        try:
+            if self.kind is list:
+                return [part.strip() for part in text.split(',') if part.strip()]
+            if self.kind is bool:
+                return {'true': True, 'false': False}[text.lower()]
+            return self.kind(text)
+        except (KeyError, ValueError):
+            kind = self.kind.__name__
+            raise RuntimeError(f"{self.name}:={text} is not of type '{kind}'") from None
+
+
+def described(
+    arguments: Sequence[Argument], start: Callable[[dict[str, Any]], Sequence[Any]]
+) -> Any:
+    """
+    Return the description of a launch.
+
+    Parameters
+    ----------
+    arguments : sequence of Argument
+        What `ros2 launch` takes.
+    start : callable
+        Takes the values of the arguments that are not empty, and returns the actions.
+
+    """
+    from launch import LaunchDescription
+    from launch.actions import DeclareLaunchArgument, OpaqueFunction
+    from launch.substitutions import LaunchConfiguration
+
+    def begin(context: Any) -> Sequence[Any]:
+        texts = {a: LaunchConfiguration(a.name).perform(context) for a in arguments}
+        return start({a.name: a.read(text) for a, text in texts.items() if text})
+
+    declared = [
+        DeclareLaunchArgument(a.name, default_value=a.default, description=a.description)
+        for a in arguments
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=begin)])
+
+
+def node(
+    given: Mapping[str, Any],
+    executable: str,
+    chosen: Mapping[str, Any],
+    usual: Mapping[str, Any],
+    *,
+    shipped: str = '',
+    **more: Any,
+) -> Any:
+    """
+    Return a node of this package.
+
+    Parameters
+    ----------
+    given : mapping
+        Values of the arguments; of these namespace, params_file and use_sim_time are used.
+    executable : str
+        Name of executable and node.
+    chosen : mapping
+        Parameters that arguments set. They overrule the parameter file.
+    usual : mapping
+        Parameters that hold where neither an argument nor the parameter file sets them.
+    shipped : str
+        Parameter file to use where none is given.
+
+    """
+    from launch_ros.actions import Node
+
+    file = given.get('params_file', shipped)
+    clock = {k: given[k] for k in ('use_sim_time',) if k in given}
+    said = parameters_named(file, full_name(given, executable)) if file else set()
+    usual = {'end_with_parent': True, **usual}
+    values = {k: v for k, v in usual.items() if k not in said} | clock | dict(chosen)
+    # A later pattern of the parameter files overrules an earlier one that matches as well. With
+    # name and namespace, launch writes the values under the full name, which comes last.
+    return Node(
+        package='armid_ros',
+        executable=executable,
+        name=executable,
+        namespace=given.get('namespace', ''),
+        parameters=[*([file] if file else []), *([values] if values else [])],
+        output='screen',
+        **more,
+    )
+
+
+def full_name(given: Mapping[str, Any], executable: str) -> str:
+    """Return the name of a node in the namespace that is given."""
+    return '/'.join(['', *filter(None, given.get('namespace', '').split('/')), executable])
+
+
+def parameters_named(file: str, name: str) -> set[str]:
+    """
+    Return the names of the parameters that a parameter file sets for a node.
+
+    Parameters
+    ----------
+    file : str
+        YAML with `ros__parameters`, by node or by pattern.
+    name : str
+        Full name of the node.
+
+    Raises
+    ------
+    RuntimeError
+        The file cannot be read.
+
+    """
+    try:
+        content = yaml.safe_load(Path(file).read_text(encoding='utf-8'))
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        raise RuntimeError(f'params_file: {file}: {error}') from error
+    found: set[str] = set()
+    pending = [('', content)]
+    while pending:
+        pattern, part = pending.pop()
+        for key, value in part.items() if isinstance(part, dict) else ():
+            if key != 'ros__parameters':
+                pending.append((f'{pattern}/{str(key).lstrip("/")}', value))
+            elif _matches(pattern, name):
+                found |= set(_flat(value))
+    return found
+
+
+def _matches(pattern: str, name: str) -> bool:
+    """Whether a pattern of a parameter file is for a node, as rcl_yaml_param_parser has it."""
+    expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+    return re.fullmatch(expression, name) is not None
+
+
+def _flat(value: Any, prefix: str = '') -> list[str]:
+    if not isinstance(value, dict):
+        return [prefix]
+    return [name for key in value for name in _flat(value[key], f'{prefix}.{key}'.lstrip('.'))]
