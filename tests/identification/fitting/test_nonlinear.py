@@ -14,6 +14,7 @@ from armid_ros.identification import (
     SignalSettings,
 )
 from armid_ros.identification.assess.consistency import check_noise
+from armid_ros.identification.fitting.nonlinear import _carried
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -54,6 +55,13 @@ def with_sizes(robot, names, seed):
         sign = np.where(lower < 0.0, rng.choice([-1.0, 1.0], len(size)), 1.0)
         arm = arm.with_effect(effect, sign * size * rng.uniform(0.7, 1.3, len(size)))
     return arm
+
+
+@pytest.mark.parametrize('rounded', [0.0, 4.1e-17, -4.1e-17])
+def test_a_first_moment_gets_a_mass_however_its_own_zero_is_rounded(rounded):
+    rigid = np.array([rounded, 0.0, 0.18, *np.zeros(7), 2.0, *np.zeros(9)])
+    masses = _carried(rigid, np.eye(20))[::10]
+    np.testing.assert_allclose(masses, [0.9, 2.0], rtol=1e-9)
 
 
 def fitted(robot, names, seed=0, **settings):
