@@ -51,7 +51,7 @@ RUN_TESTS = OMP_NUM_THREADS=$(THREADS) OPENBLAS_NUM_THREADS=$(THREADS) $(BIN)/py
 
 test: lint  ## lint, types, layers, and every test that has to pass: what CI runs
 	@date +%s >$(STAMPS)/begun
-	$(RUN_TESTS) -m 'not long' $(PYTEST)
+	ARMID_FUZZ=100 $(RUN_TESTS) -m 'not long' $(PYTEST)
 	@$(BIN)/python benchmarks/reference_loop.py $$(cat $(STAMPS)/begun)
 
 test-fast: lint  ## while you work: lint, types, layers, and the tests that a change usually breaks

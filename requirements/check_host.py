@@ -33,8 +33,8 @@ def missing():
     made_with = environment_version()
     if made_with not in (None, tuple(sys.version_info[:2])):
         return (
-            f'{ENVIRONMENT} was made with Python {made_with[0]}.{made_with[1]} and {sys.executable} is '
-            f'{version}: run `make clean` first'
+            f'{ENVIRONMENT} was made with Python {made_with[0]}.{made_with[1]} and '
+            f'{sys.executable} is {version}: run `make clean` first'
         )
     try:
         import ensurepip  # noqa: F401

@@ -11,6 +11,9 @@ import sys
 
 import pytest
 
+#: Rooms of processes, ROS graphs, papers, whole pages and many repeats: not in `make test-fast`.
+SLOW = set('benchmarks docsite elastic examples fleet fuzz hidden live pair ros'.split())
+
 
 def pytest_addoption(parser):
     """Add --seed, for tests that pass in one order alone."""
@@ -23,8 +26,12 @@ def pytest_report_header(config):
     return None if seed is None else f'order of the tests: --seed {seed}'
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Shuffle modules, and the tests of each, in the same way in every worker."""
+    """Mark rooms; shuffle modules, and the tests of each, in the same way in every worker."""
+    for item in items:
+        if item.path.relative_to(Path(__file__).parent).parts[0] in SLOW:
+            item.add_marker('slow')
     seed = config.getoption('seed')
     if seed is not None:
         rng, modules = random.Random(seed), {}

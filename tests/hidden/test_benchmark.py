@@ -19,8 +19,6 @@ from tests.hidden.catalogue import CATALOGUED
 from tests.hidden.scoring import Judged, Truth
 from tests.hidden.specification import find_case
 
-pytestmark = pytest.mark.slow
-
 DOCUMENT = {
     'schema': 'armid/diagnosis/1',
     'verdict': 'ambiguous',

@@ -22,8 +22,6 @@ from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sizing import Gap
 from tests.hidden.specification import CaseSpec
 
-pytestmark = pytest.mark.slow
-
 #: How much may be left of what was there before, where it is not a tenth.
 LEFT = {'backlash': 0.35, 'joint_elasticity': 0.05, 'time_delay': 0.05, 'torque_lag': 0.05}
 

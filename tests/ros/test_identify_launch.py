@@ -150,7 +150,6 @@ def test_torque_from_elsewhere_is_what_everybody_hears(launched):
     assert dict(nodes['joint_state_merger'].remappings)['joint_states'] == 'arm/joint_states'
 
 
-@pytest.mark.slow
 def test_it_ends_by_itself_with_the_result_saved(bench, launched, tmp_path):
     """As `ros2 launch ... simulate:=true`, each node a process, but with an arm that is quick."""
     save_excitation(short_excitation(), tmp_path / 'run.yaml')

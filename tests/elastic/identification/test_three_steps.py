@@ -31,6 +31,7 @@ def result(runs, clean_steps, truth):
     return identify_two_inertia(runs, drives, steps=steps, loop=loop)
 
 
+@pytest.mark.long
 def test_parameters_are_found_without_a_start(result, truth) -> None:
     found = errors(result.parameters, truth)
     assert found['main'] < 1.0

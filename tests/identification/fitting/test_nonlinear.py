@@ -91,6 +91,7 @@ def agrees(robot, names, seed=0):
     return truth, result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', CATALOGUE)
 def test_the_training_data_given_again_have_the_training_error_and_the_truth_comes_back(
     robot, name
@@ -106,7 +107,7 @@ def test_the_training_data_given_again_have_the_training_error_and_the_truth_com
     assert (result.passes > 1) == (name in NONLINEAR)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('pair', PAIRS, ids='+'.join)
 def test_pairs_too(robot, pair):
     agrees(robot, pair, seed=1)
@@ -151,6 +152,7 @@ def test_a_fit_that_does_not_settle_says_so(robot, monkeypatch):
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_chunks_of_a_long_stretch_join(robot, monkeypatch):
     """The torque is taken in parts of a long stretch, which an encoder zero makes overlap."""
     monkeypatch.setattr('armid_ros.identification.rows.regression._CHUNK', 2_500)
