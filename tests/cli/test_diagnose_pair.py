@@ -58,6 +58,7 @@ def test_springs_on_one_leg_are_named_there(one_leg) -> None:
     assert document['gap']['closed_fraction'] > 0.99
 
 
+@pytest.mark.long
 def test_report_and_model_name_the_segments(one_leg) -> None:
     folder, document = one_leg
     page = (folder / 'found' / 'report.html').read_text(encoding='utf-8')

@@ -19,6 +19,8 @@ from tests.hidden.catalogue import CATALOGUED
 from tests.hidden.scoring import Judged, Truth
 from tests.hidden.specification import find_case
 
+pytestmark = pytest.mark.long
+
 DOCUMENT = {
     'schema': 'armid/diagnosis/1',
     'verdict': 'ambiguous',

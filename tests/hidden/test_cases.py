@@ -15,6 +15,8 @@ from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sizing import noise_floor
 from tests.hidden.specification import case_list, find_case, SETS
 
+pytestmark = pytest.mark.long
+
 DESIGNED = (
     'viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction '
     'load_dependent_friction presliding_hysteresis thermal_friction coupled_joint_friction '
@@ -146,7 +148,6 @@ def test_bags_hold_the_recordings(free, tmp_path):
         np.testing.assert_array_equal(read.tau, bag.recording.tau)
 
 
-@pytest.mark.long
 def test_scaling_an_effect_keeps_it_in_its_joint():
     case = make_case(find_case('development/soft_limit/3-0'))
     larger = case.effects[0].scaled(2.0)

@@ -19,6 +19,8 @@ import pytest
 
 from benchmarks.elastic import errors
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope='module')
 def result(runs, clean_steps, truth):
@@ -31,7 +33,6 @@ def result(runs, clean_steps, truth):
     return identify_two_inertia(runs, drives, steps=steps, loop=loop)
 
 
-@pytest.mark.long
 def test_parameters_are_found_without_a_start(result, truth) -> None:
     found = errors(result.parameters, truth)
     assert found['main'] < 1.0

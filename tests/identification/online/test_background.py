@@ -83,7 +83,7 @@ def test_pieces_of_work_change_nothing_of_what_is_learned(samples, monkeypatch):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_update_takes_much_longer_than_others(samples):
     """Nor when blocks end, windows are full, a change is judged and rows are learned again."""
     times = []
@@ -101,7 +101,7 @@ def test_no_update_takes_much_longer_than_others(samples):
     assert longest < 10.0 * usual  # 30 where all is done at once
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_copy_goes_on_from_where_the_original_was(samples):
     half = len(samples) // 2
     first = changes.watch(iter(samples[:half]))
