@@ -14,6 +14,7 @@ import sys
 import sysconfig
 
 SUPPORTED = ((3, 11), (3, 12))
+ENVIRONMENT = os.environ.get('VENV', '.venv')
 COMPILERS = (
     ('C', 'CC', ('cc', 'gcc', 'clang')),
     ('C++', 'CXX', ('c++', 'g++', 'clang++')),
@@ -32,8 +33,8 @@ def missing():
     made_with = environment_version()
     if made_with not in (None, tuple(sys.version_info[:2])):
         return (
-            f'.venv was made with Python {made_with[0]}.{made_with[1]} and {sys.executable} is '
-            f'{version}: run `make clean` first'
+            f'{ENVIRONMENT} was made with Python {made_with[0]}.{made_with[1]} and '
+            f'{sys.executable} is {version}: run `make clean` first'
         )
     try:
         import ensurepip  # noqa: F401
@@ -56,9 +57,9 @@ def missing():
 
 
 def environment_version():
-    """Return (major, minor) of the Python that .venv was made with; None without one."""
+    """Return (major, minor) of the Python that the environment was made with; None without one."""
     try:
-        lines = Path('.venv', 'pyvenv.cfg').read_text().splitlines()
+        lines = Path(ENVIRONMENT, 'pyvenv.cfg').read_text().splitlines()
     except OSError:
         return None
     fields = dict(line.split(' = ', 1) for line in lines if ' = ' in line)

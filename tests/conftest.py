@@ -3,11 +3,42 @@
 """What every test may ask for: recordings of real machines, and a ROS 2 domain of its own."""
 
 from contextlib import ExitStack
+from itertools import chain
 import os
 from pathlib import Path
+import random
 import sys
 
 import pytest
+
+#: Rooms of processes, ROS graphs, papers, whole pages and many repeats: not in `make test-fast`.
+SLOW = set('benchmarks docsite elastic examples fleet fuzz hidden live pair ros'.split())
+
+
+def pytest_addoption(parser):
+    """Add --seed, for tests that pass in one order alone."""
+    parser.addoption('--seed', type=int, help='shuffle modules, and the tests of each')
+
+
+def pytest_report_header(config):
+    """Print the seed of the order."""
+    seed = config.getoption('seed')
+    return None if seed is None else f'order of the tests: --seed {seed}'
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """Mark rooms; shuffle modules, and the tests of each, in the same way in every worker."""
+    for item in items:
+        if item.path.relative_to(Path(__file__).parent).parts[0] in SLOW:
+            item.add_marker('slow')
+    seed = config.getoption('seed')
+    if seed is not None:
+        rng, modules = random.Random(seed), {}
+        for item in items:
+            modules.setdefault(item.path, []).append(item)
+        groups = [rng.sample(own, len(own)) for own in modules.values()]
+        items[:] = chain.from_iterable(rng.sample(groups, len(groups)))
 
 
 def pytest_configure(config):

@@ -152,7 +152,7 @@ def design_excitation(
     rng : int or Generator
         Seed, or source of randomness.
     time_budget : float
-        At most so long for the search [s].
+        Processor time of each search process [s]; the best so far is kept.
     **settings
         Further ones of ``armid_ros.excitation.DesignSettings``: ``speed='slow'``, ``starts=1``,
         ``iterations=20``, ``criterion='D'``.

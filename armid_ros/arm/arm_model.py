@@ -380,7 +380,7 @@ class ArmModel:
     def neighbours(self, period: float) -> int:
         """Return how many samples to either side what is read depends on, a period [s] apart."""
         action = self._acting
-        if action.displacement is None and action.reading_memory == 0.0:
+        if action.displacement is None and action.reading_memory == 0.0:  # noqa: RUF069 - of laws, never computed
             return 0
         return int(np.ceil(action.reading_memory / period)) + _STENCIL
 

@@ -14,6 +14,7 @@ from armid_ros.effects.action import (
     Displacement,
     DryFriction,
     law_derivatives,
+    NO_FRICTION,
     TorqueLaw,
     Transmission,
 )
@@ -47,6 +48,7 @@ __all__ = [
     'Action',
     'Displacement',
     'DryFriction',
+    'NO_FRICTION',
     'Hysteresis',
     'Transmission',
     'TorqueLaw',

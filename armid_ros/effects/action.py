@@ -25,6 +25,9 @@ TorqueLaw = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 #: Step of the differences of a torque law [rad or m, rad/s or m/s].
 _STEP = 1e-6
+#: Dry friction below this is the rounding of levels that sum to zero [N m], and so is a share of
+#: the load [-].
+NO_FRICTION = 1e-12
 
 
 class Displacement(NamedTuple):

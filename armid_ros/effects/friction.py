@@ -382,7 +382,7 @@ class FrictionLevel(Effect):
         """Return viscous and Coulomb friction of the joints that have any."""
         said: list[tuple[Effect, FloatArray]] = []
         for kind, own in self._parts:
-            there = own != 0.0
+            there = own != 0.0  # noqa: RUF069 - as described
             joints = tuple(joint for joint, has in zip(self.joints, there, strict=True) if has)
             if joints:
                 said.append((kind(joints), (values * own)[there]))

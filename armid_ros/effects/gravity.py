@@ -171,7 +171,7 @@ def _turned(gravity: FloatArray, tilt: FloatArray) -> FloatArray:
 
 def _unit(gravity: FloatArray) -> FloatArray:
     length = np.linalg.norm(gravity)
-    if length == 0.0:
+    if not length > 0.0:
         raise ModelError('an effect of gravity needs a model with gravity; its vector is zero')
     return np.asarray(gravity / length)
 

@@ -119,7 +119,7 @@ class Payload(_LinkBody):
         Its mass may be what no motion tells, such as that of an inner link; its moment has to be.
 
         """
-        if std[0] == 0.0:
+        if std[0] == 0.0:  # noqa: RUF069 - set where no motion shows it
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
@@ -137,7 +137,7 @@ class Payload(_LinkBody):
         axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
         x, y, z = axis
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
-        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():
+        if not np.all(std[4:][share != 0.0] > 0.0) or not axis.any():  # noqa: RUF069 - an axis as described
             return False
         aside = np.linalg.norm(np.cross(axis, values[1:4])) - SURELY * np.linalg.norm(std[1:4])
         most = share @ values[4:] + SURELY * np.abs(share) @ std[4:]

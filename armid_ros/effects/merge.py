@@ -10,6 +10,7 @@ from armid_ros.effects.action import (
     Action,
     Displacement,
     DryFriction,
+    NO_FRICTION,
     TorqueLaw,
     Transmission,
 )
@@ -84,7 +85,7 @@ def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:
         )
     ):
         np.add.at(sums[row], inverse.ravel(), np.concatenate(values))
-    active = np.any(sums != 0.0, axis=0)
+    active = np.any(np.abs(sums) > NO_FRICTION, axis=0)
     lower, upper, share = sums[:, active]
     return DryFriction(unique[active], lower, upper, share if np.any(share) else None)
 
@@ -93,7 +94,7 @@ def _merge_hysteresis(elements: list[Hysteresis]) -> Hysteresis | None:
     if not elements:
         return None
     level = np.concatenate([e.level for e in elements])
-    active = level != 0.0
+    active = level != 0.0  # noqa: RUF069 - any other level is an element
     if not np.any(active):
         return None
     directions = np.vstack([e.directions for e in elements])

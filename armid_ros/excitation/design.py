@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
@@ -109,7 +108,6 @@ def design(
     prior_information: FloatArray | None = None,
     rival: ArmModel | None = None,
     progress: Callable[[DesignProgress], None] | None = None,
-    clock: Callable[[], float] = time.monotonic,
 ) -> Design:
     """
     Find the trajectory that shows the parameters best.
@@ -132,8 +130,6 @@ def design(
         With criterion 'T': the model to tell ``arm`` from.
     progress : callable, optional
         Told after every step.
-    clock : callable, optional
-        Time [s] for the time budget.
 
     Returns
     -------
@@ -155,7 +151,7 @@ def design(
         if progress is not None:
             progress(DesignProgress(done, found.cost))
 
-    outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch, clock)
+    outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch)
     excitation = placed(problem, outcome.found.trajectory, clearance)
     return evaluate(problem, excitation, prior, stopped=outcome.stopped)
 

@@ -73,8 +73,9 @@ class DesignSettings:
     iterations : int
         Iterations of each search. This, not the time, decides between results.
     time_budget : float
-        Searches that take longer are stopped [s]; the same seed then need not give the same
-        trajectory, and the design says so. Infinite by default.
+        Processor time of each of ``processes`` [s]; infinite by default. Searches that use more
+        are stopped once one has found something; the same seed then need not give the same
+        trajectory, and the design says so.
     processes : int
         Searches at a time, each in a process of its own; 1: in this process.
 

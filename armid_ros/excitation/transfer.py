@@ -83,7 +83,7 @@ class Transfer:
 
     def lasting(self, duration: float) -> Transfer:
         """Return the same way in another time [s]."""
-        if self.duration == 0.0:
+        if not self.duration > 0.0:
             return replace(self, t=np.array([0.0, duration]), q=np.vstack([self.q, self.q]))
         return replace(self, t=self.t * (duration / self.duration))
 

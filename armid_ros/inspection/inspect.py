@@ -232,7 +232,7 @@ def _of_units(
     time_base = time_base_fault(recording)
     if time_base:
         yield Remark('bad', time_base)
-    empty = [j.name for j in joints if j.velocity_ratio == 0.0]
+    empty = [j.name for j in joints if j.velocity_ratio == 0.0]  # noqa: RUF069 - zeros as recorded
     if empty:
         yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')
 

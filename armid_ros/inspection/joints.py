@@ -110,7 +110,7 @@ def _facts(
         speed=top,
         moving=0.0 if still else float(moves.mean()),
         step=float(moved.min()) if len(moved) else 0.0,
-        repeated=0.0 if still else float(np.mean(changes[moves[1:]] == 0.0)),
+        repeated=0.0 if still else float(np.mean(changes[moves[1:]] == 0.0)),  # noqa: RUF069 - as recorded
         velocity_ratio=ratio,
         velocity_fit=fit,
         effort_rms=None if tau is None else float(np.sqrt(np.mean(tau**2))),

@@ -22,7 +22,7 @@ from armid_ros.model.rigid_body import (
     rigid_parameter_names,
 )
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.robots import Robot
+from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -121,7 +121,7 @@ class BaseParameters:
         """
         prior = np.array(prior, dtype=float)
         masses = [_symbol_of(parameter) == 'm' for parameter in self.standard]
-        prior[masses & (prior == 0.0)] = _LEAST_MASS
+        prior[masses & (np.abs(prior) < NO_MASS)] = _LEAST_MASS
         correction = np.linalg.pinv(self.grouping) @ (np.asarray(beta) - self.values(prior))
         return np.asarray(prior + correction)
 
@@ -279,7 +279,7 @@ def _expression(row: FloatArray, leader: int, standard: tuple[ParameterName, ...
             sign = float(np.sign(row[column]))
             factors.setdefault(factor, []).append((sign, symbol(standard[column])))
     for factor, terms in factors.items():
-        if factor == 1.0:
+        if factor == 1.0:  # noqa: RUF069 - rounded to six digits
             text += ''.join(f' {"+" if sign > 0 else "-"} {name}' for sign, name in terms)
             continue
         lead = terms[0][0]

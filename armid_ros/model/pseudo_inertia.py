@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
+from armid_ros.robots import NO_MASS
 import numpy as np
 import numpy.typing as npt
 
@@ -115,10 +116,9 @@ class Consistency:
         """Examine ten parameters."""
         matrix = pseudo_inertia(parameters)
         mass = float(matrix[3, 3])
-        nothing = np.full(3, np.nan)
-        center = matrix[:3, 3] / mass if mass != 0.0 else nothing
-        moments: FloatArray = nothing
-        if mass != 0.0:
+        center = moments = np.full(3, np.nan)
+        if abs(mass) >= NO_MASS:
+            center = matrix[:3, 3] / mass
             second = matrix[:3, :3] - mass * np.outer(center, center)
             moments = np.asarray(np.linalg.eigvalsh(np.trace(second) * np.eye(3) - second))
         return Consistency(

@@ -127,7 +127,7 @@ def _scaled(robot: Robot, shares: FloatArray) -> str:
         if inertial is None or name in robot.links or name not in carriers:
             continue
         share = float(shares[carriers[name]])
-        if share == 1.0:
+        if share >= 1.0:
             continue
         for element, keys in (
             (inertial.find('mass'), ('value',)),

@@ -147,7 +147,7 @@ class SimulatedArmNode(ArmidNode):
         self._stride = self._steps_at(rate)
         self._factor = 0.0 if self._follows else self.value('real_time_factor')
         self._clock_due, self._clock_period = 0, round(1e9 / self.value('clock_rate'))
-        if self._clock_publisher is None and not self._follows and self._factor != 1.0:
+        if self._clock_publisher is None and not self._follows and self._factor != 1.0:  # noqa: RUF069 - a parameter of the node
             self._clock_publisher = self.create_publisher(ClockMessage, '/clock', STREAM)
         if self._timer is not None:
             self.destroy_timer(self._timer)

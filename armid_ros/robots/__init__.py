@@ -13,7 +13,7 @@ from armid_ros.robots.collision import Clearance, collision_model, CollisionMode
 from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
 from armid_ros.robots.mounting import Mounting, read_mounting
-from armid_ros.robots.robot import PARAMETERS_PER_BODY, Robot
+from armid_ros.robots.robot import NO_MASS, PARAMETERS_PER_BODY, Robot
 from armid_ros.robots.selection import (
     continuous_joints,
     driven_in_words,
@@ -32,6 +32,7 @@ __all__ = [
     'HeldJoint',
     'described_at',
     'Robot',
+    'NO_MASS',
     'PARAMETERS_PER_BODY',
     'parse_gravity',
     'GRAVITIES',

@@ -46,7 +46,7 @@ class Inertial:
             return f'negative mass or inertia (m = {self.mass:g} kg, moments {said} kg m^2)'
         if moments[0] + moments[1] < moments[2] - tolerance:
             return f'principal moments {said} kg m^2 violate the triangle inequality'
-        if self.mass == 0.0 and moments[2] > 0.0:
+        if self.mass == 0.0 and moments[2] > 0.0:  # noqa: RUF069 - as described
             return f'an inertia without a mass (moments {said} kg m^2)'
         return None
 
@@ -306,7 +306,7 @@ class _Reader:
         rates = []
         for name in ('velocity', 'effort'):
             rate = abs(self.number(limit, name, where, math.inf))
-            if rate == 0.0:
+            if rate == 0.0:  # noqa: RUF069 - as described
                 self.notes.append(f'{where}: {name} limit 0; taken as unlimited')
                 rate = math.inf
             rates.append(rate)

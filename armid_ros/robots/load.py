@@ -248,7 +248,7 @@ def _kinematic_urdf(description: Description, positions: Mapping[str, float]) ->
 
 def _placement(joint: Joint, position: float) -> tuple[Vector, Vector]:
     """Placement of the child link in the parent link with the joint at a position."""
-    if position == 0.0:
+    if position == 0.0:  # noqa: RUF069 - as given
         return joint.xyz, joint.rpy
     rotation = pin.rpy.rpyToMatrix(*joint.rpy)
     axis = np.array(joint.axis)

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import json
 from pathlib import Path
+import signal
 import subprocess
 import sys
 from typing import Any
@@ -22,8 +23,10 @@ from typing import Any
 from armid_ros.errors import RobotError
 from armid_ros.files.regular import TEXT_LIMIT
 
-#: The longest that an expansion may take [s]; the largest descriptions take one or two.
+#: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
+#: A process that waits, as for a pipe, uses none; it is ended after so many times that limit.
+_WAITING = 30.0
 #: The most memory [bytes].
 MEMORY_LIMIT = 2 << 30
 
@@ -41,7 +44,7 @@ def expand_xacro(
     arguments : mapping of str to str
         Values of <xacro:arg>.
     time_limit : float
-        The longest that it may take [s].
+        Processor time that it may take [s].
 
     Raises
     ------
@@ -64,16 +67,19 @@ def expand_xacro(
             capture_output=True,
             encoding='utf-8',
             errors='replace',
-            timeout=time_limit,
+            timeout=_WAITING * time_limit,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise RobotError(f'{path}: xacro: not expanded within {time_limit:g} s') from error
+        waited = f'not expanded within {_WAITING * time_limit:g} s; does it include a pipe?'
+        raise RobotError(f'{path}: xacro: {waited}') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
     answer = _answer(done.stdout)
     if 'text' not in answer:
-        reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
+        slow = done.returncode == -signal.SIGXCPU
+        limit = f'{time_limit:g} s of processor time' if slow else f'{MEMORY_LIMIT >> 20} MiB'
+        reason = answer.get('error') or f'not expanded within {limit}'
         raise RobotError(f'{path}: xacro: {reason}')
     return str(answer['text'])
 

@@ -11,6 +11,7 @@ memory and processor time before it reads a line of the file.
 from __future__ import annotations
 
 import json
+import math
 import os
 import resource
 import sys
@@ -22,8 +23,8 @@ def main() -> None:
     request = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
     os.dup2(2, 1)  # what an expansion prints is no answer
-    seconds, memory = int(request['seconds']) + 1, int(request['memory'])
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    seconds, memory = math.ceil(request['seconds']), int(request['memory'])
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     json.dump(expanded(request), answers)
     answers.close()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.errors import ModelError
 from armid_ros.model.pseudo_inertia import PER_LINK, pseudo_inertia
-from armid_ros.robots import Robot
+from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 
 NO_BODY = (
@@ -45,7 +45,7 @@ def require_any_mass(robot: Robot) -> None:
         Naming the description and its links.
 
     """
-    if not np.any(robot.rigid_parameters[::PER_LINK]):
+    if np.all(np.abs(robot.rigid_parameters[::PER_LINK]) < NO_MASS):
         raise ModelError(
             f'{robot.path or robot.name}: no link has a mass ({", ".join(robot.links)}), so there '
             'is no model to compare with: give them an <inertial>, or identify the arm first '

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from armid_ros.effects import DryFriction
+from armid_ros.effects import DryFriction, NO_FRICTION
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.box_complementarity import BoxLaw, Modes, SPEED_TOLERANCE
@@ -114,18 +114,19 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
     """Part the elements that cannot stick, whose levels are one constant torque, from the rest."""
     if friction is None:
         return DryFriction(np.empty((0, n_joints)), np.empty(0), np.empty(0)), np.zeros(n_joints)
-    pushing = np.flatnonzero(friction.lower > friction.upper)
+    span = friction.upper - friction.lower
+    pushing = np.flatnonzero(span < -NO_FRICTION)
     if len(pushing):
         worst = int(pushing[0])
-        joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1
+        joint = int(np.argmax(friction.directions[worst] != 0.0)) + 1  # noqa: RUF069 - of joints, never computed
         raise ModelError(
             f'dry friction of joint {joint} pushes: its torque forwards is less than backwards '
             f'({friction.upper[worst]:g} against {friction.lower[worst]:g} N m); friction torques '
             'have to be positive'
         )
     share = np.zeros(len(friction.lower)) if friction.load_share is None else friction.load_share
-    constant = (friction.lower == friction.upper) & (share == 0.0)
-    first = np.argsort(np.argmax(friction.directions != 0.0, axis=1), kind='stable')
+    constant = (span <= NO_FRICTION) & (np.abs(share) <= NO_FRICTION)
+    first = np.argsort(np.argmax(friction.directions != 0.0, axis=1), kind='stable')  # noqa: RUF069 - of joints, never computed
     able = first[~constant[first]]  # in the order of the joints, so that most are one a joint
     sticking = DryFriction(
         np.ascontiguousarray(friction.directions[able]),

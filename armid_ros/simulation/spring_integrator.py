@@ -124,7 +124,7 @@ def _force(
         beyond = q - np.minimum(np.maximum(q, robot.lower), robot.upper)
         if beyond.any():
             stiffness, damping = springs.stops
-            force[e:] -= stiffness * beyond + np.where(beyond != 0.0, damping, 0.0) * v[e:]
+            force[e:] -= stiffness * beyond + np.where(beyond != 0.0, damping, 0.0) * v[e:]  # noqa: RUF069 - what is inside is clipped to itself
     return force, memory
 
 
@@ -145,6 +145,6 @@ def _hold(
         if not len(places):
             x[2 * e + axis] = 0.0
         for place in places:
-            if before.dq[place] == 0.0:
+            if before.dq[place] == 0.0:  # noqa: RUF069 - set below
                 x[place] = before.twist[place] - moved[axis]
             x[e + place] = 0.0

@@ -185,6 +185,7 @@ def test_a_recording_of_other_joints_is_refused(runs):
         ar.identify('two_link_elastic', runs[0])
 
 
+@pytest.mark.slow
 def test_a_seed_is_enough(arm, excitation):
     first, second = (ar.simulate(arm, excitation, torque_noise=0.1, rng=3) for _ in range(2))
     np.testing.assert_array_equal(first.tau, second.tau)

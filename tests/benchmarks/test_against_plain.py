@@ -49,7 +49,7 @@ def test_families_are_of_names_of_the_catalogue():
     assert {name for names in FAMILIES.values() for name in names} <= known
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ('kind', 'index'),
     [

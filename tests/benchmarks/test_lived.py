@@ -23,8 +23,6 @@ from tests.hidden.lived.motions import draw_path, tracked
 from tests.hidden.lived.plant import LivedArm
 from tests.hidden.lived.wear import Wear
 
-pytestmark = pytest.mark.slow
-
 EARTH = np.array([0.0, 0.0, -9.81])
 
 COULOMB = LivedTruth(

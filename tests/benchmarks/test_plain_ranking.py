@@ -7,7 +7,7 @@ import pytest
 from benchmarks.lived import judge
 from benchmarks.plain_ranking import plain_ranking
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 
 @pytest.mark.parametrize(('kind', 'index'), [('development', 0), ('development/exact', 0)])

@@ -21,6 +21,8 @@ from tests.diagnosis.conftest import Bench, URDF
 
 from .conftest import armid
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module')
 def files(tmp_path_factory):

@@ -43,6 +43,7 @@ def one_leg(tmp_path_factory) -> tuple[Path, Any]:
     return folder, diagnosed(folder, straps, 0, wrong_masses=0.1)
 
 
+@pytest.mark.long
 def test_springs_on_one_leg_are_named_there(one_leg) -> None:
     _, document = one_leg
     assert document['verdict'] == 'named'
@@ -57,6 +58,7 @@ def test_springs_on_one_leg_are_named_there(one_leg) -> None:
     assert document['gap']['closed_fraction'] > 0.99
 
 
+@pytest.mark.long
 def test_report_and_model_name_the_segments(one_leg) -> None:
     folder, document = one_leg
     page = (folder / 'found' / 'report.html').read_text(encoding='utf-8')

@@ -19,6 +19,8 @@ import pytest
 
 from docsite.schemas import faults
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):

@@ -24,6 +24,8 @@ import pytest
 
 from .conftest import armid, ROBOT
 
+pytestmark = pytest.mark.slow
+
 QUICK = ('--duration', 8, '--starts', 1, '--iterations', 3)
 Z = np.array([0.0, 0.0, 1.0])
 HINGE = (

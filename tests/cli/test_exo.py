@@ -12,6 +12,8 @@ import pytest
 
 from docsite.schemas import faults
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module')
 def result(tmp_path_factory):

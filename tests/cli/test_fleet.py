@@ -10,6 +10,8 @@ from benchmarks.fleet import generate, ROBOT
 
 from .conftest import armid
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module')
 def bags(tmp_path_factory):

@@ -19,6 +19,8 @@ import yaml
 
 from .conftest import armid, bag_of, ROBOT
 
+pytestmark = pytest.mark.slow
+
 VISCOUS = 'viscous_coefficient'
 
 

@@ -255,6 +255,7 @@ def test_a_change_may_be_less_by_what_the_model_had_wrong_before(bench):
     assert fresh.findings[0].std[0] < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', [7, 8, 9])
 def test_what_another_motion_makes_of_a_misfit_is_no_change(upright, seed):
     """A lag and friction with the load are there on both days; only numbers of the first are."""
@@ -302,6 +303,7 @@ def test_drag_of_three_joints_is_no_person_who_slows_them_down(upright):
     assert np.allclose(found.values, drag, atol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('with_baseline', [True, False])
 def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
     """Equal periods differ by a push, and a misfit that was known before has none in it."""
@@ -420,6 +422,7 @@ def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
     assert [one.name for one in small.minor] == ['coulomb_friction']
 
 
+@pytest.mark.slow
 def test_what_a_model_lacks_in_every_motion_is_no_part_of_a_stated_value(bench):
     """The day before was slow, so that friction that no model has was another misfit then."""
 

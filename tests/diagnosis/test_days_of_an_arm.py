@@ -28,6 +28,7 @@ def since(bench, hidden, always=None):
     return diagnose(arm, bench.recordings(today, seed=2), baseline=before, rng=rng)
 
 
+@pytest.mark.long
 def test_a_joint_that_starts_cold_is_one_cause_of_two_names(bench):
     def cold(motion, tau):
         extra = 0.8 * np.exp(-motion.t / 3.0)[:, np.newaxis] * motion.dq
@@ -43,6 +44,7 @@ def test_a_joint_that_starts_cold_is_one_cause_of_two_names(bench):
     assert named['viscous_friction'].values[0] == pytest.approx(0.8, rel=0.1)
 
 
+@pytest.mark.long
 def test_a_friction_that_has_grown_is_not_said_to_warm_up(bench):
     found = since(bench, lambda motion, tau: motion.dq * [0.0, 0.3])
     assert [one.name for one in found.findings] == ['viscous_friction'], found.summary
@@ -65,6 +67,7 @@ def test_a_value_is_inside_where_the_bound_explains_as_much(bench):
     assert [inside_with(value) for value in (-0.02, -0.5)] == [True, False]
 
 
+@pytest.mark.long
 def test_who_leans_on_an_arm_now_and_then_is_seen(bench):
     """For half a second of each recording, beside a misfit of a fifth of the torque."""
     rng = np.random.default_rng(5)

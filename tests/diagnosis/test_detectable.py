@@ -32,6 +32,7 @@ def elbow(shape):
     return lambda size: lambda m, tau: np.outer(size * shape(m, tau[:, 1]), [0.0, 1.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('name', 'hide'),
     [

@@ -229,6 +229,7 @@ def test_an_effect_of_ones_own_is_one_class(bench):
     assert found.findings[0].values[0] == pytest.approx(0.4, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('factors', [(1.15, 0.9), (0.92, 1.1)])
 def test_friction_that_has_grown_is_named_beside_a_body_that_is_off(upright, factors):
     """Its values are known: a body that is fitted anew does not take the change."""

@@ -76,6 +76,7 @@ def of_position(motion):
     return 0.8 * np.sin(2.5 * motion.q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('curve', 'before', 'today'),
     [

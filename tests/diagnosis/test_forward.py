@@ -49,6 +49,7 @@ def test_the_cause_that_takes_most_is_taken_first(search, monkeypatch):
     assert way.first.ranking[0].gain > max(one.gain for one in way.last.look.ranking)
 
 
+@pytest.mark.slow
 def test_a_cause_that_another_one_beats_beside_the_rest_is_exchanged(search, monkeypatch):
     """Unless what the others leave in the end is less."""
     way = search.forward()

@@ -50,6 +50,7 @@ def scaled(recordings, factor):
     return [replace(one, tau=factor * one.tau) for one in recordings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (57.3, 'degrees'), (1e-3, 'kN m')]
 )

@@ -17,7 +17,7 @@ from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.cases import lived_case
 from tests.hidden.lived.chain import Chain
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 EARTH, MOON = 9.81, 1.62
 

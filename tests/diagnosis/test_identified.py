@@ -101,6 +101,7 @@ def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench, discrepa
     np.testing.assert_allclose(error[np.ix_(known, known)], 0.0, atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', [0, 1])
 def test_what_a_model_was_identified_wrong_is_no_change(upright, seed):
     """A slow short motion hardly tells inertias; a fast one of another day does."""

@@ -44,6 +44,7 @@ def offset(tau):
     return np.broadcast_to([0.0, 0.3, 0.0], tau.shape)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('friction', ['known', 'named'])
 @pytest.mark.parametrize(
     ('size', 'hidden', 'first', 'others'),

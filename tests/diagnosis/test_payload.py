@@ -54,6 +54,7 @@ def test_a_load_of_an_inner_link_may_be_that_link(upright):
     assert one.joints == ('shoulder',)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('arm', ['bench', 'upright'])
 def test_a_payload_that_was_put_down_is_less_than_nothing(request, arm):
     arm = request.getfixturevalue(arm)
@@ -89,6 +90,7 @@ def test_a_light_load_of_a_heavy_arm_is_predicted_no_worse_than_a_link(upright):
     assert gains[0] > gains[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('side', [1.0, -1.0])
 @pytest.mark.parametrize('mass', [3.0, 8.0])
 def test_a_heavy_load_is_no_fault_of_the_data(bench, mass, side):

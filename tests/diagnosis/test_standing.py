@@ -39,6 +39,7 @@ def coming_to_rest(bench, held, seed=0):
     return result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('baseline', [False, True])
 @pytest.mark.parametrize('held', [0.28, -0.28])
 def test_what_friction_holds_is_no_gap(bench, held, baseline):
@@ -52,6 +53,7 @@ def test_what_friction_holds_is_no_gap(bench, held, baseline):
     assert found.verdict == 'consistent', found.summary
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('baseline', [False, True])
 @pytest.mark.parametrize('part', ['recordings', 'validate'])
 def test_more_than_friction_holds_is_said(bench, baseline, part):

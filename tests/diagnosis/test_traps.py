@@ -91,6 +91,7 @@ def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench)
     assert by_floor.count(None) >= 5
 
 
+@pytest.mark.slow
 def test_information_criteria_over_pooled_rows_invent_effects(bench):
     invented, named = [], []
     for seed in range(1, 5):

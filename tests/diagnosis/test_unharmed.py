@@ -9,7 +9,7 @@ import pytest
 from tests.diagnosis.conftest import TORQUE_NOISE
 from tests.diagnosis.test_floor import cut
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 SIZE = np.array([0.03, 0.05])
 

@@ -49,7 +49,7 @@ def test_blocks_of_data_can_be_read(page):
             assert json.loads(block.text) is not None, f'{name_of(page)}:{block.line}'
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('page', [page for page in PAGES if runs(page)], ids=name_of)
 def test_the_blocks_of_a_page_run_one_after_the_other(page, at_desk):
     for path in at_desk.iterdir():

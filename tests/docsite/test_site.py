@@ -16,7 +16,7 @@ import pytest
 from docsite.links import broken_links
 from docsite.nodes import NODES
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[2]
 

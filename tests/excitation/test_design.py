@@ -131,15 +131,9 @@ def test_interrupt_keeps_the_best_so_far(two_link_arm, quick):
 
 @pytest.mark.parametrize('processes', [1, 2])
 def test_time_budget_ends_the_search_with_the_best_so_far(two_link_arm, quick, processes):
-    steps = []
-    settings = replace(quick, time_budget=5.5, processes=processes, iterations=100000)
-    result = design(
-        two_link_arm,
-        settings,
-        np.random.default_rng(0),
-        progress=steps.append,
-        clock=lambda: float(len(steps)),
-    )
+    """One that is used up before anything is found is of a slow computer, and no error."""
+    settings = replace(quick, time_budget=1e-9, processes=processes, iterations=100000)
+    result = design(two_link_arm, settings, np.random.default_rng(0))
     assert result.stopped == 'time budget'
     assert np.isfinite(result.cost)
 
@@ -166,7 +160,7 @@ def test_error_in_a_process_of_its_own_is_raised_here(two_link_arm, quick):
     task = Task(replace(problem, limits=weak), None, None)
     rngs = np.random.default_rng(0).spawn(2)
     with pytest.raises(TrajectoryError, match='joint shoulder: torque limit 2 N m'):
-        search_all(task, rngs, lambda done, found: None, lambda: 0.0)
+        search_all(task, rngs, lambda done, found: None)
 
 
 def test_speed_classes_come_from_one_call(two_link_arm, quick):

@@ -72,6 +72,7 @@ EFFECTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('effects', EFFECTS.values(), ids=EFFECTS.keys())
 @pytest.mark.parametrize('criterion', ['D', 'A', 'E', 'condition'])
 def test_gradient_of_each_criterion(tree, with_effects, criterion, effects):
@@ -129,6 +130,7 @@ def assert_gradient(objective, problem):
         np.testing.assert_allclose(np.sum(gradient() * direction), numeric, rtol=2e-5, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     'effects',
     [

@@ -53,6 +53,7 @@ def test_without_joint_states_it_is_said(arm, run):
     assert Rehearsal(run, arm).report().surprises == ('no joint state came during the rehearsal',)
 
 
+@pytest.mark.slow
 def test_long_rehearsals_keep_a_bounded_number_of_samples(arm, run):
     report = rehearsed(arm, run, off=0.02, count=20_000).report()
     assert 1000 < report.samples < 4000

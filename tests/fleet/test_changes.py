@@ -37,7 +37,7 @@ def names(series, alpha=0.05):
     return {one.arm for one in judge(series) if named(one, alpha)}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_thousand_healthy_arms_are_rarely_accused():
     accused = [len(names(fleet(np.random.default_rng(seed), 1000))) > 0 for seed in range(6)]
     assert np.mean(accused) <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / 6)
@@ -69,7 +69,6 @@ def test_the_interval_of_wear_holds_the_truth_as_often_as_it_says():
     assert inside == pytest.approx(0.95, abs=0.02)
 
 
-@pytest.mark.slow
 def test_of_the_arms_named_few_are_healthy():
     rng = np.random.default_rng(4)
     false, true = 0, 0
@@ -139,7 +138,6 @@ def test_a_day_that_all_siblings_share_is_no_change_of_any():
         assert np.abs(kept).max() < 0.05
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize('bags', [10, 30])
 def test_healthy_arms_whose_days_differ_as_real_ones_do_are_rarely_named(bags):
     counts = [tally(120, bags, 20, np.random.default_rng([11, bags, k])) for k in range(2)]

@@ -27,7 +27,7 @@ import pytest
 from .conftest import identified, SETTINGS, URDF
 from .test_identify import digits, stamps
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 FIXED = replace(SETTINGS, signals=SignalSettings(20.0, 8))
 

@@ -3,7 +3,7 @@
 """
 Damaged files by the thousand: mutants of every format, and the one property they have.
 
-`make test-all` tries 300 of a kind and `make test` 50, always the same; `make fuzz` 10,000 other
+`make test` tries 100 of a kind and `make test-fast` 50, always the same; `make fuzz` 10,000 other
 ones. What fails is kept in tests/fuzz/failures, and is what the next `make fuzz` tries first.
 
 """

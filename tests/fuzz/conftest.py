@@ -10,7 +10,7 @@ from hypothesis.database import DirectoryBasedExampleDatabase
 
 from tests.fuzz.property import TALLY
 
-#: Mutants of each kind that `make test-all` tries; up to as many are always the same ones.
+#: Mutants of each kind that pytest tries; up to as many are always the same ones.
 USUAL = 300
 WANTED = int(os.environ.get('ARMID_FUZZ', USUAL))
 

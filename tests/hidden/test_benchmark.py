@@ -19,7 +19,7 @@ from tests.hidden.catalogue import CATALOGUED
 from tests.hidden.scoring import Judged, Truth
 from tests.hidden.specification import find_case
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 DOCUMENT = {
     'schema': 'armid/diagnosis/1',

@@ -15,7 +15,7 @@ from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sizing import noise_floor
 from tests.hidden.specification import case_list, find_case, SETS
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 DESIGNED = (
     'viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction '

@@ -22,7 +22,7 @@ from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sizing import Gap
 from tests.hidden.specification import CaseSpec
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 #: How much may be left of what was there before, where it is not a tenth.
 LEFT = {'backlash': 0.35, 'joint_elasticity': 0.05, 'time_delay': 0.05, 'torque_lag': 0.05}

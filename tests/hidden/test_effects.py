@@ -22,7 +22,7 @@ from tests.hidden.catalogue import CATALOGUED, HIDDEN
 from tests.hidden.sensing import SENSING
 from tests.hidden.specification import CaseSpec
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 SAMPLES = slice(2200, -1000, 7)  # from the first period on
 

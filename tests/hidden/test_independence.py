@@ -7,10 +7,6 @@ from pathlib import Path
 import subprocess
 import sys
 
-import pytest
-
-pytestmark = pytest.mark.slow
-
 HERE = Path(__file__).parent
 ALLOWED = {'armid_ros.robots', 'armid_ros.recording', 'armid_ros.errors', 'armid_ros.motion'}
 JUDGING = {'test_catalogue', 'test_benchmark'}  # these compare with what looks

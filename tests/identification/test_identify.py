@@ -181,6 +181,7 @@ def test_payload_is_found_against_a_known_arm(arm, motion):
     assert abs(found[0] - 0.3) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('described', 'left'),
     [(r'<inertial>.*?</inertial>', ''), (r'<mass value="[^"]*"', '<mass value="0"')],

@@ -204,6 +204,7 @@ def test_joints_that_are_exchanged_are_named_as_identify_does(clean, robot):
     assert 'takes it' not in found.verdict
 
 
+@pytest.mark.slow
 def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     """The grade of identify is asked, whatever it is for: here a torque that is no arm's."""
     pushed = clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]

@@ -95,7 +95,6 @@ def test_a_job_that_fails_does_not_end_the_process():
         assert assistant._process.poll() is None
 
 
-@pytest.mark.slow
 def test_the_process_ends_when_nobody_can_ask_it_any_more():
     with working() as assistant:
         assistant._process.stdin.close()

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
 
+from armid_ros.errors import RobotError
 from armid_ros.model import (
     gravity_sensitivity,
     inverse_dynamics,
@@ -10,6 +11,7 @@ from armid_ros.model import (
     regressor,
     rigid_parameter_names,
 )
+from armid_ros.model.pseudo_inertia import Consistency
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
@@ -29,6 +31,20 @@ def motion(arm):
 def test_regressor_times_parameters_is_inverse_dynamics(arm, motion):
     tau = regressor(arm, motion) @ arm.rigid_parameters
     np.testing.assert_allclose(tau, inverse_dynamics(arm, motion), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize('rounded', [0.0, 4.1e-17, -4.1e-17])
+def test_a_mass_is_zero_however_it_is_rounded(arm, motion, rounded):
+    """What a first moment without a mass is answered with does not depend on the processor."""
+    parameters = arm.rigid_parameters.copy()
+    parameters[50], parameters[51:54] = rounded, [0.0, 0.18, 0.0]
+    with pytest.raises(RobotError, match='needs a mass'):
+        arm.with_inertias(parameters)
+    parameters[51:54] = rounded
+    tau = inverse_dynamics(arm.with_inertias(parameters), motion)
+    np.testing.assert_allclose(tau, regressor(arm, motion) @ parameters, rtol=1e-9, atol=1e-12)
+    nothing = Consistency.of('link', [rounded, *np.full(9, rounded)])
+    assert np.isnan([*nothing.center, *nothing.moments]).all()
 
 
 def test_derivatives_are_those_of_bodies_that_no_arm_has_too(arm, motion):

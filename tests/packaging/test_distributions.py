@@ -54,6 +54,7 @@ def wheel(sdist, tmp_path_factory):
     return ZipFile(built('build_wheel', source, folder / 'out'))
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_every_file_of_the_package(root, wheel):
     package = root / 'armid_ros'
     wanted = {

@@ -132,6 +132,21 @@ def test_launch_and_config_files_are_in_share(prefix, root):
                 assert (share / path.relative_to(root)).is_file()
 
 
+@pytest.mark.parametrize(
+    'name',
+    [
+        'effects/test_contract.py',
+        'simulation/test_against_mujoco.py',
+        'hidden/test_independence.py',
+        'recording/test_writer.py',
+        'diagnosis/test_traps.py',
+        'packaging/test_layers.py',
+    ],
+)
+def test_proofs_that_every_change_has_to_pass_are_not_long(root, name):
+    assert 'mark.long' not in (root / 'tests' / name).read_text()
+
+
 def test_all_say_one_version(root, distribution):
     """Manifests, setup.py, the package and the changelog."""
     manifests = (root / 'package.xml', root / 'msg_schemas' / 'package.xml')

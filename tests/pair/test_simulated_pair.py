@@ -38,7 +38,6 @@ def test_one_joint_by_torque_stays_with_the_gait():
     assert not by_torque.fallen
 
 
-@pytest.mark.slow
 def test_all_joints_in_open_loop_fall_where_torques_are_sampled_coarsely():
     """The instability of the open loop: nothing holds what a small error begins."""
     by_torque = simulated(driven=leg_pair().robot.joints, torque_rate=30.0)

@@ -50,7 +50,7 @@ def test_springs_believed_too_soft_lead_both_engines_astray_alike(pair, motions,
     assert most(path - check.followed) < 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_joints_by_torque_fall_when_it_is_one_per_cent_wrong(pair) -> None:
     """An inverted pendulum without feedback: exact torques hold it for a cycle, others do not."""
     whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 601), 0.0)

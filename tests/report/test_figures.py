@@ -129,6 +129,7 @@ def cut_off(figure):
     ]
 
 
+@pytest.mark.slow
 def test_nothing_is_cut_off_at_the_edges(case):
     (fits,) = case.validation.values()
     informative = np.array(fits[0].informative)

@@ -28,7 +28,7 @@ from sensor_msgs.msg import JointState
 
 from tests.ros.test_online_identifier import EFFECT, message, PENDULUM, RATE, spoil
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 SCHEDULES = int(os.environ.get('ARMID_CHAOS', 4))
 #: Deviations and SI units by which the estimate may be off in the end.

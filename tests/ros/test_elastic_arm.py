@@ -18,7 +18,6 @@ from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from builtin_interfaces.msg import Duration
 import numpy as np
-import pytest
 from sensor_msgs.msg import Imu, JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -69,7 +68,6 @@ def test_both_sides_are_published_with_one_stamp(bench):
     np.testing.assert_allclose([up.x, up.y, up.z], [0.0, 0.0, 9.81], atol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_bag_recorded_live_tells_the_springs(bench, tmp_path):
     arm = still_arm(
         bench, robot='two_link_elastic', loop_gain=0.15, start='0,0', velocity_noise=[0.003],
@@ -157,7 +155,6 @@ def test_springs_are_identified_live_at_a_kilohertz(bench):
     np.testing.assert_allclose(found.values[:7], wanted, rtol=0.02)
 
 
-@pytest.mark.slow
 def test_any_arm_hangs_its_links_on_springs_and_follows(bench):
     robot = load_robot('humanoid_arm')
     arm = still_arm(

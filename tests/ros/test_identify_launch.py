@@ -104,7 +104,7 @@ def test_torque_from_elsewhere_is_what_everybody_hears():
     assert dict(nodes['joint_state_merger'].remappings)['joint_states'] == 'arm/joint_states'
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_path):
     """As two `ros2 launch ... simulate:=true`, each node a process, with arms that are quick."""
     save_excitation(short_excitation(), tmp_path / 'run.yaml')

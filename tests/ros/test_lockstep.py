@@ -100,6 +100,7 @@ def test_a_replay_learns_the_same(first_run, robot):
     np.testing.assert_allclose(again.estimate.values, result.estimate.values, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_a_run_that_nobody_learns_from_gives_the_same_samples(
     first_run, truth, robot, excitation, tmp_path
 ):

@@ -560,7 +560,6 @@ def test_too_little_motion_is_said_with_the_joint(bench, arm):
     assert 'too little motion to learn from: elbow' in state.message
 
 
-@pytest.mark.slow
 def test_a_change_is_published_and_said(bench, arm):
     sizes = bench.listen(ParameterEstimate, 'online_identifier/change', LATCHED)
     node = identifying(bench)

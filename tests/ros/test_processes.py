@@ -23,8 +23,6 @@ from trajectory_msgs.msg import JointTrajectory
 
 from tests.ros.controller import Controller
 
-pytestmark = pytest.mark.slow
-
 PATIENCE = 120.0
 
 

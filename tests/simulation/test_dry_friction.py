@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect
+from armid_ros.effects import make_effect, merge_actions
 from armid_ros.errors import ModelError
 from armid_ros.simulation import Plant, State, step
 from armid_ros.simulation.contacts import Contacts
@@ -20,6 +20,17 @@ def run(plant: Plant, state: State, seconds: float, torque) -> list[State]:
     for _ in range(round(seconds / plant.dt)):
         passed.append(step(plant, passed[-1], np.asarray(torque)))
     return passed
+
+
+@pytest.mark.parametrize('parts', [[0.1, 0.2, -0.3], [0.3, -0.1, -0.2]])
+def test_friction_that_sums_to_zero_is_none_however_it_is_rounded(slider, parts):
+    """Floats leave 5e-17 N of one sum and -3e-17 N, which would push, of the other."""
+    robot = slider()
+    kinds = [
+        make_effect('coulomb_friction', robot).action(np.array([part]), ArmModel(robot))
+        for part in parts
+    ]
+    assert sum(parts) != 0.0 and merge_actions(robot, kinds).dry_friction.directions.size == 0
 
 
 def with_coulomb(robot, values) -> ArmModel:

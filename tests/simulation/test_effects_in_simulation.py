@@ -114,6 +114,7 @@ def rms(x: FloatArray) -> float:
 
 #: Links that land on a flank do so between samples of the reference: tests of hidden effects have
 #: them at the rate of a recording.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     'name', [n for n, kind in CATALOGUE.items() if n != 'backlash' and not kind.learned]
 )

@@ -213,7 +213,7 @@ def _pose(robot: Robot, q: FloatArray) -> str:
     moved = [
         f'{joint} {value:.3g} {unit}'
         for joint, value, unit in zip(robot.joints, q, robot.position_units, strict=True)
-        if value != 0.0
+        if value != 0.0  # noqa: RUF069 - joints that stay are put to zero
     ]
     if not moved:
         return 'zero'

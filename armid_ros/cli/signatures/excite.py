@@ -152,7 +152,10 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @click.option('--starts', default=4, show_default=True, help='Searches from other beginnings.')
 @click.option('--iterations', default=150, show_default=True, help='Of each search.')
 @click.option(
-    '--time-budget', default=120.0, show_default=True, help='At most so long for a design [s].'
+    '--time-budget',
+    default=120.0,
+    show_default=True,
+    help='At most so much processor time in each search process [s].',
 )
 @options.gravity
 @options.joints

@@ -192,7 +192,7 @@ def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters
     """Return the effect parameters with a value of zero, as far as the data determine them."""
     rigid = len(arm.robot.rigid_parameters)
     names, theta = arm.parameters, arm.theta
-    free = np.array([k for k in range(rigid, len(names)) if theta[k] == 0.0], dtype=np.intp)
+    free = np.array([k for k in range(rigid, len(names)) if theta[k] == 0.0], dtype=np.intp)  # noqa: RUF069 - an effect without a value
     if not len(free):
         return None
     columns = [part.reduce(arm.effect_columns(part.motion)[:, :, free - rigid]) for part in data]

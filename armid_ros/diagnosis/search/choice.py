@@ -169,7 +169,7 @@ class Explainer:
         found = explain(question, evidence, settings)
         rigid, described = len(arm.robot.rigid_parameters), arm.theta
         change = np.abs(found.fitted.arm.theta[: len(described)] - described)
-        known = (np.arange(len(described)) >= rigid) & (described != 0.0)
+        known = (np.arange(len(described)) >= rigid) & (described != 0.0)  # noqa: RUF069 - an effect without a value
         far = change > settings.thresholds.described * np.abs(described)
         changed = np.flatnonzero(known & far)
         if not len(changed):

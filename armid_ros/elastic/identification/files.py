@@ -174,7 +174,7 @@ def read_runs(
     period = float(np.median(np.diff(motor.t)))
     left = asked.q - motor.q
     runs = []
-    for stood, start, stop in _experiments(motor.t, np.any(asked.dq != 0.0, axis=1), period):
+    for stood, start, stop in _experiments(motor.t, np.any(asked.dq != 0.0, axis=1), period):  # noqa: RUF069 - as commanded
         rows = slice(start, stop)
         t = np.asarray(period * np.arange(stop - start), dtype=np.float64)
         zero = np.zeros((stop - start, 2))

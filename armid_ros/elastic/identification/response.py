@@ -214,7 +214,7 @@ class _Arm:
         last = np.einsum('bij,bj->bi', a, x_next) + constant
         moved = 0.5 * dt * (x + x_next) + dt**2 / 12.0 * (first - last)
         held = modes == 0
-        still = held & (x[:, 2:4] == 0.0)
+        still = held & (x[:, 2:4] == 0.0)  # noqa: RUF069 - set below
         x_next[:, :2] = np.where(still, x[:, :2] - moved[:, 4:], x_next[:, :2])
         x_next[:, 2:4] = np.where(held, 0.0, x_next[:, 2:4])
         return q2 + moved[:, 5], x_next, last[:, 2:], modes

@@ -129,7 +129,7 @@ def _solve(
     for _ in range(3):
         rows = (table / weight[:, np.newaxis]).reshape(-1, 8)
         scale = np.linalg.norm(rows, axis=0)
-        if np.any(scale == 0.0):
+        if not np.all(scale > 0.0):
             raise IdentificationError('the rigid fit needs motion of both joints; one stands')
         solution, _, _, sizes = np.linalg.lstsq(
             rows / scale, (torque / weight).ravel(), rcond=None

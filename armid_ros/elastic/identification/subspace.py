@@ -123,7 +123,7 @@ def identify_subspace(
         np.sqrt(np.mean(np.concatenate([getattr(e, name) for e in experiments]) ** 2, axis=0))
         for name in ('u', 'y')
     )
-    if np.any(u_scale == 0.0) or np.any(y_scale == 0.0):
+    if not (np.all(u_scale > 0.0) and np.all(y_scale > 0.0)):
         raise IdentificationError('subspace identification: an input or an output is always zero')
     scaled = [Signals(e.u / u_scale, e.y / y_scale) for e in experiments]
     a, c, sizes = _observable(scaled, order, horizon)
@@ -215,7 +215,7 @@ def _inputs(
     b = np.zeros((len(poles), m), complex)
     place = 0
     for k in kept:
-        if poles[k].imag == 0.0:
+        if poles[k].imag == 0.0:  # noqa: RUF069 - LAPACK sets it for real eigenvalues
             b[k] = solution[place]
             place += 1
         else:
@@ -247,7 +247,7 @@ def _real(modal: ComplexArray, states: ComplexArray, poles: ComplexArray) -> Flo
     columns = []
     for k, pole in enumerate(poles):
         output = np.outer(modal[:, k], states[:, k]).ravel()
-        if pole.imag == 0.0:
+        if pole.imag == 0.0:  # noqa: RUF069 - LAPACK sets it for real eigenvalues
             columns.append(output.real)
         else:
             columns += [2.0 * output.real, -2.0 * output.imag]

@@ -243,7 +243,7 @@ def _lasting(jacobian: FloatArray, residual: FloatArray, shape: tuple[int, ...])
 def _covariance(jacobian: FloatArray) -> FloatArray:
     """Return the covariance of the factors where the residuals have unit variance."""
     scale = np.linalg.norm(jacobian, axis=0)
-    if np.any(scale == 0.0):
+    if not np.all(scale > 0.0):
         raise IdentificationError(
             'the step responses do not depend on every parameter; do both joints move in them?'
         )

@@ -110,7 +110,7 @@ def link_heights(
 def vertical(gravity: FloatArray) -> FloatArray:
     """Return the unit vector against gravity; z of the base where there is none."""
     size = float(np.linalg.norm(gravity))
-    return np.array([0.0, 0.0, 1.0]) if size == 0.0 else np.asarray(-gravity / size)
+    return np.asarray(-gravity / size) if size > 0.0 else np.array([0.0, 0.0, 1.0])
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:

@@ -137,7 +137,7 @@ class _Tree:
         nearest = int(np.argmin([np.linalg.norm(target - q) for q in self.poses]))
         way = target - self.poses[nearest]
         reach = float(np.abs(way).max())
-        if reach == 0.0:
+        if not reach > 0.0:
             return nearest
         step = target if reach <= _STEP else self.poses[nearest] + way * (_STEP / reach)
         if not self.free(self.poses[nearest], step):

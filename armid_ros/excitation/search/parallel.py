@@ -14,9 +14,9 @@ import pickle
 import signal
 import sys
 import threading
+import time
 from types import ModuleType
 
-from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem
@@ -29,9 +29,6 @@ _ONE_THREAD = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
 
 #: Why searches did not end by themselves.
 INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
-
-#: How often the time budget is looked at while the processes are silent [s].
-_PATIENCE = 0.2
 
 
 @dataclass(frozen=True)
@@ -65,14 +62,13 @@ class Outcome:
 Watch = Callable[[float, Found], None]
 
 
-def search_all(
-    task: Task, rngs: Sequence[np.random.Generator], watch: Watch, clock: Callable[[], float]
-) -> Outcome:
+def search_all(task: Task, rngs: Sequence[np.random.Generator], watch: Watch) -> Outcome:
     """
     Run one search per generator and return the best trajectory of all.
 
     The result does not depend on which search ends first: the lowest cost wins, and the first
-    generator among equals. KeyboardInterrupt ends them all; the best so far is kept.
+    generator among equals. KeyboardInterrupt ends them all, and so does the time budget, once
+    something is found; the best so far is kept.
 
     Parameters
     ----------
@@ -82,8 +78,6 @@ def search_all(
         One per search.
     watch : callable
         Told how far they are.
-    clock : callable
-        Time [s], for the time budget.
 
     Raises
     ------
@@ -95,62 +89,63 @@ def search_all(
         If interrupted before anything was found.
 
     """
-    board = _Board(len(rngs), watch)
-    deadline = clock() + task.problem.settings.time_budget
     processes = min(task.problem.settings.processes, len(rngs))
+    board = _Board(len(rngs), task.problem.settings.time_budget * processes, watch)
     try:
         if processes == 1 or not _portable(task):
-            stopped = _here(task, rngs, board, deadline, clock)
+            stopped = _here(task, rngs, board)
         else:
-            stopped = _in_processes(task, rngs, board, deadline, clock, processes)
+            stopped = _in_processes(task, rngs, board, processes)
     except KeyboardInterrupt:
         if board.best is None:
             raise
         stopped = INTERRUPTED
-    if board.best is None:
-        budget = task.problem.settings.time_budget
-        raise TrajectoryError(f'nothing was found within the time budget of {budget:g} s')
+    assert board.best is not None
     return Outcome(board.best, stopped)
 
 
 class _Board:
     """What every search has found so far."""
 
-    def __init__(self, count: int, watch: Watch) -> None:
+    def __init__(self, count: int, budget: float, watch: Watch) -> None:
         self._found: list[Found | None] = [None] * count
-        self._done = [0.0] * count
-        self._watch = watch
+        self._done, self._used = [0.0] * count, [0.0] * count
+        self._budget, self._watch = budget, watch
 
     @property
     def best(self) -> Found | None:
         found = [f for f in self._found if f is not None]
         return min(found, key=lambda f: f.cost) if found else None
 
-    def note(self, number: int, done: float, found: Found) -> None:
-        self._found[number], self._done[number] = found, done
+    @property
+    def out_of_time(self) -> bool:
+        """Whether the searches have used their processor time."""
+        return sum(self._used) > self._budget
+
+    def note(self, number: int, done: float, found: Found, used: float) -> None:
+        self._found[number], self._done[number], self._used[number] = found, done, used
         best = self.best
         assert best is not None
         self._watch(sum(self._done) / len(self._done), best)
 
 
-def _here(
-    task: Task,
-    rngs: Sequence[np.random.Generator],
-    board: _Board,
-    deadline: float,
-    clock: Callable[[], float],
-) -> str:
+def _here(task: Task, rngs: Sequence[np.random.Generator], board: _Board) -> str:
     for number, rng in enumerate(rngs):
+        begun = time.process_time()
 
         def report(
-            done: float, cost: float, trajectory: FourierTrajectory, n: int = number
+            done: float,
+            cost: float,
+            trajectory: FourierTrajectory,
+            n: int = number,
+            begun: float = begun,
         ) -> None:
-            board.note(n, done, Found(trajectory, cost))
-            if clock() > deadline:
+            board.note(n, done, Found(trajectory, cost), time.process_time() - begun)
+            if board.out_of_time:
                 raise Stopped
 
         search(task.problem, task.clearance, task.prior, rng, report)
-        if clock() > deadline:
+        if board.out_of_time:
             return OUT_OF_TIME
     return ''
 
@@ -159,8 +154,6 @@ def _in_processes(
     task: Task,
     rngs: Sequence[np.random.Generator],
     board: _Board,
-    deadline: float,
-    clock: Callable[[], float],
     processes: int,
 ) -> str:
     context = multiprocessing.get_context('spawn')
@@ -176,7 +169,7 @@ def _in_processes(
                     process.start()
                 theirs.close()
                 running[ours] = (number, process)
-            for connection in wait(list(running), timeout=_PATIENCE):
+            for connection in wait(list(running)):
                 assert isinstance(connection, Connection)
                 number, worker = running[connection]
                 try:
@@ -193,7 +186,7 @@ def _in_processes(
                 if isinstance(message, Exception):
                     raise message
                 board.note(number, *message)
-            if clock() > deadline:
+            if board.out_of_time:
                 return OUT_OF_TIME
         return ''
     finally:
@@ -207,8 +200,10 @@ def _work(task: Task, rng: np.random.Generator, connection: Connection) -> None:
     """Search, in a process of its own, and send what is found."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
+    begun = time.process_time()
+
     def report(done: float, cost: float, trajectory: FourierTrajectory) -> None:
-        connection.send((done, Found(trajectory, cost)))
+        connection.send((done, Found(trajectory, cost), time.process_time() - begun))
 
     try:
         search(task.problem, task.clearance, task.prior, rng, report)

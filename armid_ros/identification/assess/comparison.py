@@ -40,7 +40,8 @@ from scipy.stats import chi2, f, norm, t
 SCHEMA = 'armid/comparison/1'
 #: Probability that the list of changes has a chance find in it.
 CHANCE = 0.05
-#: Directions of a covariance below this share of the largest, all scaled, are rounding.
+#: Directions of a covariance below this share of the largest, all scaled, are rounding, and so
+#: are differences of a value below this share of it.
 _ROUNDING = 1e-10
 
 
@@ -81,10 +82,10 @@ class ParameterChange:
 
     @property
     def deviations(self) -> float:
-        """Difference in its standard deviations."""
-        return (
-            self.difference / self.std if self.std > 0.0 else np.copysign(np.inf, self.difference)
-        )
+        """Difference in its standard deviations; of exact values none, or infinitely many."""
+        if self.std > 0.0:
+            return self.difference / self.std
+        return float(np.copysign(np.inf if self.changed else 0.0, self.difference))
 
 
 @dataclass(frozen=True)
@@ -350,13 +351,14 @@ class _Side:
 def _single_chances(before: _Side, after: _Side) -> list[float]:
     """Return how likely each difference is by chance, with freedoms of a sum (Welch)."""
     size, std = np.abs(after.values - before.values), np.hypot(before.std, after.std)
+    same = size <= _ROUNDING * np.abs(before.values)
     safe = np.where(std > 0.0, std, 1.0)
     shares = [((side.std / safe) ** 4) / side.freedoms for side in (before, after)]
     with np.errstate(over='ignore', divide='ignore'):  # infinitely many deviations have no chance
         missed, freedom = size / safe, 1.0 / (shares[0] + shares[1])
     known = np.isfinite(freedom)
     chances = 2.0 * np.where(known, t.sf(missed, np.where(known, freedom, 1.0)), norm.sf(missed))
-    return [float(p) for p in np.where(std > 0.0, chances, (size == 0.0).astype(float))]
+    return [float(p) for p in np.where(std > 0.0, chances, same)]
 
 
 def _group_chance(
@@ -367,7 +369,7 @@ def _group_chance(
         return 1.0
     squares, rank = _squares(difference[np.newaxis], covariance)
     inflation = _inflation(covariance, scatter)
-    if inflation == 1.0:
+    if inflation <= 1.0:
         return float(chi2.sf(squares, rank))
     return float(f.sf(squares / rank / inflation, rank, rank * freedom))
 

@@ -73,7 +73,7 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 
 def _longest_same(reading: FloatArray) -> tuple[int, int]:
     """Return where the longest run of one value starts and stops."""
-    edges = np.flatnonzero(np.diff(reading) != 0.0) + 1
+    edges = np.flatnonzero(np.diff(reading) != 0.0) + 1  # noqa: RUF069 - as recorded
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
     return int(bounds[longest]), int(bounds[longest + 1])

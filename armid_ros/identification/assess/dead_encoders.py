@@ -92,7 +92,7 @@ def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) ->
     if recording.dq is None:
         return
     moves = np.ptp(recording.q, axis=0) > REST_RANGE
-    same = moves & (np.ptp(recording.dq, axis=0) == 0.0)
+    same = moves & (np.ptp(recording.dq, axis=0) == 0.0)  # noqa: RUF069 - as recorded
     if not np.any(moves & ~same):
         return  # a driver that does not measure velocities
     for j in np.flatnonzero(same).tolist():

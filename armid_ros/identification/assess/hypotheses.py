@@ -190,8 +190,7 @@ class ZeroOff(Hypothesis):
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint and the angle."""
-        wrong = (self.degrees + 180.0) % 360.0 - 180.0
-        wrong = 180.0 if wrong == -180.0 else wrong
+        wrong = 180.0 - (180.0 - self.degrees) % 360.0
         remedy = f'{"subtract" if wrong > 0 else "add"} {np.deg2rad(abs(wrong)):.4g} rad'
         return (
             f'the zero of {robot.joints[self.joint]} seems to be off by about {wrong:.0f} '

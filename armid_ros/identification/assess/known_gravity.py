@@ -34,7 +34,7 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
     size = float(np.linalg.norm(vector))
     direction = vector / size
     axis = np.round(direction)
-    if np.linalg.norm(axis) == 1.0 and direction @ axis > np.cos(np.deg2rad(_AXIS)):
+    if np.count_nonzero(axis) == 1 and direction @ axis > np.cos(np.deg2rad(_AXIS)):
         direction = axis + 0.0
     sizes = [float(np.linalg.norm(told)), *(-value[2] for value in GRAVITIES.values())]
     near = min(sizes, key=lambda known: abs(np.log(size / max(known, 1e-9))))

@@ -93,9 +93,7 @@ def _ratio(before: KnownFit, after: KnownFit, joint: str) -> float:
     )
     if first == second:
         return 1.0
-    if first == 0.0:
-        return float('inf')
-    ratio = second / first
+    ratio = second / first if first > 0.0 else float('inf')
     growth = torques[1] / torques[0] if min(torques) > 0.0 else 1.0
     if ratio > 1.0:
         return max(ratio / max(growth, 1.0), 1.0)

@@ -67,11 +67,11 @@ def velocity_ratio(recording: Recording) -> VelocityRatio | None:
         return VelocityRatio(np.full(n, np.nan), np.zeros(n))
     moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     product, own, other = np.sum(moved * made, 0), np.sum(moved**2, 0), np.sum(made**2, 0)
-    rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | (own == 0.0)
+    rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | ~(own > 0.0)
     size = np.sqrt(own * other)
     return VelocityRatio(
         np.where(rests, np.nan, product / np.where(rests, 1.0, own)),
-        np.where(rests | (size == 0.0), 0.0, product / np.where(size == 0.0, 1.0, size)),
+        np.where(~rests & (size > 0.0), product / np.where(size > 0.0, size, 1.0), 0.0),
     )
 
 

@@ -104,7 +104,7 @@ def _fit(
     """
     stacked = (columns * weight[:, :, np.newaxis]).reshape(-1, columns.shape[2])
     size = np.sqrt(np.mean(stacked**2, axis=0))
-    size[size == 0.0] = 1.0
+    size = np.where(size > 0.0, size, 1.0)
     torque = np.sqrt(np.mean((tau * weight) ** 2))
     stacked = stacked / size
     normal = stacked.T @ stacked

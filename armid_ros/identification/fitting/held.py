@@ -80,7 +80,7 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     unknown = np.any(base.grouping[:, ~np.isfinite(spread)], axis=1)
     known = np.where(np.isfinite(spread), spread, 0.0)
     size = np.linalg.norm(base.grouping * known, axis=1)
-    return np.where(unknown | (size == 0.0), np.inf, size)
+    return np.where(~unknown & (size > 0.0), size, np.inf)
 
 
 def _of(base: BaseParameters, kept: npt.NDArray[np.intp]) -> BaseParameters:

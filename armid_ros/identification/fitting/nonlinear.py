@@ -23,6 +23,7 @@ from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
+from armid_ros.robots import NO_MASS
 import numpy as np
 import scipy.linalg
 
@@ -199,7 +200,7 @@ def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
 
     """
     links = rigid.reshape(-1, len(LINK_PARAMETERS))
-    lacking = (links[:, 0] == 0.0) & np.any(links[:, 1:4] != 0.0, axis=1)
+    lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if not np.any(lacking):
         return rigid
     mass = np.zeros_like(links)

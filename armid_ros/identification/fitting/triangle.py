@@ -243,7 +243,7 @@ def fit_scaled(triangle: Triangle, scale: FloatArray) -> TriangleFit:
     stacked = triangle.factors / scale[:, np.newaxis, np.newaxis]
     stacked = stacked.reshape(-1, stacked.shape[2])
     size = np.linalg.norm(stacked, axis=0)
-    size[size == 0.0] = 1.0
+    size = np.where(size > 0.0, size, 1.0)
     (factor,) = scipy.linalg.qr(stacked / size, mode='r', check_finite=False)
     rank = triangle.rank
     upper = factor[:rank, :rank]

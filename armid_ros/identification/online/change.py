@@ -173,7 +173,7 @@ def _independent(columns: FloatArray) -> list[int]:
     kept = []
     for k, column in enumerate(columns.T):
         length = np.linalg.norm(column)
-        if length == 0.0:
+        if not length > 0.0:
             continue
         rest = column / length
         rest = rest - basis @ (basis.T @ rest)

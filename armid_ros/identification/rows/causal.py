@@ -343,7 +343,7 @@ class CausalFilter:
         longest = self.max_gap * self._period if self._period else np.inf
         if 0.0 < dt <= longest:
             return True
-        if dt == 0.0 or (self._period and -longest <= dt < 0.0):
+        if dt == 0.0 or (self._period and -longest <= dt < 0.0):  # noqa: RUF069 - equal stamps differ by zero
             self._rejected['out_of_order'] += 1
             return False
         self.restart('dropout' if dt > 0.0 else 'jump_back')

@@ -31,6 +31,8 @@ _LIMIT_SLACK = 0.01
 SHORTEST = 1.0
 #: Recordings shorter than this in all show few of the parameters [s].
 _SHORT = 5.0
+#: A torque that varies by less than this share of it is constant; filters round a constant.
+_ROUNDING = 1e-9
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
 _CLEAR = 0.8
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
@@ -152,7 +154,8 @@ def check_torque(
     """
     robot = arm.robot
     tau = np.concatenate([part.tau for part in problem])
-    silent = [name for name, y in zip(robot.joints, tau.T, strict=True) if np.ptp(y) == 0.0]
+    constant = np.ptp(tau, axis=0) <= _ROUNDING * np.abs(tau).max(axis=0)
+    silent = [name for name, still in zip(robot.joints, constant, strict=True) if still]
     source = recordings[0].source
     if len(silent) == robot.n_joints:
         raise IdentificationError(f'{source}: {SILENT}')

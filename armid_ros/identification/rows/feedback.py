@@ -94,7 +94,7 @@ def laws_of_controllers(
 def _turning(dq: FloatArray) -> npt.NDArray[np.bool_]:
     """Return where a joint turns round, or filters smear that it does, shape (R,)."""
     slow = np.abs(dq) <= _TURNING * np.abs(dq).max(initial=0.0)
-    slow[1:] |= np.diff(np.sign(dq)) != 0.0
+    slow[1:] |= np.diff(np.sign(dq)) != 0
     beside = np.convolve(slow, np.ones(2 * _BESIDE + 1))
     return np.asarray(beside[_BESIDE : _BESIDE + len(slow)] > 0.0)
 

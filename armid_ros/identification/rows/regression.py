@@ -326,7 +326,7 @@ def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
 def unsure_samples(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
     """Return the samples next to a reversal of joints that have dry friction, shape (N, n)."""
     held = _held(arm, motion)
-    turned = np.diff(np.sign(motion.dq[:, held]), axis=0) != 0.0
+    turned = np.diff(np.sign(motion.dq[:, held]), axis=0) != 0
     unsure = np.zeros(motion.q.shape, dtype=bool)
     unsure[1:, held] = turned
     unsure[:-1, held] |= turned

@@ -31,7 +31,7 @@ class _Part:
     def take(self, t: float, values: FloatArray) -> None:
         if self.samples:
             step = t - self.samples[-1][0]
-            if step == 0.0:
+            if step == 0.0:  # noqa: RUF069 - equal stamps differ by zero
                 return
             if step < 0.0:
                 self.samples.clear()

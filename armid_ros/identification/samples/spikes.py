@@ -252,7 +252,7 @@ class SpikeGate:
             if stray is not None:
                 self.rejected['stamp'] += 1
             return True
-        if dt == 0.0 or (math.isfinite(longest) and -longest <= dt < 0.0):
+        if dt == 0.0 or (math.isfinite(longest) and -longest <= dt < 0.0):  # noqa: RUF069 - equal stamps differ by zero
             self.rejected['out_of_order'] += 1
             self._stray = stray
         elif stray is None:

@@ -215,7 +215,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
     own = max((WORDS[quantity].get(word, 0.0) for word in words), default=0.0)
     others = [table for name, table in WORDS.items() if name != quantity]
     other = max((table.get(word, 0.0) for table in others for word in words), default=0.0)
-    if own == 0.0 or own < other:
+    if own <= 0.0 or own < other:
         return 0.0
     return (
         own
@@ -227,7 +227,7 @@ def _score(pattern: str, quantity: QuantityName) -> float:
 def _still(chosen: ChosenColumns) -> float:
     """Return what speaks against a family with columns that never change: they are not filled."""
     still = [
-        float(np.ptp(column.values[np.isfinite(column.values)])) == 0.0
+        float(np.ptp(column.values[np.isfinite(column.values)])) == 0.0  # noqa: RUF069 - as recorded
         for column in chosen.columns
     ]
     return 1.0 if any(still) else 0.0

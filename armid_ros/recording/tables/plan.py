@@ -389,7 +389,7 @@ def _time_unit(table: Table, column: TableColumn) -> str:
     if not len(steps):
         raise RecordingError(f'{table.source}: column {column.name} does not increase')
     step = float(np.median(steps))
-    if step == 1.0 and np.all(steps == np.rint(steps)):
+    if step == 1.0 and np.all(steps == np.rint(steps)):  # noqa: RUF069 - a count
         raise RecordingError(
             f'{table.source}: column {column.name} counts 1, 2, 3; give its unit with '
             '--time-unit s or ms, or the samples per second with --rate'

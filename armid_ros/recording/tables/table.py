@@ -155,7 +155,7 @@ class Table:
 
 def normal_unit(text: str) -> str:
     """Return a unit as it is written here: 'deg', 'rad/s', 'N m', 'ms'."""
-    text = text.strip().strip('[]()').replace('°', 'deg').replace('µ', 'u')
+    text = text.strip().strip('[]()').replace('°', 'deg').replace('\u00b5', 'u')
     known = {
         'nm': 'N m', 'n*m': 'N m', 'n.m': 'N m', 'n·m': 'N m', 'newton meter': 'N m',
         'mnm': 'mN m', 'nmm': 'N mm', 'degree': 'deg', 'degrees': 'deg', 'deg/sec': 'deg/s',

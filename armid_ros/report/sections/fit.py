@@ -187,7 +187,7 @@ def fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[C
     measured = joined([fit.motion.tau[:, joint] for fit in fits if fit.motion.tau is not None])
     predicted = joined([fit.predicted[:, joint] for fit in fits])
     residual = measured - predicted
-    counts = joined([fit.informative[:, joint].astype(float) for fit in fits]) == 1.0
+    counts = joined([fit.informative[:, joint].astype(float) for fit in fits]) > 0.5
     kept = thinned(measured, residual)
     torque_chart = Chart(
         t[kept],

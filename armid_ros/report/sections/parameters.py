@@ -48,7 +48,7 @@ class ParameterRow:
     @property
     def known(self) -> bool:
         """Whether the description has a value of it."""
-        return self.rigid or self.described != 0.0
+        return self.rigid or self.described != 0.0  # noqa: RUF069 - an effect without a value
 
     @property
     def text(self) -> tuple[str, str, str]:

@@ -174,7 +174,7 @@ class Foreseen(Section):
         rows = []
         for k in sorted(members, key=lambda k: float(size[k])):
             name, std, value = information.parameters[k], information.std[k], described[k]
-            seen, known = bool(np.isfinite(std)), name.rigid or value != 0.0
+            seen, known = bool(np.isfinite(std)), name.rigid or value != 0.0  # noqa: RUF069 - an effect without a value
             relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
             rows.append(
                 (

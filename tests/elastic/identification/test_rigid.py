@@ -37,6 +37,7 @@ def test_deviations_hold_for_short_data(runs, truth) -> None:
     assert np.abs(off).max() < 3.0
 
 
+@pytest.mark.long
 def test_a_torque_that_is_held_is_half_a_sample_late(truth) -> None:
     """Taken for that of the sample it begins with, it would take 3 % off the friction."""
     shipped = two_link_set('after')

@@ -19,6 +19,8 @@ import pytest
 
 from benchmarks.elastic import errors
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope='module')
 def result(runs, clean_steps, truth):

@@ -23,7 +23,7 @@ import pytest
 
 from benchmarks.elastic import errors, steps, tuning
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 LOOP = two_link_loop(two_link_set('after'))
 START = two_link_set('before').parameters

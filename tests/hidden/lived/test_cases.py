@@ -13,7 +13,7 @@ from tests.hidden.lived.cases import draw_case, lived_case
 from tests.hidden.lived.chain import body_parts, Chain
 from tests.hidden.lived.specification import KINDS, ORDER, SIZES, specify, sphere
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 ROUND = len(ORDER)
 

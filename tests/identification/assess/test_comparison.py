@@ -235,9 +235,11 @@ def test_why_a_parameter_is_not_compared_is_told_apart():
     assert {one.parameter: one.why for one in complete.only_before} == alone
 
 
-def test_known_exactly_and_equal_is_no_change():
-    before, after = parameters([1.0, 2.0], [0.0, 0.1]), parameters([1.0, 2.1], [0.0, 0.1])
-    assert compare(before, after).changed == ()
+@pytest.mark.parametrize('equal', [0.3, 0.1 + 0.2])
+def test_known_exactly_and_equal_is_no_change(equal):
+    before, after = parameters([0.3, 2.0], [0.0, 0.1]), parameters([equal, 2.1], [0.0, 0.1])
+    found = compare(before, after)
+    assert found.changed == () and found.changes[0].deviations == 0.0
 
 
 class TestRefusals:

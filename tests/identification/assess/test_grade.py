@@ -107,6 +107,7 @@ def test_the_grade_is_that_of_the_joint_that_is_predicted_worst(structure, run, 
     assert f'is off by 100 % in {structure.robot.joints[5]}, the most of all' in found.reasons[0]
 
 
+@pytest.mark.slow
 def test_noise_as_large_as_the_torque_of_a_joint_condemns_no_model(structure, run, other):
     """No model predicts noise."""
     rng = np.random.default_rng(0)
@@ -121,6 +122,7 @@ def test_noise_as_large_as_the_torque_of_a_joint_condemns_no_model(structure, ru
     assert found.word == 'good'
 
 
+@pytest.mark.slow
 def test_a_joint_at_rest_with_any_torque_within_its_friction_condemns_no_model(structure, arm):
     """Friction holds it with whatever torque it was left with."""
     motion = multisine(arm.robot.joints, 20.0, RATE, seed=1, base_hz=0.12)
@@ -174,6 +176,7 @@ def named_worst(reasons):
     return float(said[0]), said[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('worst', [0, 4])
 def test_the_joint_that_is_named_has_the_largest_error_where_all_is_noise(
     structure, run, other, sound, worst
@@ -223,6 +226,7 @@ def test_two_seconds_of_data_are_too_little(arm, structure):
     assert result.halves.joints.max() > LIMITS.poor
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', range(6))
 def test_recordings_drawn_at_random_are_good(arm, structure, seed):
     found, _ = graded(structure, [record(arm, 10 + seed, duration=15.0 + 5.0 * seed)])
@@ -265,6 +269,7 @@ def test_torques_that_come_late_are_not_good(structure, run):
     assert int(said) == pytest.approx(100, abs=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('since', [0, 1000])
 def test_a_dead_channel_of_torque_is_unusable(structure, run, other, since):
     """The fit explains a torque that is not there by links that weigh nothing."""

@@ -153,6 +153,7 @@ def bristles(motion, give):
     return bent / give
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', range(8))
 def test_friction_that_gives_way_before_it_slips_is_no_late_torque(robot, seed):
     links = robot.rigid_parameters.reshape(-1, 10)
@@ -213,6 +214,7 @@ def test_a_torque_of_one_joint_in_another_unit(robot, sound, joint, unit, factor
     assert expected in mistake_in(robot, wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('joint', [0, 1, 2, 3])
 @pytest.mark.parametrize('degrees', [-90.0, 90.0, 180.0])
 def test_a_zero_that_is_off(robot, sound, joint, degrees):

@@ -77,6 +77,7 @@ def test_output_error_is_biased_less_by_encoder_noise_than_least_squares(arm, mo
     assert simulated < 0.8 * plain
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ('method', 'noise', 'signals'),
     [('iv', 3e-4, SIGNALS), ('ekf', 3e-4, SIGNALS), ('ekf', 1e-5, SignalSettings())],

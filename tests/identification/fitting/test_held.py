@@ -48,6 +48,7 @@ def found(structure, recordings):
     return identify(structure, recordings, rng=np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_a_model_of_jogs_predicts_joints_that_move_at_once(real, found):
     """The first joints are off by twice and three times as much where all is fitted."""
     motion = multisine(real.robot.joints, 20.0, 100.0, seed=11)

@@ -23,6 +23,7 @@ def fits(parts, noise):
     return values, std, np.array([one[0] for one in held]), np.array([one[1] for one in held])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('size', [1, 2, 4])
 @pytest.mark.parametrize('loud', [(1, 1, 1, 1, 1, 1), (1, 1, 1, 1, 1, 10), (1, 1, 1, 1, 5, 10)])
 def test_white_noise_gives_the_variance_of_least_squares(size, loud):

@@ -14,6 +14,7 @@ from armid_ros.identification import (
     SignalSettings,
 )
 from armid_ros.identification.assess.consistency import check_noise
+from armid_ros.identification.fitting.nonlinear import _carried
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -56,6 +57,13 @@ def with_sizes(robot, names, seed):
     return arm
 
 
+@pytest.mark.parametrize('rounded', [0.0, 4.1e-17, -4.1e-17])
+def test_a_first_moment_gets_a_mass_however_its_own_zero_is_rounded(rounded):
+    rigid = np.array([rounded, 0.0, 0.18, *np.zeros(7), 2.0, *np.zeros(9)])
+    masses = _carried(rigid, np.eye(20))[::10]
+    np.testing.assert_allclose(masses, [0.9, 2.0], rtol=1e-9)
+
+
 def fitted(robot, names, seed=0, **settings):
     """Return the true arm, what was recorded of it, and its identification."""
     truth = with_sizes(robot, names, seed)
@@ -83,6 +91,7 @@ def agrees(robot, names, seed=0):
     return truth, result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', CATALOGUE)
 def test_the_training_data_given_again_have_the_training_error_and_the_truth_comes_back(
     robot, name
@@ -98,7 +107,7 @@ def test_the_training_data_given_again_have_the_training_error_and_the_truth_com
     assert (result.passes > 1) == (name in NONLINEAR)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('pair', PAIRS, ids='+'.join)
 def test_pairs_too(robot, pair):
     agrees(robot, pair, seed=1)
@@ -143,6 +152,7 @@ def test_a_fit_that_does_not_settle_says_so(robot, monkeypatch):
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_chunks_of_a_long_stretch_join(robot, monkeypatch):
     """The torque is taken in parts of a long stretch, which an encoder zero makes overlap."""
     monkeypatch.setattr('armid_ros.identification.rows.regression._CHUNK', 2_500)

@@ -68,6 +68,7 @@ def samples():
     return list(changes.changing('payload:' + changes.ball(0.3), 0, BEFORE, 3.0, RATE))
 
 
+@pytest.mark.slow
 def test_pieces_of_work_change_nothing_of_what_is_learned(samples, monkeypatch):
     pieces = changes.watch(iter(samples))
     monkeypatch.setattr(online_identifier, 'Background', Foreground)
@@ -82,6 +83,7 @@ def test_pieces_of_work_change_nothing_of_what_is_learned(samples, monkeypatch):
     )
 
 
+@pytest.mark.long
 def test_no_update_takes_much_longer_than_others(samples):
     """Nor when blocks end, windows are full, a change is judged and rows are learned again."""
     times = []
@@ -99,6 +101,7 @@ def test_no_update_takes_much_longer_than_others(samples):
     assert longest < 10.0 * usual  # 30 where all is done at once
 
 
+@pytest.mark.long
 def test_a_copy_goes_on_from_where_the_original_was(samples):
     half = len(samples) // 2
     first = changes.watch(iter(samples[:half]))

@@ -131,6 +131,7 @@ def test_candidates_are_every_effect_the_friction_of_a_joint_and_a_load():
 RATE = 200.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ('change', 'before', 'name', 'truth'),
     [
@@ -168,11 +169,12 @@ def test_a_change_in_mid_motion_is_seen_and_nothing_else_forgotten(change, befor
     assert np.all(moved < 4.0 * known.std[others])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_work_without_a_change_raises_no_alarm():
     assert not changes.watch(changes.unchanging(2, 1, RATE)).changes
 
 
+@pytest.mark.slow
 def test_a_motion_without_noise_raises_no_alarm(arm):
     """What filtering leaves of it is anything but normal: nothing, and much at reversals."""
     motion = multisine(arm.robot.joints, 20.0, 250.0, seed=0)

@@ -83,6 +83,7 @@ def clean(arm, motion, tau):
     return online
 
 
+@pytest.mark.slow
 def test_filtering_does_not_bias_a_rigid_arm(arm, motion):
     """
     Without noise the truth is found, and a single filter before the regressor would not do.
@@ -104,6 +105,7 @@ def test_filtering_does_not_bias_a_rigid_arm(arm, motion):
     assert coarse > 0.5 * MOTION_FILTER_RATIO**2 * error
 
 
+@pytest.mark.slow
 def test_friction_is_found_without_noise(arm, clean, motion):
     assert torque_error(arm, clean, motion) < 1e-3
     estimate = clean.estimate()
@@ -113,7 +115,7 @@ def test_friction_is_found_without_noise(arm, clean, motion):
             assert found == pytest.approx(value, rel=0.02), (name, joint)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
     """Chi-square of the errors of 8 noises, and every parameter within its own interval."""
     total, outside, count = 0.0, 0, 0

@@ -86,7 +86,7 @@ def test_after_a_change_the_noise_is_still_known():
     np.testing.assert_allclose(np.diag(covariance), np.diag(expected), rtol=0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_online_intervals_hold_in_coloured_noise():
     """
     Two joints with friction, encoder noise, torque noise that lasts, 20 times over.

@@ -43,6 +43,7 @@ def rows_of(path, arm, samples):
     return [rows for _, parts in pieces for rows in parts], len(pieces), columns
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('gaps', [(), ((21.3, 22.0), (40.0, 40.5))])
 @pytest.mark.parametrize('samples', [1700, 4000])
 def test_rows_of_pieces_are_those_of_the_whole(tmp_path, smooth, gaps, samples):

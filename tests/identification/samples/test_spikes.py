@@ -241,6 +241,7 @@ def undamaged(arm, recorded):
     return learned(arm, motion, motion.q, tau).estimate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('row', 'torque', 'angle'),
     [(3000, 100.0, 0.0), (3000, 1e4, 0.0), (150, 100.0, 0.0), (3000, 0.0, 0.1)],
@@ -260,6 +261,7 @@ def test_a_spike_neither_moves_the_estimate_nor_widens_it(
     assert sum(online.spikes.values()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('number', [1e6 + 1.0, 1e100, 1e154, 1e308, np.inf, np.nan])
 def test_no_number_ends_the_identifier(arm, recorded, undamaged, number):
     motion, tau = recorded
