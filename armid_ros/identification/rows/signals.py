@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.senders import two_senders
 from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
@@ -152,6 +153,9 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     """
     for recording in recordings:
         _require_rate(recording)
+        mixed = two_senders(recording)
+        if mixed:
+            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
