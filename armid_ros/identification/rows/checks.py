@@ -33,6 +33,9 @@ SHORTEST = 1.0
 _SHORT = 5.0
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
 _CLEAR = 0.8
+#: Correlation of a torque with a described one from which their ratio is clear: four fifths of the
+#: power follow.
+FOLLOWS = 0.9
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
 #: What they are of a joint that slides, whose effort is a force.
@@ -156,8 +159,9 @@ def check_torque(
     source = recordings[0].source
     if len(silent) == robot.n_joints:
         raise IdentificationError(f'{source}: {SILENT}')
-    slope, correlation = _slope_on_description(robot, problem)
-    clear = np.abs(correlation) > 0.9
+    motions, torques = [part.motion for part in problem], [part.tau for part in problem]
+    slope, correlation = torque_factors(robot, motions, torques)
+    clear = np.abs(correlation) > FOLLOWS
     if np.sum(clear) >= min(2, robot.n_joints):
         factors = slope[clear]
         joints = ', '.join(np.array(robot.joints)[clear])
@@ -330,14 +334,31 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
     )
 
 
-def _slope_on_description(
-    robot: Robot, problem: Sequence[Regression]
+def torque_factors(
+    robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Regress measured torques on the description's, friction and offset taken out first."""
+    """
+    Regress measured torques on those of a description, with friction and offset taken out first.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    motions : sequence of Motion
+        The data.
+    torques : sequence of ndarray, shape (N, n)
+        What was measured.
+
+    Returns
+    -------
+    factor, correlation : ndarray, shape (n,)
+        Measured torque per described torque, and their correlation; 0 where there is no torque.
+
+    """
     slope, correlation = np.zeros((2, robot.n_joints))
-    predicted = np.concatenate([inverse_dynamics(robot, part.motion) for part in problem])
-    measured = np.concatenate([part.tau for part in problem])
-    dq = np.concatenate([part.motion.dq for part in problem])
+    predicted = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    measured = np.concatenate(torques)
+    dq = np.concatenate([motion.dq for motion in motions])
     for joint in range(robot.n_joints):
         nuisance = np.column_stack([np.ones(len(dq)), dq[:, joint], np.sign(dq[:, joint])])
         pair = np.column_stack([predicted[:, joint], measured[:, joint]])

@@ -60,7 +60,7 @@ def two_arms_at_other_rates(one):
 def test_two_senders_of_one_topic_are_refused(mix, velocity):
     recording = mix(run())
     recording = recording if velocity else replace(recording, dq=None)
-    with pytest.raises(IdentificationError, match='mixed: .* two senders'):
+    with pytest.raises(IdentificationError, match=r'mixed: .* two senders'):
         conditioning([recording], SignalSettings())
 
 
