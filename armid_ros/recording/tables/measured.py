@@ -78,10 +78,17 @@ def measured(plan: TablePlan) -> Recording:
         tau=tau,
         start_ns=start,
         source=table.source,
-        topic='the table',
+        topic=_called(plan),
         report=report,
         others=tuple(_others(plan)),
     )
+
+
+def _called(plan: TablePlan) -> str:
+    """Name the table for messages, with what it has that may be what is missing."""
+    if plan.source('effort') is not None or not plan.unread:
+        return 'the table'
+    return f'the table (--effort names columns of it; not read are {plan.unread})'
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import re
 
 from armid_ros.errors import RecordingError
@@ -88,8 +88,8 @@ class Table:
         Samples per second, where the file says so and not each row.
     notes : tuple of str
         What reading it met.
-    empty : tuple of str
-        Columns without a number in them.
+    words : mapping of str to sequence of str
+        Columns of words, and those without anything in them.
 
     """
 
@@ -99,7 +99,7 @@ class Table:
     first_line: int | None = None
     rate_hz: float | None = None
     notes: tuple[str, ...] = ()
-    empty: tuple[str, ...] = ()
+    words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse tables that are empty or ragged."""
@@ -120,11 +120,26 @@ class Table:
         return tuple(column.name for column in self.columns)
 
     def column(self, name: str) -> TableColumn | None:
-        """Return the column of a name, with or without the unit in brackets; None if none has."""
-        for column in self.columns:
-            if name in (column.name, column.bare_name):
-                return column
-        return None
+        """
+        Return the column of a name, with or without the unit in brackets; None if none has.
+
+        Raises
+        ------
+        RecordingError
+            Several have it, with different values.
+
+        """
+        named = [column for column in self.columns if column.name == name]
+        named = named or [column for column in self.columns if column.bare_name == name]
+        for other in named[1:]:
+            if not np.array_equal(other.values, named[0].values, equal_nan=True):
+                row = int(np.argmax(other.values != named[0].values))
+                raise RecordingError(
+                    f"{self.source}: {len(named)} columns are called '{name}', with different "
+                    f'values, first in {self.where(row)}: {named[0].values[row]:g} and '
+                    f'{other.values[row]:g}; give each a name of its own'
+                )
+        return named[0] if named else None
 
     def where(self, row: int) -> str:
         """Return where a row is, for a message."""
@@ -134,18 +149,18 @@ class Table:
         """Return the names of the columns, elements of arrays in short, for a message."""
         names: dict[str, int] = {}
         for column in self.columns:
-            key = (
-                f'{column.array.removeprefix("[]")}[..]'
-                if column.name.endswith(']')
-                else column.name
-            )
+            key = f'{column.array.removeprefix("[]")}[..]' if column.array else column.name
             names[key] = names.get(key, 0) + 1
         shown = [
             f'{key[:-4]}[0..{count - 1}]' if key.endswith('[..]') else key
             for key, count in names.items()
         ]
         more = f' and {len(shown) - 40} more' if len(shown) > 40 else ''
-        empty = f'; without a number: {", ".join(self.empty[:40])}' if self.empty else ''
+        words = [
+            f"{name} ('{said[0]}')" if len(said) and said[0] else name
+            for name, said in self.words.items()
+        ]
+        empty = f'; without a number: {", ".join(words[:40])}' if words else ''
         bare = self.first_line is not None and any(c.array == '[]' for c in self.columns)
         header = (
             f'; a header line with names is missing above line {self.first_line}' if bare else ''
@@ -178,7 +193,7 @@ def unit_of(name: str) -> str:
 
 
 def table_of_arrays(
-    source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str, **facts: object
+    source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str
 ) -> Table:
     """
     Make a table of named arrays, of which samples run along the axis that most have in common.
@@ -191,8 +206,6 @@ def table_of_arrays(
         Numeric ones; scalars and those of other lengths are passed over.
     described : str
         What kind of file it is.
-    **facts
-        Further attributes of the table.
 
     """
     usable = {
@@ -204,7 +217,9 @@ def table_of_arrays(
     columns: list[TableColumn] = []
     for name, values in usable.items():
         columns += _columns_of(name, values.astype(np.float64), length)
-    return Table(source, tuple(columns), described, **facts)  # type: ignore[arg-type]
+    there = tuple(column for column in columns if np.isfinite(column.values).any())
+    words: dict[str, Sequence[str]] = {one.name: () for one in columns if one not in there}
+    return Table(source, there, described, words=words)
 
 
 def _common_length(source: str, arrays: Sequence[npt.NDArray[np.generic]]) -> int:
