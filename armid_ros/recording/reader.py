@@ -34,6 +34,7 @@ from armid_ros.recording.series import (
 )
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray, Topic
+from armid_ros.recording.turns import unwrapped
 import numpy as np
 
 # More samples than this part being not finite is no glitch but a fault of the recording.
@@ -139,6 +140,7 @@ def assemble(
             f'({_counted(counts) or "the bag is too short"})'
         )
     t = (stamps - stamps[0]) * 1e-9
+    q, wrapped = unwrapped(q)
     report = ReadReport(
         messages=decoder.messages,
         samples=len(stamps),
@@ -146,6 +148,7 @@ def assemble(
         not_finite=culprits,
         gaps=_gaps(t),
         absent=absent,
+        unwrapped=tuple(joints[k] for k in wrapped),
         clock_note=note,
         damage=_with_what_is_left(damage, decoder.messages, float(t[-1])),
         **counts,

@@ -31,6 +31,10 @@ RESTART_NS = 10**9
 _FEWEST_AGAIN = 10
 # A stretch without samples is a gap when it is longer than this many sampling periods.
 GAP_PERIODS = 5.0
+# No position, velocity or torque is as large; memory that nobody wrote to is.
+_LARGEST = 1e15
+# A torque that varies by less is none: memory that nobody wrote to [N m].
+NOTHING = 1e-9
 # Beyond these fractions of the messages the header's clock is not believed.
 _MAX_ZERO = 0.01
 _MAX_REPEATED = 0.5
@@ -109,6 +113,10 @@ def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
     """Say why stamps cannot be believed; nothing if they can."""
+    first = int(np.argmax(stamps != 0))
+    if first and np.count_nonzero(stamps[first:] == 0) <= _MAX_ZERO * len(stamps):
+        stamps = stamps[first:]  # before /clock there is no time
+        position = None if position is None else position[first:]
     zero = int((stamps == 0).sum())
     if zero > _MAX_ZERO * len(stamps):
         return 'are zero' if zero == len(stamps) else f'are zero in {zero} of {len(stamps)}'
@@ -125,7 +133,9 @@ def clock_problem(
     if (steps < 0).mean() > _MAX_BACKWARD:
         return 'jump back and forth'
     if receive is not None and len(receive) > 2:
-        span, received = float(np.ptp(stamps[stamps != 0])), float(np.ptp(receive))
+        span, received = (
+            float(np.ptp(times[times != 0])) if times.any() else 0.0 for times in (stamps, receive)
+        )
         if received > 0 and not received / _MAX_SPAN_RATIO < span < received * _MAX_SPAN_RATIO:
             return f'span {span * 1e-9:.3g} s where reception took {received * 1e-9:.3g} s'
     return ''
@@ -150,7 +160,7 @@ def not_finite(
     joints: Sequence[str], values: Iterable[tuple[str, FloatArray | None]], count: int
 ) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
     """
-    Find values that are not finite.
+    Find values that are not finite, or beyond all quantities (1e15).
 
     Parameters
     ----------
@@ -174,7 +184,7 @@ def not_finite(
     for name, array in values:
         if array is None:
             continue
-        wrong = ~np.isfinite(array)
+        wrong = ~(np.abs(array) < _LARGEST)
         if wrong.any():
             bad |= wrong.any(axis=1)
             for joint, number in zip(joints, wrong.sum(axis=0).tolist(), strict=True):

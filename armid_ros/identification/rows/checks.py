@@ -15,6 +15,7 @@ from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
+from armid_ros.recording.series import NOTHING
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
@@ -155,7 +156,7 @@ def check_torque(
     """
     robot = arm.robot
     tau = np.concatenate([part.tau for part in problem])
-    silent = [name for name, y in zip(robot.joints, tau.T, strict=True) if np.ptp(y) == 0.0]
+    silent = [name for name, y in zip(robot.joints, tau.T, strict=True) if np.ptp(y) < NOTHING]
     source = recordings[0].source
     if len(silent) == robot.n_joints:
         raise IdentificationError(f'{source}: {SILENT}')

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -19,6 +20,13 @@ _TRACK = 3.0
 #: Below this share of the messages, those of a second sender come between the others; where they
 #: replace them, so that without them there is a gap of so many periods, an encoder is at fault.
 _FEW, _GAP = 0.2, 1.5
+
+
+def require_one_sender(recording: Recording) -> None:
+    """Raise an IdentificationError where messages come from two senders."""
+    mixed = two_senders(recording)
+    if mixed:
+        raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
 
 
 def two_senders(recording: Recording) -> str:

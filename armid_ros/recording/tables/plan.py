@@ -334,7 +334,9 @@ def _doubts(
                 'them N m'
             )
         if source.quantity == 'position' and source.unit == 'rad':
-            doubts += _far(np.fmax.reduce(np.abs(source.values())), settings, slides)
+            values = np.abs(source.values())
+            reach = np.fmax.reduce(np.where(values < 1e15, values, np.nan))
+            doubts += _far(reach, settings, slides)
     return doubts
 
 
