@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointStateDecoder
-from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import Topic
 
 #: This many messages tell which joints a topic names.
 _PEEK = 1000
@@ -54,15 +55,15 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
                 topic.name,
                 topic.type_name,
                 topic.count,
-                _joints(bag, topic.name) if topic.type_name == JOINT_STATE else (),
+                _joints(bag, topic) if holds_joint_state(topic) else (),
             )
             for topic in bag.topics()
         )
 
 
-def _joints(bag: Bag, name: str) -> tuple[str, ...]:
+def _joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
     decoder = JointStateDecoder(())
-    for block in bag.blocks(name):
+    for block in joint_state_blocks(bag, topic):
         for _ in decoder.decode(block):
             pass
         if decoder.messages >= _PEEK:
