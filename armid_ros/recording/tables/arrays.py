@@ -48,7 +48,7 @@ def read_matlab(path: Path) -> Table:
     if HDF5 in raw[:1024]:
         return read_hdf5(path)
     for name, shape, _ in whosmat(io.BytesIO(raw)):
-        _require_packed(f'{path}: {name}', 8 * math.prod(shape), len(raw))
+        _require_packed(f'{path}: {name[:40]!r}', 8 * math.prod(shape), len(raw))
     content = loadmat(io.BytesIO(raw), simplify_cells=True)
     content = {name: value for name, value in content.items() if not name.startswith('__')}
     arrays = dict(_flattened(content, ''))
@@ -68,7 +68,7 @@ def read_hdf5(path: Path) -> Table:
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in 'fiub' and '#' not in name[:1]:
             stored = item.id.get_storage_size()
-            _require_packed(f'{path}: {name}', item.size * item.dtype.itemsize, stored)
+            _require_packed(f'{path}: {name[:40]!r}', item.size * item.dtype.itemsize, stored)
             arrays[name.replace('/', '.')] = np.asarray(item)
 
     with h5py.File(path, 'r') as file:

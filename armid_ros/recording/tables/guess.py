@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import re
 
-from armid_ros.recording.tables.patterns import ChosenColumns
+from armid_ros.recording.tables.patterns import by_number, ChosenColumns
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.words import (
@@ -207,7 +207,7 @@ def _in_order(
     """Return a family in the order of the joints; None where it does not fit them."""
     labels = list(members)
     if all(label.isdigit() for label in labels):
-        labels.sort(key=int)
+        labels.sort(key=by_number)
     if joints is not None:
         names = [renamed(label, rename) for label in labels]
         if set(joints) <= set(names):

@@ -164,5 +164,11 @@ def _by_placeholder(table: Table, pattern: str) -> dict[TableColumn, str]:
             found[column] = match[1].strip('[]')
     if found and any(label.isdigit() for label in found.values()):
         found = {column: label for column, label in found.items() if label.isdigit()}
-        return dict(sorted(found.items(), key=lambda pair: int(pair[1])))
+        return dict(sorted(found.items(), key=lambda pair: by_number(pair[1])))
     return found
+
+
+def by_number(label: str) -> tuple[int, str]:
+    """Return what sorts labels of digits by their number, of whatever length."""
+    digits = label.lstrip('0')
+    return len(digits), digits

@@ -155,9 +155,10 @@ class Table:
             f'{key[:-4]}[0..{count - 1}]' if key.endswith('[..]') else key
             for key, count in names.items()
         ]
+        shown = [' '.join(name.split())[:80] for name in shown]
         more = f' and {len(shown) - 40} more' if len(shown) > 40 else ''
         words = [
-            f"{name} ('{said[0]}')" if len(said) and said[0] else name
+            f"{name[:80]} ('{said[0][:40]}')" if len(said) and said[0] else name[:80]
             for name, said in self.words.items()
         ]
         empty = f'; without a number: {", ".join(words[:40])}' if words else ''
