@@ -33,8 +33,8 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.load_change import find_load, LoadChange
 from armid_ros.identification.assess.not_compared import NotCompared, only_in, without_deviation
 from armid_ros.identification.assess.residual_change import residual_changes, ResidualChange
-from armid_ros.identification.assess.torque_units import NEAR
 from armid_ros.identification.parameters_file import ParameterFile
+from armid_ros.identification.rows.checks import NEAR
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.stats import chi2, f, norm, t

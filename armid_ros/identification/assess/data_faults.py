@@ -38,12 +38,13 @@ from armid_ros.identification.assess.mistakes import (
     is_factor,
     slow_motions_of,
 )
-from armid_ros.identification.assess.torque_units import unit_of, units_near
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
+    unit_of,
+    units_near,
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers

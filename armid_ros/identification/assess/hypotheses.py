@@ -19,12 +19,12 @@ from typing import ClassVar
 from armid_ros.identification.assess.grade_limits import GradeLimits
 from armid_ros.identification.assess.hypothesis import changed, Hypothesis, Quantity, scaled
 from armid_ros.identification.assess.known_gravity import known_gravity
-from armid_ros.identification.assess.torque_units import unit_of
 from armid_ros.identification.rows.checks import (
     effort_unit,
     FOLLOWS,
     torque_factors,
     TORQUE_UNITS,
+    unit_of,
 )
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion

@@ -14,8 +14,13 @@ from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.hypotheses import InUnit
-from armid_ros.identification.assess.torque_units import NEAR, units_near
-from armid_ros.identification.rows.checks import effort_unit, FOLLOWS, TORQUE_UNITS
+from armid_ros.identification.rows.checks import (
+    effort_unit,
+    FOLLOWS,
+    NEAR,
+    TORQUE_UNITS,
+    units_near,
+)
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording

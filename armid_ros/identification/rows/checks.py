@@ -39,6 +39,19 @@ _CLEAR = 0.8
 FOLLOWS = 0.9
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
+#: A factor of torques is that of a unit if it is within this factor of it: masses of a description
+#: are off by less.
+NEAR = 1.5
+#: Units of a force on a lever [1/(N m)], which all joints have at once: of one joint alone a load
+#: makes the torque ten times as large.
+_LEVER_UNITS = {'kgf m': 1.0 / 9.80665, 'kgf cm': 100.0 / 9.80665, 'lbf in': 1.0 / 0.1129848}
+#: The same for those, which gains of currents are near to: 10 N m/A is 1.02 kgf m/A. Masses of a
+#: description that are off make about as much of the factor of one joint.
+_NEAR_FORCE = 1.2
+_UNITS_OF_JOINTS = {
+    **TORQUE_UNITS,
+    'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0)),
+}
 #: What they are of a joint that slides, whose effort is a force.
 _FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Said of torques that are absent.
@@ -369,3 +382,42 @@ def torque_factors(
             slope[joint] = product / own
             correlation[joint] = product / np.sqrt(own * (rest[:, 1] @ rest[:, 1]))
     return slope, correlation
+
+
+def unit_of(factor: float, of_joints: Sequence[float] = ()) -> str:
+    """
+    Return the unit, or two, in which torques are that are so many times too large, or ''.
+
+    Parameters
+    ----------
+    factor : float
+        Of all joints together.
+    of_joints : sequence of float
+        Of single joints: a unit has to fit each of them, where the gains of currents differ.
+
+    """
+    fitting = [set(units_near(one)) for one in of_joints]
+    return ' or '.join(u for u in units_near(factor) if all(u in units for units in fitting))
+
+
+def units_near(factor: float, near_force: float = _NEAR_FORCE) -> dict[str, float]:
+    """
+    Return the factors of units that torques may be in, by their names, the nearest first.
+
+    Parameters
+    ----------
+    factor : float
+        By which torques are too large.
+    near_force : float
+        How far it may be from that of a unit of force on a lever, as a factor.
+
+    """
+    if factor <= 0.0:
+        return {}
+    known = {**_UNITS_OF_JOINTS, **_LEVER_UNITS}
+    off = {
+        unit: abs(float(np.log(factor / per))) / float(np.log(near))
+        for units, near in ((_UNITS_OF_JOINTS, NEAR), (_LEVER_UNITS, near_force))
+        for unit, per in units.items()
+    }
+    return {unit: known[unit] for unit in sorted(off, key=off.__getitem__) if off[unit] < 1.0}

@@ -43,11 +43,12 @@ def two_senders(recording: Recording) -> str:
         return ''
     before, after, across = q[1:-1] - q[:-2], q[1:-1] - q[2:], q[2:] - q[:-2]
     step = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-    reach = _usual_speed(recording, across) * (t[2:] - t[:-2])[:, np.newaxis]
-    least = np.maximum(np.maximum(_LEAST, _CLOSER * np.abs(across)), reach)
-    apart = step > least
-    rows = np.flatnonzero(apart.any(axis=1))
-    if len(rows) < max(_FEWEST, _SHARE * len(t)):
+    apart = step > np.maximum(_LEAST, _CLOSER * np.abs(across))
+    fewest = max(_FEWEST, _SHARE * len(t))
+    if np.count_nonzero(apart) < fewest:
+        return ''
+    apart &= step > _usual_speed(recording, across) * (t[2:] - t[:-2])[:, np.newaxis]
+    if np.count_nonzero(apart.any(axis=1)) < fewest:
         return ''
     joint = int(np.argmax(apart.sum(axis=0)))
     rows = np.flatnonzero(apart[:, joint])

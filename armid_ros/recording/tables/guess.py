@@ -233,8 +233,6 @@ def _score(pattern: str, quantity: QuantityName) -> float:
 
 def _still(chosen: ChosenColumns) -> float:
     """Return what speaks against a family with columns that never change: they are not filled."""
-    still = [
-        float(np.ptp(column.values[np.isfinite(column.values)])) == 0.0
-        for column in chosen.columns
-    ]
+    finite = (column.values[np.isfinite(column.values)] for column in chosen.columns)
+    still = [len(values) == 0 or float(np.ptp(values)) == 0.0 for values in finite]
     return 1.0 if any(still) else 0.0

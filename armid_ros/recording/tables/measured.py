@@ -9,12 +9,11 @@ from collections.abc import Iterator, Mapping
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
-from armid_ros.recording.series import GAP_PERIODS, longest_run, not_finite
+from armid_ros.recording.series import GAP_PERIODS, longest_run, not_finite, unwrapped
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
-from armid_ros.recording.turns import unwrapped
 import numpy as np
 import numpy.typing as npt
 

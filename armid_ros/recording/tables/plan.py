@@ -10,6 +10,7 @@ import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
+from armid_ros.recording.series import LARGEST
 from armid_ros.recording.tables.guess import guess, guess_time, Incomplete, incomplete, named_time
 from armid_ros.recording.tables.patterns import choose, ChosenColumns
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
@@ -335,7 +336,7 @@ def _doubts(
             )
         if source.quantity == 'position' and source.unit == 'rad':
             values = np.abs(source.values())
-            reach = np.fmax.reduce(np.where(values < 1e15, values, np.nan))
+            reach = np.fmax.reduce(np.where(values < LARGEST, values, np.nan))
             doubts += _far(reach, settings, slides)
     return doubts
 

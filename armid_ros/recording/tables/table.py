@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import re
 
 from armid_ros.errors import RecordingError
+from armid_ros.files.documents import LARGEST
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +44,7 @@ class TableColumn:
     name : str
         As in the file; an element of an array is 'q[0]', or '[0]' where the array has no name.
     values : ndarray, shape (N,)
-        NaN where the file has no number.
+        NaN where the file has no number, or one beyond all quantities.
     array : str
         Name of the array it is an element of; empty for a column of its own.
     unit : str
@@ -58,7 +59,9 @@ class TableColumn:
 
     def __post_init__(self) -> None:
         """Freeze the values, and take the unit from the name where none was given."""
-        object.__setattr__(self, 'values', read_only(self.values))
+        with np.errstate(invalid='ignore'):  # of rubbish that is a signalling NaN
+            values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
+        object.__setattr__(self, 'values', read_only(values))
         object.__setattr__(
             self, 'unit', normal_unit(self.unit) or unit_of(self.array or self.name)
         )

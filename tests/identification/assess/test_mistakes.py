@@ -19,7 +19,7 @@ from armid_ros.identification.assess.hypotheses import (
 )
 from armid_ros.identification.assess.known_gravity import known_gravity
 from armid_ros.identification.assess.mistakes import find_mistake, suspected_mistake
-from armid_ros.identification.assess.torque_units import unit_of
+from armid_ros.identification.rows.checks import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
