@@ -8,13 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
-from armid_ros.recording.joint_state.decoder import JointStateDecoder
+from armid_ros.recording.joint_state.conversion import holds_joint_state
+from armid_ros.recording.reader import named_joints
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Topic
-
-#: This many messages tell which joints a topic names.
-_PEEK = 1000
 
 
 @dataclass(frozen=True)
@@ -55,17 +51,7 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
                 topic.name,
                 topic.type_name,
                 topic.count,
-                _joints(bag, topic) if holds_joint_state(topic) else (),
+                named_joints(bag, topic) if holds_joint_state(topic) else (),
             )
             for topic in bag.topics()
         )
-
-
-def _joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
-    decoder = JointStateDecoder(())
-    for block in joint_state_blocks(bag, topic):
-        for _ in decoder.decode(block):
-            pass
-        if decoder.messages >= _PEEK:
-            break
-    return decoder.names_seen

@@ -21,12 +21,11 @@ from armid_ros.recording.recording import (
     PositionRange,
     ReadReport,
     Recording,
-    TimeGap,
 )
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,
-    GAP_PERIODS,
+    gaps,
     gather,
     JointSamples,
     merged,
@@ -152,7 +151,7 @@ def assemble(
         samples=len(stamps),
         malformed=decoder.malformed,
         not_finite=culprits,
-        gaps=_gaps(t),
+        gaps=gaps(t),
         absent=absent,
         unwrapped=tuple(joints[k] for k in wrapped),
         clock_note=note,
@@ -228,7 +227,7 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
         )
     if len(candidates) == 1:
         return (candidates[0],)
-    named = {topic.name: _named_joints(bag, topic) for topic in candidates}
+    named = {topic.name: named_joints(bag, topic) for topic in candidates}
     complete = [topic for topic in candidates if set(joints) <= set(named[topic.name])]
     if len(complete) > 1:
         plain = [topic for topic in complete if topic.name.split('/')[-1] == 'joint_states']
@@ -246,8 +245,8 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     )
 
 
-def _named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
-    """Return the joints the first messages of a topic name."""
+def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
+    """Return the joints that the first messages of a topic name."""
     decoder = JointStateDecoder(())
     for block in joint_state_blocks(bag, topic):
         for _ in decoder.decode(block):
@@ -341,13 +340,6 @@ def _finite(
     q, dq, tau = (None if array is None else array[~bad] for array in values)
     assert q is not None
     return (q, dq, tau, stamps[~bad]), culprits
-
-
-def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    """Return the stretches without samples."""
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
 
 
 def _counted(counts: Counter[str]) -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointStates
-from armid_ros.recording.recording import Clock
+from armid_ros.recording.recording import Clock, TimeGap
 from armid_ros.recording.source import IntArray
 import numpy as np
 import numpy.typing as npt
@@ -386,6 +386,13 @@ def _resampled(
         None if v is None else v[before] + weight * (v[after] - v[before]) for v in series.values
     )
     return JointSamples(series.joints, stamps, (q, dq, tau)), valid, equal
+
+
+def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
+    """Return the stretches without samples."""
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
+    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
 
 
 def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
-from armid_ros.recording.series import GAP_PERIODS, longest_run, not_finite, unwrapped
+from armid_ros.recording.recording import PositionRange, ReadReport, Recording
+from armid_ros.recording.series import gaps, longest_run, not_finite, unwrapped
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
@@ -71,7 +71,7 @@ def measured(plan: TablePlan) -> Recording:
         nan=int((~kept & stamped).sum()),
         unstamped=int((~stamped).sum()),
         not_finite=culprits,
-        gaps=_gaps(time),
+        gaps=gaps(time),
         absent=plan.absent,
         unwrapped=tuple(plan.joints[k] for k in wrapped),
         damage='; '.join(note for note in table.notes if 'cut off' in note),
@@ -151,9 +151,3 @@ def _others(plan: TablePlan) -> Iterator[PositionRange]:
         values = column.values[np.isfinite(column.values)] * source.factor[0]
         if len(values):
             yield PositionRange(joint, float(values.min()), float(values.max()))
-
-
-def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
