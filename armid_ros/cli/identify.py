@@ -244,6 +244,8 @@ def _print(
     say(f'{work.graded.word}:')
     for reason in work.graded.reasons:
         say(f'  {reason}')
+    for lacking in () if work.verification is None else work.verification.left_out:
+        say(f'  {lacking}')
     shown = [fit for fits in work.validation.values() for fit in fits] or result.training
     trends = residual_trends(result.arm.robot.joints, shown)
     if trends:

@@ -11,6 +11,7 @@ from typing import Literal
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
+from armid_ros.identification.rows.senders import two_senders
 from armid_ros.identification.rows.stamps import rounded_stamps
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
@@ -144,6 +145,9 @@ def inspect(
         *_of_efforts(joints, robot, trial),
         *_of_filters(recording),
     ]
+    mixed = two_senders(recording)
+    if trial is None and mixed:
+        found.append(Remark('bad', mixed))
     if trial is None or trial.refused:
         found += [Remark('bad', text) for text in dead_encoders(robot, recording)]
     if trial is not None and trial.refused:

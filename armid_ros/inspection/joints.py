@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from armid_ros.identification.assess.velocities import velocity_ratio, VelocityRatio
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
+from armid_ros.recording.series import NOTHING
 import numpy as np
 from scipy.signal import savgol_filter
 
@@ -115,5 +116,5 @@ def _facts(
         velocity_fit=fit,
         effort_rms=None if tau is None else float(np.sqrt(np.mean(tau**2))),
         effort_largest=None if tau is None else float(np.abs(tau).max()),
-        effort_varies=tau is not None and bool(np.ptp(tau) > 0.0),
+        effort_varies=tau is not None and bool(np.ptp(tau) > NOTHING),
     )

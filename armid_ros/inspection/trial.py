@@ -15,8 +15,8 @@ from armid_ros.identification.assess.grade import grade
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.undriven import held_elsewhere
-from armid_ros.model import inverse_dynamics
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -96,6 +96,8 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     except ArmidError as refusal:
         return TrialFit(refused=str(refusal))
     motions = [fit.motion for fit in result.training]
+    torques = [motion.tau for motion in motions if motion.tau is not None]
+    factors, correlation = torque_factors(robot, motions, torques)
     score = Score.of(result.training)
     return TrialFit(
         relative_error_percent=score.relative_error_percent,
@@ -103,7 +105,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         theory=result.theory.rank,
         condition_number=result.condition_number,
         cutoff_hz=result.used.cutoff_hz,
-        scale=_scale(robot, motions),
+        scale=np.where(np.abs(correlation) > FOLLOWS, factors, np.nan),
         notes=result.notes,
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
         poor=tuple(_poor(result, score.joint_relative_error_percent)),
@@ -119,19 +121,3 @@ def _poor(result: Identification, errors: FloatArray) -> Iterator[str]:
     for joint, error, left in zip(result.arm.robot.joints, errors, beyond, strict=True):
         if left > LIMITS.poor:
             yield f'{error:.0f} % of the efforts of {joint}'
-
-
-def _scale(robot: Robot, motions: list[Motion]) -> FloatArray:
-    """Regress efforts on what the description takes, friction and offset taken out first."""
-    predicted = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
-    tau = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
-    dq = np.concatenate([motion.dq for motion in motions])
-    scale = np.full(robot.n_joints, np.nan)
-    for j in range(robot.n_joints):
-        nuisance = np.column_stack([np.ones(len(dq)), dq[:, j], np.sign(dq[:, j])])
-        pair = np.column_stack([predicted[:, j], tau[:, j]])
-        rest = pair - nuisance @ np.linalg.lstsq(nuisance, pair, rcond=None)[0]
-        own, other = rest[:, 0] @ rest[:, 0], rest[:, 1] @ rest[:, 1]
-        if own > 0.0 and other > 0.0 and abs(rest[:, 0] @ rest[:, 1]) > 0.9 * np.sqrt(own * other):
-            scale[j] = rest[:, 0] @ rest[:, 1] / own
-    return scale

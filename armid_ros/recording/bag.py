@@ -22,7 +22,7 @@ from typing import Self
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular, reading
-from armid_ros.recording.compression import message_content, unpacked
+from armid_ros.recording.compression import message_content, unpacked, ZSTD
 from armid_ros.recording.damage import Damage
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
@@ -35,7 +35,7 @@ _STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
     '.mcap': McapSource,
     '.db3': SqliteSource,
 }
-_COMPRESSED = '.zstd'
+_COMPRESSED = ('.zstd', '.zst')
 
 
 def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
@@ -143,7 +143,7 @@ class Bag:
             for source in self._sources:
                 for block in source.blocks(topic):
                     count += len(block)
-                    yield self._decompressed(block) if self._by_message else block
+                    yield self._decompressed(block) if self._packed(block.message(0)) else block
         expected = self._metadata.counts.get(topic, count)
         if count != expected:
             self._damage.add(
@@ -156,16 +156,20 @@ class Bag:
         streams = [source.messages() for source in self._sources]
         with reading(self.path, RecordingError):
             for message in heapq.merge(*streams, key=lambda message: message.log_time_ns):
-                if self._by_message:
+                if self._packed(message.cdr):
                     yield message._replace(cdr=message_content(message.cdr, limit))
                 else:
                     yield message
+
+    def _packed(self, message: bytes) -> bool:
+        """Whether messages are compressed one by one, of which only the metadata knows."""
+        return self._by_message or message[:4] == ZSTD
 
     def _open(self, file: Path) -> Source:
         """Open one file."""
         storage = _STORAGES[_storage_suffix(file)]
         with reading(file, RecordingError):
-            plain = self._unpacked(file) if file.suffix == _COMPRESSED else file
+            plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
             source: Source = storage(plain, self._settings)
         self._stack.callback(source.close)
         return source
@@ -210,7 +214,7 @@ class _Part:
 
 def _storage_suffix(file: Path) -> str:
     """Return '.mcap', '.db3', or what else a file is called."""
-    return Path(file.stem).suffix if file.suffix == _COMPRESSED else file.suffix
+    return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
 
 
 def _files_of(path: Path) -> BagMetadata:

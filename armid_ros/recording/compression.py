@@ -21,6 +21,8 @@ import zstandard
 _Buffer = bytes | memoryview
 #: What the decompressors raise for rubbish.
 CORRUPT = (zstandard.ZstdError, RuntimeError, MemoryError, OverflowError, ValueError)
+#: What a frame of zstd begins with, and no message in CDR.
+ZSTD = b'\x28\xb5\x2f\xfd'
 _STEP = 1 << 20
 _PARTIAL_STEP = 1024
 

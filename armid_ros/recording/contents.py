@@ -8,12 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.joint_state.decoder import JointStateDecoder
-from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.joint_state.conversion import holds_joint_state
+from armid_ros.recording.reader import named_joints
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-
-#: This many messages tell which joints a topic names.
-_PEEK = 1000
 
 
 @dataclass(frozen=True)
@@ -54,17 +51,7 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
                 topic.name,
                 topic.type_name,
                 topic.count,
-                _joints(bag, topic.name) if topic.type_name == JOINT_STATE else (),
+                named_joints(bag, topic) if holds_joint_state(topic) else (),
             )
             for topic in bag.topics()
         )
-
-
-def _joints(bag: Bag, name: str) -> tuple[str, ...]:
-    decoder = JointStateDecoder(())
-    for block in bag.blocks(name):
-        for _ in decoder.decode(block):
-            pass
-        if decoder.messages >= _PEEK:
-            break
-    return decoder.names_seen

@@ -11,10 +11,12 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
-from armid_ros.recording.reader import assemble, check_joints, choose_topic
+from armid_ros.recording.reader import assemble, check_joints, choose_topics
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import Topic
 import numpy as np
 import numpy.typing as npt
 
@@ -58,7 +60,12 @@ def read_pieces(
     """
     joints = tuple(joints)
     with Bag(path, settings) as bag:
-        chosen = choose_topic(bag, joints, topic)
+        chosen, *others = choose_topics(bag, joints, topic)
+        if others:
+            raise RecordingError(
+                f'{path}: joints are spread over {chosen.name} and {others[0].name}, which cannot '
+                'be read piece by piece: merge them with joint_state_merger'
+            )
         decoder = JointStateDecoder(joints)
         where = f'{path}: {chosen.name}'
         held: list[JointStates] = []
@@ -69,7 +76,7 @@ def read_pieces(
             with reading(where, RecordingError):
                 return assemble(str(path), chosen.name, joints, list(held), decoder, damage)
 
-        for part in _parts(bag, chosen.name, decoder, samples):
+        for part in _parts(bag, chosen, decoder, samples):
             if new and new + len(part) > samples:
                 piece = made()
                 yield piece, False
@@ -79,10 +86,10 @@ def read_pieces(
         yield made(bag.damage), True
 
 
-def _parts(bag: Bag, topic: str, decoder: JointStateDecoder, most: int) -> Iterator[JointStates]:
+def _parts(bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int) -> Iterator[JointStates]:
     """Yield the messages of a topic, so many at a time at most."""
     with reading(bag.path, RecordingError):
-        for block in bag.blocks(topic):
+        for block in joint_state_blocks(bag, topic):
             for states in decoder.decode(block):
                 for start in range(0, len(states), most):
                     yield _part(states, slice(start, start + most))

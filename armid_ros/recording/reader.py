@@ -13,6 +13,7 @@ from armid_ros.errors import nearest, RecordingError
 from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.recording import (
@@ -20,17 +21,17 @@ from armid_ros.recording.recording import (
     PositionRange,
     ReadReport,
     Recording,
-    TimeGap,
 )
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,
-    GAP_PERIODS,
+    gaps,
     gather,
     JointSamples,
     merged,
     not_finite,
     ordered,
+    unwrapped,
 )
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray, Topic
@@ -63,7 +64,8 @@ def read_recording(
         positions is kept.
     topic : str, optional
         Topic of sensor_msgs/JointState; by default the only one, or the only one that names all
-        the joints, or of several such the only one called 'joint_states'.
+        the joints, or of several such the only one called 'joint_states', or those that name all
+        joints together, none of them twice.
     settings : ReadSettings
         Whether checksums are compared, and how much memory to take.
 
@@ -85,21 +87,25 @@ def read_recording(
     if not joints or len(set(joints)) != len(joints):
         raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
     with Bag(path, settings) as bag:
-        chosen = choose_topic(bag, joints, topic)
-        decoder = JointStateDecoder(joints, chosen.count)
-        where = f'{path}: {chosen.name}'
+        chosen = choose_topics(bag, joints, topic)
+        decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
+        name = ' + '.join(one.name for one in chosen)
+        where = f'{path}: {name}'
         with reading(path, RecordingError):
             pieces = list(_within(settings, where, _decoded(bag, chosen, decoder)))
         damage = bag.damage
     check_joints(where, decoder, joints)
     with reading(where, RecordingError):
-        return assemble(str(path), chosen.name, joints, pieces, decoder, damage)
+        return assemble(str(path), name, joints, pieces, decoder, damage)
 
 
-def _decoded(bag: Bag, topic: Topic, decoder: JointStateDecoder) -> Iterator[JointStates]:
-    """Yield the messages of a topic as arrays."""
-    for block in bag.blocks(topic.name):
-        yield from decoder.decode(block)
+def _decoded(
+    bag: Bag, topics: Sequence[Topic], decoder: JointStateDecoder
+) -> Iterator[JointStates]:
+    """Yield the messages of topics as arrays."""
+    for topic in topics:
+        for block in joint_state_blocks(bag, topic):
+            yield from decoder.decode(block)
 
 
 def _within(
@@ -139,13 +145,15 @@ def assemble(
             f'({_counted(counts) or "the bag is too short"})'
         )
     t = (stamps - stamps[0]) * 1e-9
+    q, wrapped = unwrapped(q)
     report = ReadReport(
         messages=decoder.messages,
         samples=len(stamps),
         malformed=decoder.malformed,
         not_finite=culprits,
-        gaps=_gaps(t),
+        gaps=gaps(t),
         absent=absent,
+        unwrapped=tuple(joints[k] for k in wrapped),
         clock_note=note,
         damage=_with_what_is_left(damage, decoder.messages, float(t[-1])),
         **counts,
@@ -190,22 +198,23 @@ def _recording(
     )
 
 
-def choose_topic(bag: Bag, joints: Sequence[str], wanted: str | None) -> Topic:
-    """Return the topic to read."""
+def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:
+    """Return the topic to read, or the topics that name the joints between them."""
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
+    candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
     available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
     if wanted is not None:
         name = '/' + wanted.lstrip('/')
         for topic in topics:
             if '/' + topic.name.lstrip('/') != name:
                 continue
-            if topic.type_name != JOINT_STATE:
+            if not holds_joint_state(topic):
                 raise RecordingError(
                     f'{bag.path}: {topic.name} is a topic of {topic.type_name}, not of '
                     f'{JOINT_STATE}; of that type there are: {available or "none"}'
                 )
-            return _checked(bag, topic)
+            return (topic,)
         raise RecordingError(
             f'{bag.path}: there is no topic {wanted}; topics of {JOINT_STATE}: '
             f'{available or "none"}'
@@ -217,14 +226,18 @@ def choose_topic(bag: Bag, joints: Sequence[str], wanted: str | None) -> Topic:
             f'{bag.path}: no topic of {JOINT_STATE}; the bag has {others or "no topics"}{damage}'
         )
     if len(candidates) == 1:
-        return _checked(bag, candidates[0])
-    named = {topic.name: _named_joints(bag, topic) for topic in candidates}
+        return (candidates[0],)
+    named = {topic.name: named_joints(bag, topic) for topic in candidates}
     complete = [topic for topic in candidates if set(joints) <= set(named[topic.name])]
     if len(complete) > 1:
         plain = [topic for topic in complete if topic.name.split('/')[-1] == 'joint_states']
         complete = plain if len(plain) == 1 else complete
     if len(complete) == 1:
-        return _checked(bag, complete[0])
+        return (complete[0],)
+    parts = tuple(one for one in candidates if set(joints) & set(named[one.name]))
+    between = [name for one in parts for name in named[one.name]]
+    if not complete and set(joints) <= set(between) and len(between) == len(set(between)):
+        return parts
     listed = '; '.join(f'{name} names {", ".join(n) or "none"}' for name, n in named.items())
     which = 'several topics name' if complete else 'no topic names'
     raise RecordingError(
@@ -232,20 +245,10 @@ def choose_topic(bag: Bag, joints: Sequence[str], wanted: str | None) -> Topic:
     )
 
 
-def _checked(bag: Bag, topic: Topic) -> Topic:
-    """Refuse what is not CDR."""
-    if topic.encoding != 'cdr':
-        raise RecordingError(
-            f"{bag.path}: {topic.name} is serialised as '{topic.encoding}'; only CDR, "
-            'the form of ROS 2, can be read'
-        )
-    return topic
-
-
-def _named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
-    """Return the joints the first messages of a topic name."""
+def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
+    """Return the joints that the first messages of a topic name."""
     decoder = JointStateDecoder(())
-    for block in bag.blocks(topic.name):
+    for block in joint_state_blocks(bag, topic):
         for _ in decoder.decode(block):
             pass
         if decoder.messages >= _PEEK_MESSAGES:
@@ -337,13 +340,6 @@ def _finite(
     q, dq, tau = (None if array is None else array[~bad] for array in values)
     assert q is not None
     return (q, dq, tau, stamps[~bad]), culprits
-
-
-def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    """Return the stretches without samples."""
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
 
 
 def _counted(counts: Counter[str]) -> str:

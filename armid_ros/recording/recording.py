@@ -88,6 +88,8 @@ class ReadReport:
         Stretches of more than five sampling periods without a sample.
     absent : tuple of str
         Quantities some or all joints lack, in words: 'effort of wrist'.
+    unwrapped : tuple of str
+        Joints whose positions jumped by whole turns, and are continuous now.
     clock_note : str
         Why the receive time was used; empty when the header's was.
     damage : str
@@ -109,6 +111,7 @@ class ReadReport:
     not_finite: tuple[str, ...] = ()
     gaps: tuple[TimeGap, ...] = ()
     absent: tuple[str, ...] = ()
+    unwrapped: tuple[str, ...] = ()
     clock_note: str = ''
     damage: str = ''
 
@@ -120,7 +123,7 @@ class ReadReport:
     @property
     def unharmed(self) -> bool:
         """Whether reading lost and repaired nothing; velocities are not needed."""
-        return replace(self, absent=()).clean
+        return replace(self, absent=(), unwrapped=()).clean
 
     def describe(self) -> str:
         """Return the report as one or a few sentences."""
@@ -145,6 +148,8 @@ class ReadReport:
             text += f' {number}, the longest {longest.length:.3g} s at {longest.t:.3f} s.'
         if self.absent:
             text += f' Not recorded: {", ".join(self.absent)}.'
+        if self.unwrapped:
+            text += f' Jumps by whole turns undone: {", ".join(self.unwrapped)}.'
         if self.clock_note:
             text += f' Time is that of reception: {self.clock_note}.'
         if self.damage:

@@ -13,6 +13,7 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import is_plain
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.tables.settings import renamed
@@ -103,6 +104,11 @@ def copy_renamed(
         topics = {topic.name: topic for topic in bag.topics()}
         for topic in topics.values():
             described = topic.message_type
+            if topic.type_name == JOINT_STATE and not is_plain(topic):
+                raise RecordingError(
+                    f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
+                    'changed; give --rename to the command that reads the bag'
+                )
             writer.add_topic(
                 topic.name,
                 topic.type_name,

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointStates
-from armid_ros.recording.recording import Clock
+from armid_ros.recording.recording import Clock, TimeGap
 from armid_ros.recording.source import IntArray
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,14 @@ RESTART_NS = 10**9
 _FEWEST_AGAIN = 10
 # A stretch without samples is a gap when it is longer than this many sampling periods.
 GAP_PERIODS = 5.0
+# No position, velocity or torque is as large; memory that nobody wrote to is.
+LARGEST = 1e15
+# A torque that varies by less is none: memory that nobody wrote to [N m].
+NOTHING = 1e-9
+#: A whole turn in the units that positions come in [rad, degrees].
+_TURNS = (2.0 * np.pi, 360.0)
+#: What a step that is a jump by a whole turn may be off it, as a share of the turn.
+_OFF_A_TURN = 0.15
 # Beyond these fractions of the messages the header's clock is not believed.
 _MAX_ZERO = 0.01
 _MAX_REPEATED = 0.5
@@ -109,6 +117,10 @@ def clock_problem(
     stamps: IntArray, position: FloatArray | None, receive: IntArray | None = None
 ) -> str:
     """Say why stamps cannot be believed; nothing if they can."""
+    first = int(np.argmax(stamps != 0))
+    if first and np.count_nonzero(stamps[first:] == 0) <= _MAX_ZERO * len(stamps):
+        stamps = stamps[first:]  # before /clock there is no time
+        position = None if position is None else position[first:]
     zero = int((stamps == 0).sum())
     if zero > _MAX_ZERO * len(stamps):
         return 'are zero' if zero == len(stamps) else f'are zero in {zero} of {len(stamps)}'
@@ -125,7 +137,9 @@ def clock_problem(
     if (steps < 0).mean() > _MAX_BACKWARD:
         return 'jump back and forth'
     if receive is not None and len(receive) > 2:
-        span, received = float(np.ptp(stamps[stamps != 0])), float(np.ptp(receive))
+        span, received = (
+            float(np.ptp(times[times != 0])) if times.any() else 0.0 for times in (stamps, receive)
+        )
         if received > 0 and not received / _MAX_SPAN_RATIO < span < received * _MAX_SPAN_RATIO:
             return f'span {span * 1e-9:.3g} s where reception took {received * 1e-9:.3g} s'
     return ''
@@ -150,7 +164,7 @@ def not_finite(
     joints: Sequence[str], values: Iterable[tuple[str, FloatArray | None]], count: int
 ) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
     """
-    Find values that are not finite.
+    Find values that are not finite, or beyond all quantities (1e15).
 
     Parameters
     ----------
@@ -174,7 +188,7 @@ def not_finite(
     for name, array in values:
         if array is None:
             continue
-        wrong = ~np.isfinite(array)
+        wrong = ~(np.abs(array) < LARGEST)
         if wrong.any():
             bad |= wrong.any(axis=1)
             for joint, number in zip(joints, wrong.sum(axis=0).tolist(), strict=True):
@@ -372,3 +386,56 @@ def _resampled(
         None if v is None else v[before] + weight * (v[after] - v[before]) for v in series.values
     )
     return JointSamples(series.joints, stamps, (q, dq, tau)), valid, equal
+
+
+def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
+    """Return the stretches without samples."""
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
+    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
+
+
+def unwrapped(q: FloatArray) -> tuple[FloatArray, list[int]]:
+    """
+    Undo jumps by a whole turn.
+
+    A joint is wrapped if it stays within one turn and every step of more than half a turn is one
+    of a whole turn but for what the joint moves otherwise.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        Positions [rad or degrees].
+
+    Returns
+    -------
+    q : ndarray, shape (N, n)
+        Continuous positions, by whole turns as near to zero as may be; the same object where
+        nothing was wrapped.
+    joints : list of int
+        Those that were.
+
+    """
+    steps = np.diff(q, axis=0)
+    found: list[int] = []
+    largest = np.max(np.abs(steps), axis=0, initial=0.0)
+    for joint in np.flatnonzero(largest > (1.0 - _OFF_A_TURN) * _TURNS[0]).tolist():
+        step = steps[:, joint]
+        for turn in _TURNS:
+            far = np.abs(step) > 0.5 * turn
+            off = np.abs(np.abs(step[far]) - turn)
+            usual = np.max(np.abs(step[~far]), initial=0.0)
+            within = np.ptp(q[:, joint]) <= turn * (1.0 + 1e-3)
+            if (
+                far.any()
+                and within
+                and np.all(off < min(_OFF_A_TURN * turn, 3.0 * usual + 1e-3 * turn))
+            ):
+                whole = q[:, joint].copy()
+                whole[1:] -= turn * np.cumsum(np.where(far, np.sign(step), 0.0))
+                whole -= turn * np.round(0.5 * (whole.min() + whole.max()) / turn)
+                q = q.copy() if not found else q
+                q[:, joint] = whole
+                found.append(joint)
+                break
+    return q, found

@@ -66,12 +66,25 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
     """Say in words what changed, the surest first; the first sentence is the sum of it."""
+    if comparison.factors:
+        return (*(_unusable(one) for one in comparison.unusable), _units(comparison))
     return (
         *(_unusable(one) for one in comparison.unusable),
         _sum(comparison),
         *(_residual(one, comparison) for one in comparison.changed_residuals),
         *tell_not_compared(comparison),
         *_details(comparison),
+    )
+
+
+def _units(comparison: Comparison) -> str:
+    """Say that torques of one of the two are in another unit."""
+    named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
+    return (
+        f'Inertia and friction of {comparison.after.source} are those of '
+        f'{comparison.before.source} times one factor a joint ({named}): torques of one '
+        'of the two are in another unit, or are currents, as drivers change with their version. '
+        'Convert them with --current-gain, and identify again.'
     )
 
 

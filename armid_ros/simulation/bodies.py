@@ -10,9 +10,8 @@ from armid_ros.robots import NO_MASS, Robot
 import numpy as np
 
 NO_BODY = (
-    'the inertia matrix of the arm is not positive definite, so its rigid-body parameters and '
-    'rotor inertias are not those of bodies: if they were identified, identify with --physical, '
-    'which keeps every link a body; if they are described, correct the description'
+    'the inertia matrix is not positive definite: identify with --physical, or correct the '
+    'description'
 )
 
 

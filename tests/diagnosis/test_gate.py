@@ -95,7 +95,24 @@ def test_torques_in_kilogram_force_metres_since_the_baseline(upright, seed):
 def test_a_factor_that_leaves_less_than_a_unit_is_none(upright, factor):
     """Converted by that of kgf m, torques of a ninth are 9 % too large."""
     now = scaled(upright.recordings(seed=1), factor)
-    assert not faults_since(upright.arm, now, upright.recordings())
+    assert not any('kgf' in said for said in faults_since(upright.arm, now, upright.recordings()))
+
+
+@pytest.mark.parametrize('inverse', [False, True])
+def test_currents_since_a_baseline_in_newton_metres_are_named_with_their_gains(upright, inverse):
+    """Drivers change from one to the other with their version."""
+    gains = np.array([13.3, 11.1, 10.6])
+    days = scaled(upright.recordings(seed=1), 1.0 / gains), upright.recordings()
+    now, before = days[::-1] if inverse else days
+    arm = upright.arm
+    if inverse:
+        arm = ArmModel(arm.robot.with_inertias(arm.robot.rigid_parameters / 11.0), arm.effects)
+    (said,) = faults_since(arm, now, before)
+    stated = said.split('--current-gain ')[1].split(',')
+    known = [name in said.split('--current-gain')[0] for name in arm.robot.joints]
+    expected = 1.0 / gains if inverse else gains
+    assert 'currents?' in said and sum(known) >= 2
+    np.testing.assert_allclose(np.array(stated, dtype=float)[known], expected[known], rtol=0.1)
 
 
 def test_masses_in_grams_are_no_unit_of_torques_that_are_as_before(bench):

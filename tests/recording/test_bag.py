@@ -249,19 +249,6 @@ def test_metadata_that_lies_is_refused_with_what_there_is(swinging, tmp_path):
             read_recording(tmp_path / 'bag', joints=JOINTS)
 
 
-def test_messages_of_ros_1_are_refused(swinging, tmp_path):
-    path = tmp_path / 'file.mcap'
-    with path.open('wb') as stream:
-        writer = McapFileWriter(stream)
-        writer.start(profile='ros1')
-        schema = writer.register_schema('sensor_msgs/JointState', 'ros1msg', b'')
-        channel = writer.register_channel('/joint_states', 'ros1', schema)
-        writer.add_message(channel, 1, bytes(100), 1)
-        writer.finish()
-    with pytest.raises(RecordingError, match="/joint_states is serialised as 'ros1'; only CDR"):
-        read_recording(path, joints=JOINTS)
-
-
 def test_a_crashed_sqlite_recording_is_read_with_its_journal(
     swinging, stamps, tmp_path, assert_same
 ):

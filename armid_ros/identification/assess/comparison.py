@@ -29,10 +29,12 @@ from typing import Any
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparable import nothing_shared, require_comparable
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.load_change import find_load, LoadChange
 from armid_ros.identification.assess.not_compared import NotCompared, only_in, without_deviation
 from armid_ros.identification.assess.residual_change import residual_changes, ResidualChange
 from armid_ros.identification.parameters_file import ParameterFile
+from armid_ros.identification.rows.checks import NEAR
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy.stats import chi2, f, norm, t
@@ -112,6 +114,11 @@ class GroupChange:
     changed: bool
 
 
+#: Deviations from zero of a value that a ratio is taken of, how many there have to be, and the
+#: share of them that has to agree.
+_CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
+
+
 @dataclass(frozen=True)
 class Comparison:
     """
@@ -152,6 +159,33 @@ class Comparison:
         """Return which of the two does not describe its recordings."""
         both = self.before, self.after
         return tuple(one for one in both if one.fit is not None and one.fit.unusable)
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """
+        Return by what one factor the values of each joint changed, where that is all that did.
+
+        No load and no wear makes masses and friction of all joints several times what they were:
+        torques of one of the two are in another unit, or are currents. Empty where none are.
+
+        """
+        clear = [
+            (c.parameter.joint, c.after / c.before)
+            for c in self.changes
+            if abs(c.before) > _CLEAR * c.before_std and abs(c.after) > _CLEAR * c.after_std
+        ]
+        ratios = np.array([ratio for _, ratio in clear])
+        if len(ratios) < _FEWEST or np.mean(ratios > 0.0) < _MOST:
+            return {}
+        common = float(np.median(ratios))
+        near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
+        if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < _MOST:
+            return {}
+        joints = dict.fromkeys(joint for joint, _ in clear if joint)
+        return {
+            joint: float(np.median([ratio for of, ratio in clear if of == joint]))
+            for joint in joints
+        }
 
     @property
     def not_compared(self) -> tuple[NotCompared, ...]:
@@ -204,6 +238,7 @@ class Comparison:
                 for g in self.groups
             ],
             'load': None if self.load is None else self.load.document(),
+            'factors': self.factors,
             'residuals': [one.document() for one in self.residuals],
             'unusable': [
                 {'source': one.source, 'reason': one.fit.reason}

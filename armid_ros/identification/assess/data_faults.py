@@ -20,12 +20,12 @@ from armid_ros.identification.assess.dead_channels import dead_channels
 from armid_ros.identification.assess.dead_encoders import dead_encoders
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
-    Hypothesis,
     InDegrees,
     InUnit,
     OtherUnit,
     Reversed,
 )
+from armid_ros.identification.assess.hypothesis import Hypothesis
 from armid_ros.identification.assess.joint_units import (
     factors_apart,
     knows,
@@ -38,12 +38,13 @@ from armid_ros.identification.assess.mistakes import (
     is_factor,
     slow_motions_of,
 )
-from armid_ros.identification.assess.torque_units import unit_of, units_near
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
+    unit_of,
+    units_near,
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
@@ -168,38 +169,33 @@ def _mistaken(
     if any(one.partner is not None for one in recordings):
         return []
     then = _baseline_factor(arm, before, used)
-    said: set[tuple[str, ...]] = set()
-    for recording in recordings:
-        mistake = find_mistake(arm.body, recording, used)
-        if mistake is None:
-            break
-        said.add(tuple(_fault(one, arm.robot, then) for one in mistake.hypotheses))
-    else:
+    mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
+    found = [one.hypotheses for one in mistakes if one is not None]
+    if len(found) == len(recordings):
+        said = {tuple(_fault(one, arm.robot, then) for one in likely) for likely in found}
         (first, *others) = said
         if all(first) and not others:
             return [', or '.join(first)]
     now = None if then is None else effort_factor(arm.body, recordings, used)
     if now is None or then is None:
         return []
-    wrong = _unit_since(arm, recordings, used, now, then)
-    if not wrong:
-        return []
-    days = (slow_motions_of(some, used) for some in (recordings, before))
-    return [factors_apart(arm, *days) or wrong]
-
-
-def _unit_since(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, now: float, then: float
-) -> str:
-    """Say in which unit torques are, by their factors on the model now and in a baseline."""
-    found = [
+    units = [
         unit
         for unit, per in units_near(now / then).items()
         if is_factor(arm.body, recordings, used, then * per)
     ]
-    if not found:
-        return ''
-    return f'torques are in {" or ".join(found)} if those of the baseline are in N m: convert them'
+    scaled = len(found) == len(recordings) and all(
+        isinstance(likely[0], OtherUnit) for likely in found
+    )
+    if not units and not scaled:
+        return []
+    days = [slow_motions_of(some, used) for some in (recordings, before)]
+    apart = factors_apart(arm, days[0], days[1], units[0] if units else '')
+    if apart or not units:
+        return [apart] if apart else []
+    return [
+        f'torques are in {" or ".join(units)} if those of the baseline are in N m: convert them'
+    ]
 
 
 def mistaken_recordings(

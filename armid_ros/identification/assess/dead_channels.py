@@ -16,6 +16,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.checks import SILENT
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
+from armid_ros.recording.series import NOTHING
 import numpy as np
 
 #: For so long [s], and while the joint goes so far of its way.
@@ -47,7 +48,7 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 
     """
     assert recording.tau is not None
-    if not np.any(np.ptp(recording.tau, axis=0)):
+    if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
         yield f'in {recording.source or "a recording"} {SILENT}'
         return
     units = arm.robot.torque_units
@@ -73,7 +74,7 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
 
 def _longest_same(reading: FloatArray) -> tuple[int, int]:
     """Return where the longest run of one value starts and stops."""
-    edges = np.flatnonzero(np.diff(reading) != 0.0) + 1  # noqa: RUF069 - as recorded
+    edges = np.flatnonzero(np.abs(np.diff(reading)) > NOTHING) + 1
     bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
     return int(bounds[longest]), int(bounds[longest + 1])

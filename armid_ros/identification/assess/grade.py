@@ -216,6 +216,9 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
         yield _halves(result)
     fits = _fits_that_count(result, validation)
     every = Score.of(fits).joint_relative_error_percent
+    if np.all(every[moving(fit.motion for fit in fits)] > LIMITS.unusable):
+        yield _Reason('unusable', f'the torque of no joint is predicted to {LIMITS.unusable:g} %')
+        return
     noisy = every - beyond_noise(every, fits, result.used) > LIMITS.unusable
     if np.any(noisy):
         named = ', '.join(

@@ -11,95 +11,31 @@ decides that.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
+from armid_ros.identification.assess.hypothesis import changed, Hypothesis, Quantity, scaled
 from armid_ros.identification.assess.known_gravity import known_gravity
-from armid_ros.identification.assess.torque_units import unit_of
-from armid_ros.identification.rows.checks import effort_unit, TORQUE_UNITS
+from armid_ros.identification.rows.checks import (
+    effort_unit,
+    FOLLOWS,
+    torque_factors,
+    TORQUE_UNITS,
+    unit_of,
+)
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-
-Quantity = Literal['position', 'torque', 'position and torque']
 
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
-
-
-class Hypothesis(ABC):
-    """
-    One thing that may be wrong with a recording.
-
-    Attributes
-    ----------
-    values : int
-        Numbers that are chosen to fit the data.
-    of_masses : bool
-        Whether masses that are all off by one factor do the same: `material` says from where on
-        they cannot be.
-
-    """
-
-    values: ClassVar[int] = 1
-    of_masses: ClassVar[bool] = False
-
-    @property
-    def disputable(self) -> bool:
-        """Whether other masses would explain as much, so that a person has to say which it is."""
-        return False
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Return what is wrong and where, without by how much."""
-        parts = (getattr(self, part.name) for part in fields(self) if part.compare)  # type: ignore
-        return (type(self).__name__, *(v for v in parts if not isinstance(v, float | tuple)))
-
-    def motion(self, motion: Motion) -> Motion:
-        """Return a motion and its torque as they would be without the mistake."""
-        return motion
-
-    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
-        """Return all of a recording as it would be without the mistake."""
-        return [self.motion(motion) for motion in stretches]
-
-    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-        """
-        Return what the described body takes along the changed motion.
-
-        Returns
-        -------
-        fixed : ndarray, shape (N, n)
-            Torque that is known [N m].
-        columns : ndarray, shape (N, n, k)
-            What free values are multiplied by.
-
-        """
-        return inverse_dynamics(robot, motion), np.empty((*motion.q.shape, 0))
-
-    def settled(self, values: FloatArray) -> Hypothesis:
-        """Return the hypothesis with the free values that fit."""
-        return self
-
-    def nearby(self) -> Iterator[Hypothesis]:
-        """Yield finer steps of the same kind."""
-        return iter(())
-
-    def material(self, robot: Robot, limits: GradeLimits) -> bool:
-        """Whether the description cannot be what is wrong instead."""
-        return True
-
-    @abstractmethod
-    def sentence(self, robot: Robot) -> str:
-        """Say what seems to be wrong and what to do, without a full stop."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +73,7 @@ class Reversed(Hypothesis):
 
     def motion(self, motion: Motion) -> Motion:
         """Turn the sign of the joint."""
-        return _scaled(motion, self.joint, self.quantity, -1.0)
+        return scaled(motion, self.joint, self.quantity, -1.0)
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint."""
@@ -159,7 +95,7 @@ class Exchanged(Hypothesis):
         """Exchange them back."""
         order = np.arange(motion.n_joints)
         order[[self.first, self.second]] = order[[self.second, self.first]]
-        return _changed(motion, self.quantity, lambda values: values[:, order])
+        return changed(motion, self.quantity, lambda values: values[:, order])
 
     def sentence(self, robot: Robot) -> str:
         """Name the joints."""
@@ -248,7 +184,7 @@ class InDegrees(Hypothesis):
     def motion(self, motion: Motion) -> Motion:
         """Convert them."""
         joint = slice(None) if self.joint is None else self.joint
-        return _scaled(motion, joint, 'position', np.deg2rad(1.0))
+        return scaled(motion, joint, 'position', np.deg2rad(1.0))
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint, if it is one alone."""
@@ -305,16 +241,31 @@ class OtherGravity(Hypothesis):
 
 @dataclass(frozen=True)
 class OtherUnit(Hypothesis):
-    """Efforts are a factor from N m, the same in all joints: currents, a gear ratio, a unit."""
+    """
+    Efforts are a factor from N m: a unit where it is that of every joint, else currents.
+
+    Attributes
+    ----------
+    factor : float
+        Of all joints together.
+    of_joints : tuple of float
+        Of each joint, NaN where its torque does not show it.
+
+    """
 
     of_masses: ClassVar[bool] = True
 
     factor: float = np.nan
+    of_joints: tuple[float, ...] = ()
 
     @property
     def disputable(self) -> bool:
         """Whether it is no unit, and masses may be what is wrong."""
-        return not unit_of(self.factor)
+        return not self._unit
+
+    @property
+    def _unit(self) -> str:
+        return unit_of(self.factor, [one for one in self.of_joints if one > 0.0])
 
     def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
         """Leave the factor free."""
@@ -325,18 +276,31 @@ class OtherUnit(Hypothesis):
         """Return the factor that fits."""
         return OtherUnit(float(values[0]))
 
+    def detailed(self, robot: Robot, motions: Sequence[Motion]) -> Hypothesis:
+        """Return the factor of each joint, too."""
+        torques = [motion.tau for motion in motions if motion.tau is not None]
+        factors, correlation = torque_factors(robot, motions, torques)
+        return replace(self, of_joints=tuple(np.where(correlation > FOLLOWS, factors, np.nan)))
+
     def material(self, robot: Robot, limits: GradeLimits) -> bool:
         """Whether it is too far from one for masses to be what is wrong."""
         return _beyond_masses(self.factor, limits)
 
     def sentence(self, robot: Robot) -> str:
-        """Say the unit, or else the factor."""
-        unit = unit_of(self.factor)
-        if unit:
-            return f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
+        """Say the unit, or else the factor, and the gain of each joint."""
+        if self._unit:
+            return (
+                f'the efforts of all joints seem to be in {self._unit} instead of N m: convert '
+                'them'
+            )
+        gains = ','.join(
+            f'{1.0 / (one if one > 0.0 else self.factor):.3g}'
+            for one in self.of_joints or (self.factor,)
+        )
         return (
             f'the efforts of all joints seem to be {self.factor:.2g} times the torque in N m '
-            '(currents?): convert them, unless it is the masses of the description'
+            '(currents?): convert them, unless it is the masses of the description; by those they '
+            f'need --current-gain {gains}'
         )
 
 
@@ -349,7 +313,7 @@ class InUnit(Hypothesis):
 
     def motion(self, motion: Motion) -> Motion:
         """Convert it."""
-        return _scaled(motion, self.joint, 'torque', 1.0 / TORQUE_UNITS[self.unit])
+        return scaled(motion, self.joint, 'torque', 1.0 / TORQUE_UNITS[self.unit])
 
     def sentence(self, robot: Robot) -> str:
         """Name the joint and the unit."""
@@ -417,21 +381,3 @@ def _of_joint(robot: Robot, joint: int) -> Iterator[Hypothesis]:
 def _beyond_masses(factor: float, limits: GradeLimits) -> bool:
     """Whether masses are not off by a factor, all of them."""
     return not 1.0 / limits.torque_factor < factor < limits.torque_factor
-
-
-def _scaled(motion: Motion, joint: int | slice, quantity: Quantity, factor: float) -> Motion:
-    """Return a motion in which a quantity of one joint, or of some, is multiplied."""
-    scale = np.ones(motion.n_joints)
-    scale[joint] = factor
-    return _changed(motion, quantity, lambda values: values * scale)
-
-
-def _changed(
-    motion: Motion, quantity: Quantity, change: Callable[[FloatArray], FloatArray]
-) -> Motion:
-    if quantity != 'torque':
-        motion = replace(motion, q=change(motion.q), dq=change(motion.dq), ddq=change(motion.ddq))
-    if quantity != 'position':
-        assert motion.tau is not None
-        motion = motion.with_torque(change(motion.tau))
-    return motion

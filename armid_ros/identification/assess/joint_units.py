@@ -14,8 +14,13 @@ from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.hypotheses import InUnit
-from armid_ros.identification.assess.torque_units import NEAR
-from armid_ros.identification.rows.checks import effort_unit, TORQUE_UNITS
+from armid_ros.identification.rows.checks import (
+    effort_unit,
+    FOLLOWS,
+    NEAR,
+    TORQUE_UNITS,
+    units_near,
+)
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -27,11 +32,10 @@ import numpy.typing as npt
 #: smallest factor of one is a hundred, of which this is half in the logarithm, and no drive gives
 #: as much.
 _BEYOND_DRIVE = 10.0
+#: A factor since a baseline is that of a unit of force within this factor: masses cancel.
+_NEAR_SINCE = 1.05
 #: A joint below this share of its top speed may be held by its friction, with any torque.
 _SLOW = 0.05
-#: Correlation of a torque with that of the model from which its factor is clear: four fifths of
-#: the power follow the model.
-_FOLLOWS = 0.9
 
 
 def units_beyond_drives(
@@ -105,21 +109,29 @@ def units_beside_model(
         yield from found
 
 
-def factors_apart(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()) -> str:
+def factors_apart(
+    arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = (), unit: str = ''
+) -> str:
     """
     Say what factors torques of joints are off by where no one unit makes them.
 
-    Parameters are those of `units_beside_model`. Empty where one may.
+    Parameters are those of `units_beside_model`, and the unit that all joints together are in, if
+    they are in one. Empty where each joint is in it, or each in N m.
 
     """
     factors = _since(arm, motions, before)
-    clear = np.flatnonzero(factors > 0.0)
-    if not len(clear) or factors[clear].max() < NEAR**2 * factors[clear].min():
+    clear = np.flatnonzero(factors > 0.0).tolist()
+    in_unit = [unit in units_near(factors[k], _NEAR_SINCE) for k in clear]
+    if all(in_unit) or all(1.0 / NEAR < factors[k] < NEAR for k in clear):
         return ''
-    named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear.tolist())
+    named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear)
+    common = float(np.exp(np.mean(np.log(factors[clear]))))
+    gains = ','.join(f'{1.0 / (factor or common):.3g}' for factor in factors)
+    then = 'the baseline' if before else 'the model'
     return (
-        f'torques are no torques in N m: they are those of the model times {named} (currents?): '
-        'convert each joint by its own gain'
+        f'torques are those of {then} times {named}: one of the two is in other units than N m '
+        '(currents? drivers change from one to the other with their version): convert each joint '
+        f'by its own gain, as with --current-gain {gains}'
     )
 
 
@@ -165,7 +177,7 @@ def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:
         x, y = (torque[moves[:, joint], joint] for torque in (expected, measured))
         x, y = x - x.mean(), y - y.mean()
         size = float(np.sqrt((x @ x) * (y @ y)))
-        if size > 0.0 and x @ y > _FOLLOWS * size:
+        if size > 0.0 and x @ y > FOLLOWS * size:
             factors[joint] = (x @ y) / (x @ x)
     return factors
 

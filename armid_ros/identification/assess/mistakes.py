@@ -13,7 +13,7 @@ is believed and the prediction fails, hypotheses are tried once more with such a
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armid_ros.effects.timing import within_band
@@ -23,12 +23,12 @@ from armid_ros.identification.assess.hypotheses import (
     AsRecorded,
     Faulty,
     hypotheses,
-    Hypothesis,
     InUnit,
     OtherGravity,
     OtherUnit,
     WithoutBody,
 )
+from armid_ros.identification.assess.hypothesis import Hypothesis
 from armid_ros.identification.assess.late_torque import late_torque
 from armid_ros.identification.assess.prediction_error import (
     described_error,
@@ -140,6 +140,9 @@ def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) ->
         without = tuple(slow_motions(recording.select(faults.sound), used))
         tried.append(Faulty(faults.first, faults.count, without))
     found = _best(robot, tried, _described(robot, slow), _nearest(robot, slow))
+    if found is not None:
+        likely = tuple(one.detailed(robot, slow) for one in found.hypotheses)
+        found = replace(found, hypotheses=likely)
     if found is not None and not found.links:
         return found
     if any(_predicts(judge(robot, slow)) for judge in (_described, _nearest)):

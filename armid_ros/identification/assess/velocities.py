@@ -24,6 +24,8 @@ from scipy.integrate import cumulative_trapezoid
 #: Velocities are integrated over pieces of at most so many seconds, which is a period and more of
 #: what arms do: their noise adds up to a walk.
 _PIECE = 10.0
+#: What a joint of constant speed leaves its line by [rad or m].
+_STEADY = 0.1 * REST_RANGE
 #: Correlation from which a ratio is a plain factor. A low-pass that takes a twentieth of a
 #: velocity delays it by a phase whose cosine is that much less than one, 0.95.
 _PLAIN = 0.98
@@ -47,7 +49,7 @@ class VelocityRatio:
     Attributes
     ----------
     ratio : ndarray, shape (n,)
-        1 in equal units; NaN where a joint rests.
+        1 in equal units; NaN where a joint rests, or goes at constant speed.
     fit : ndarray, shape (n,)
         Correlation of the two; 0 where a velocity is zero throughout.
 
@@ -67,7 +69,8 @@ def velocity_ratio(recording: Recording) -> VelocityRatio | None:
         return VelocityRatio(np.full(n, np.nan), np.zeros(n))
     moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     product, own, other = np.sum(moved * made, 0), np.sum(moved**2, 0), np.sum(made**2, 0)
-    rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | ~(own > 0.0)
+    # A joint of constant speed has nothing but its line, and noise.
+    rests = (np.ptp(recording.q, axis=0) < REST_RANGE) | (own < len(moved) * _STEADY**2)
     size = np.sqrt(own * other)
     return VelocityRatio(
         np.where(rests, np.nan, product / np.where(rests, 1.0, own)),

@@ -115,9 +115,9 @@ class Verification:
     left_out: tuple[str, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Say in words what was found."""
+        """Say in words what was found; ``left_out`` says what was not done."""
         said = [] if self.noise is None else [*self.noise.sentences()]
-        return (*said, *(pair.sentence() for pair in self.forward), *self.left_out)
+        return (*said, *(pair.sentence() for pair in self.forward))
 
 
 def verify(

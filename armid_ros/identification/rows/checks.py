@@ -15,6 +15,7 @@ from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
+from armid_ros.recording.series import NOTHING
 from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
@@ -35,8 +36,24 @@ _SHORT = 5.0
 _ROUNDING = 1e-9
 #: Correlation with the direction of motion from which a torque is friction and nothing else.
 _CLEAR = 0.8
+#: Correlation of a torque with a described one from which their ratio is clear: four fifths of the
+#: power follow.
+FOLLOWS = 0.9
 #: Units of torque that are mistaken for N m, and how many of each one N m is.
 TORQUE_UNITS = {'N mm': 1e3, 'N cm': 1e2, 'kN m': 1e-3}
+#: A factor of torques is that of a unit if it is within this factor of it: masses of a description
+#: are off by less.
+NEAR = 1.5
+#: Units of a force on a lever [1/(N m)], which all joints have at once: of one joint alone a load
+#: makes the torque ten times as large.
+_LEVER_UNITS = {'kgf m': 1.0 / 9.80665, 'kgf cm': 100.0 / 9.80665, 'lbf in': 1.0 / 0.1129848}
+#: The same for those, which gains of currents are near to: 10 N m/A is 1.02 kgf m/A. Masses of a
+#: description that are off make about as much of the factor of one joint.
+_NEAR_FORCE = 1.2
+_UNITS_OF_JOINTS = {
+    **TORQUE_UNITS,
+    'N m times 57.3 (degrees against radians)': float(np.rad2deg(1.0)),
+}
 #: What they are of a joint that slides, whose effort is a force.
 _FORCE_UNITS = {'N m': 'N', 'N mm': 'mN', 'N cm': 'cN', 'kN m': 'kN'}
 #: Said of torques that are absent.
@@ -154,13 +171,15 @@ def check_torque(
     """
     robot = arm.robot
     tau = np.concatenate([part.tau for part in problem])
-    constant = np.ptp(tau, axis=0) <= _ROUNDING * np.abs(tau).max(axis=0)
+    span, size = np.ptp(tau, axis=0), np.abs(tau).max(axis=0)
+    constant = span <= np.maximum(NOTHING, _ROUNDING * size)
     silent = [name for name, still in zip(robot.joints, constant, strict=True) if still]
     source = recordings[0].source
     if len(silent) == robot.n_joints:
         raise IdentificationError(f'{source}: {SILENT}')
-    slope, correlation = _slope_on_description(robot, problem)
-    clear = np.abs(correlation) > 0.9
+    motions, torques = [part.motion for part in problem], [part.tau for part in problem]
+    slope, correlation = torque_factors(robot, motions, torques)
+    clear = np.abs(correlation) > FOLLOWS
     if np.sum(clear) >= min(2, robot.n_joints):
         factors = slope[clear]
         joints = ', '.join(np.array(robot.joints)[clear])
@@ -333,14 +352,31 @@ def beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> tuple[str, .
     )
 
 
-def _slope_on_description(
-    robot: Robot, problem: Sequence[Regression]
+def torque_factors(
+    robot: Robot, motions: Sequence[Motion], torques: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Regress measured torques on the description's, friction and offset taken out first."""
+    """
+    Regress measured torques on those of a description, with friction and offset taken out first.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    motions : sequence of Motion
+        The data.
+    torques : sequence of ndarray, shape (N, n)
+        What was measured.
+
+    Returns
+    -------
+    factor, correlation : ndarray, shape (n,)
+        Measured torque per described torque, and their correlation; 0 where there is no torque.
+
+    """
     slope, correlation = np.zeros((2, robot.n_joints))
-    predicted = np.concatenate([inverse_dynamics(robot, part.motion) for part in problem])
-    measured = np.concatenate([part.tau for part in problem])
-    dq = np.concatenate([part.motion.dq for part in problem])
+    predicted = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
+    measured = np.concatenate(torques)
+    dq = np.concatenate([motion.dq for motion in motions])
     for joint in range(robot.n_joints):
         nuisance = np.column_stack([np.ones(len(dq)), dq[:, joint], np.sign(dq[:, joint])])
         pair = np.column_stack([predicted[:, joint], measured[:, joint]])
@@ -350,3 +386,42 @@ def _slope_on_description(
             slope[joint] = product / own
             correlation[joint] = product / np.sqrt(own * (rest[:, 1] @ rest[:, 1]))
     return slope, correlation
+
+
+def unit_of(factor: float, of_joints: Sequence[float] = ()) -> str:
+    """
+    Return the unit, or two, in which torques are that are so many times too large, or ''.
+
+    Parameters
+    ----------
+    factor : float
+        Of all joints together.
+    of_joints : sequence of float
+        Of single joints: a unit has to fit each of them, where the gains of currents differ.
+
+    """
+    fitting = [set(units_near(one)) for one in of_joints]
+    return ' or '.join(u for u in units_near(factor) if all(u in units for units in fitting))
+
+
+def units_near(factor: float, near_force: float = _NEAR_FORCE) -> dict[str, float]:
+    """
+    Return the factors of units that torques may be in, by their names, the nearest first.
+
+    Parameters
+    ----------
+    factor : float
+        By which torques are too large.
+    near_force : float
+        How far it may be from that of a unit of force on a lever, as a factor.
+
+    """
+    if factor <= 0.0:
+        return {}
+    known = {**_UNITS_OF_JOINTS, **_LEVER_UNITS}
+    off = {
+        unit: abs(float(np.log(factor / per))) / float(np.log(near))
+        for units, near in ((_UNITS_OF_JOINTS, NEAR), (_LEVER_UNITS, near_force))
+        for unit, per in units.items()
+    }
+    return {unit: known[unit] for unit in sorted(off, key=off.__getitem__) if off[unit] < 1.0}

@@ -17,10 +17,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification.rows.senders import require_one_sender
 from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import PartnerMotion, Recording
+from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
 from scipy import fft, signal
@@ -152,6 +154,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     """
     for recording in recordings:
         _require_rate(recording)
+        require_one_sender(recording)
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
@@ -235,10 +238,11 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     positions = recording.q
     if recording.partner is not None:
         positions = np.hstack([positions, recording.partner.q])
+    measured = np.where(np.max(np.abs(recording.tau), axis=0) < NOTHING, 0.0, recording.tau)
     period = 1.0 / used.rate_hz
     for part in unbroken(recording, used.rate_hz):
         if len(part) >= _LEAST_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
-            t, q, tau = _even(recording.t[part], period, positions[part], recording.tau[part])
+            t, q, tau = _even(recording.t[part], period, positions[part], measured[part])
             yield _differentiated(recording, t, q, tau, used)
 
 

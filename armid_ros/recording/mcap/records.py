@@ -210,6 +210,12 @@ def _walk(found: FileMap) -> _Outside:
             outside.footer = begin if length == _FOOTER.size else None
             break
     outside.position = position
+    behind = size - position - len(MAGIC)
+    if found.finished and behind > 0:
+        found.damage.add(
+            f'{behind} bytes follow the end of the file, as of another file that was appended: '
+            f'only what is before byte {position + len(MAGIC)} is read; cut the file there'
+        )
     return outside
 
 

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import io
+import math
 from pathlib import Path
 from typing import Any
 import zipfile
 
 from armid_ros.errors import RecordingError
+from armid_ros.recording.settings import DEFAULT
 from armid_ros.recording.tables.content import read_content
 from armid_ros.recording.tables.extra import imported
 from armid_ros.recording.tables.table import Table, table_of_arrays
@@ -19,6 +21,8 @@ import numpy.typing as npt
 
 #: What an HDF5 file begins with; MATLAB puts 512 bytes before it.
 HDF5 = b'\x89HDF'
+#: Bytes that one byte of deflate can stand for, with some to spare.
+_MOST_PACKED = 1100
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
@@ -26,26 +30,26 @@ Arrays = dict[str, npt.NDArray[np.generic]]
 def read_numpy(path: Path) -> Table:
     """Read a .npy or .npz file, compressed by gzip or not."""
     raw = read_content(path)
-    try:
-        loaded = np.load(io.BytesIO(raw), allow_pickle=False)
-        arrays = {'': loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise RecordingError(f'{path}: NumPy cannot read it: {error}') from error
+    if zipfile.is_zipfile(io.BytesIO(raw)):
+        with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+        DEFAULT.require(unpacked, f'{path}: what is packed in it')
+    loaded = np.load(io.BytesIO(raw), allow_pickle=False)
+    arrays = {'': loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
     described = 'one NumPy array' if '' in arrays else 'NumPy arrays'
     return table_of_arrays(str(path), _fields(arrays), described)
 
 
 def read_matlab(path: Path) -> Table:
     """Read a .mat file: up to version 7 by scipy, version 7.3 by h5py."""
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
-    with path.open('rb') as file:
-        if HDF5 in file.read(1024):
-            return read_hdf5(path)
-    try:
-        content = loadmat(path, simplify_cells=True)
-    except (ValueError, TypeError, OSError) as error:
-        raise RecordingError(f'{path}: no MAT file that can be read: {error}') from error
+    raw = read_content(path)
+    if HDF5 in raw[:1024]:
+        return read_hdf5(path)
+    for name, shape, _ in whosmat(io.BytesIO(raw)):
+        _require_packed(f'{path}: {name[:40]!r}', 8 * math.prod(shape), len(raw))
+    content = loadmat(io.BytesIO(raw), simplify_cells=True)
     content = {name: value for name, value in content.items() if not name.startswith('__')}
     arrays = dict(_flattened(content, ''))
     if not arrays:
@@ -62,15 +66,21 @@ def read_hdf5(path: Path) -> Table:
     arrays: Arrays = {}
 
     def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and not name.startswith('#'):
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in 'fiub' and '#' not in name[:1]:
+            stored = item.id.get_storage_size()
+            _require_packed(f'{path}: {name[:40]!r}', item.size * item.dtype.itemsize, stored)
             arrays[name.replace('/', '.')] = np.asarray(item)
 
-    try:
-        with h5py.File(path, 'r') as file:
-            file.visititems(visit)
-    except OSError as error:
-        raise RecordingError(f'{path}: HDF5 cannot read it: {error}') from error
+    with h5py.File(path, 'r') as file:
+        file.visititems(visit)
     return table_of_arrays(str(path), arrays, 'HDF5 arrays')
+
+
+def _require_packed(what: str, size: int, stored: int) -> None:
+    """Refuse an array that states more than its bytes can hold, or than memory is allowed."""
+    if size > _MOST_PACKED * stored:
+        raise RecordingError(f'{what} states {size} bytes, of which {stored} are there')
+    DEFAULT.require(size, what)
 
 
 def _fields(arrays: Mapping[str, npt.NDArray[Any]]) -> Arrays:

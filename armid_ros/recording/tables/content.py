@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 from pathlib import Path
 import zlib
 
@@ -25,6 +26,7 @@ def read_content(path: Path) -> bytes:
     """
     limit = DEFAULT.memory_limit
     with open_regular(path, RecordingError) as stream:
+        DEFAULT.require(os.fstat(stream.fileno()).st_size, f'{path}: the file')
         if path.suffix != '.gz':
             return stream.read()
         try:

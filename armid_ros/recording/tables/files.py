@@ -10,6 +10,7 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.tables.arrays import read_hdf5, read_matlab, read_numpy
+from armid_ros.recording.tables.messages import settled
 from armid_ros.recording.tables.parquet import INFO, read_lerobot, read_parquet
 from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.text import read_text
@@ -53,14 +54,22 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
     """
     if not path.exists():
         raise RecordingError(f'{path}: there is no such file')
-    if (path / INFO).is_file():
-        return read_lerobot(path, episode)
-    if _suffix(path) not in _READERS:
+    lerobot = (path / INFO).is_file()
+    if not lerobot and _suffix(path) not in _READERS:
         known = ', '.join(_READERS)
         raise RecordingError(f'{path}: no table; tables are {known} and LeRobot datasets')
-    with open_regular(path, RecordingError):  # a FIFO would be waited for
-        pass
-    return _READERS[_suffix(path)](path)
+    if not lerobot:
+        with open_regular(path, RecordingError):  # a FIFO would be waited for
+            pass
+    try:
+        return settled(read_lerobot(path, episode) if lerobot else _READERS[_suffix(path)](path))
+    except RecordingError:
+        raise
+    except Exception as problem:  # libraries raise whatever their parsers stumble over
+        said = ' '.join(str(problem).split())[:500]
+        raise RecordingError(
+            f'{path}: cannot be read, it may be damaged: {type(problem).__name__}: {said}'
+        ) from problem
 
 
 def side_by_side(tables: Sequence[Table]) -> Table:
@@ -81,7 +90,7 @@ def side_by_side(tables: Sequence[Table]) -> Table:
     if len(set(lengths)) > 1:
         counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
         raise RecordingError(f'{counted}; files side by side hold the same samples')
-    names = [name for table in tables for name in table.names]
+    names = [name for table in tables for name in dict.fromkeys(table.names)]
     columns = [
         TableColumn(
             name if names.count(name) == 1 else f'{_stem(table)}:{name}',

@@ -14,14 +14,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import re
 
-from armid_ros.recording.tables.patterns import ChosenColumns
+from armid_ros.recording.tables.patterns import by_number, ChosenColumns
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import MEASURED, OTHERWISE, QuantityName, TIMES, WORDS
+from armid_ros.recording.tables.words import (
+    is_quantity,
+    MEASURED,
+    OTHERWISE,
+    QuantityName,
+    TIMES,
+    WORDS,
+    words_of,
+)
 import numpy as np
 
 _NUMBER = re.compile(r'\d+')
-_BREAK = re.compile(r'[^A-Za-z0-9]+')
 
 
 @dataclass(frozen=True)
@@ -125,7 +132,7 @@ def named_time(table: Table, way: float) -> TableColumn | None:
     """Return the column that is named like a time and goes one way: up is 1, down -1, any 0."""
     scores = {}
     for column in table.columns:
-        words = _words(column.bare_name)
+        words = words_of(column.bare_name)
         score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
         score += sum(OTHERWISE.get(word, 0.0) for word in words) - 0.1 * len(words)
         finite = column.values[np.isfinite(column.values)]
@@ -165,7 +172,7 @@ def _readings(
     if column.array and name.endswith(']'):
         element = name[len(column.array) + 1 : -1]
         stem, dot, kind = element.rpartition('.')
-        if dot and _quantity_of(kind):
+        if dot and is_quantity(kind):
             yield f'{column.array}[{{}}.{kind}]', stem
         yield column.array, element
         return
@@ -184,10 +191,10 @@ def _readings(
 def _named(name: str) -> Iterator[tuple[str, str]]:
     """Read a name as a joint's with the quantity behind or in front: 'elbow/position'."""
     behind = re.fullmatch(r'(.*[/.])?([^/.]+)([/._ ])([A-Za-z]+)', name)
-    if behind and _quantity_of(behind[4]) and not behind[2].isdigit():
+    if behind and is_quantity(behind[4]) and not behind[2].isdigit():
         yield f'{behind[1] or ""}{{}}{behind[3]}{behind[4]}', behind[2]
     ahead = re.fullmatch(r'([A-Za-z]+)([/._ ])([^/.]+)', name)
-    if ahead and _quantity_of(ahead[1]) and not ahead[3].isdigit():
+    if ahead and is_quantity(ahead[1]) and not ahead[3].isdigit():
         yield f'{ahead[1]}{ahead[2]}{{}}', ahead[3]
 
 
@@ -200,7 +207,7 @@ def _in_order(
     """Return a family in the order of the joints; None where it does not fit them."""
     labels = list(members)
     if all(label.isdigit() for label in labels):
-        labels.sort(key=int)
+        labels.sort(key=by_number)
     if joints is not None:
         names = [renamed(label, rename) for label in labels]
         if set(joints) <= set(names):
@@ -211,7 +218,7 @@ def _in_order(
 
 
 def _score(pattern: str, quantity: QuantityName) -> float:
-    words = _words(pattern)
+    words = words_of(pattern)
     own = max((WORDS[quantity].get(word, 0.0) for word in words), default=0.0)
     others = [table for name, table in WORDS.items() if name != quantity]
     other = max((table.get(word, 0.0) for table in others for word in words), default=0.0)
@@ -226,19 +233,9 @@ def _score(pattern: str, quantity: QuantityName) -> float:
 
 def _still(chosen: ChosenColumns) -> float:
     """Return what speaks against a family with columns that never change: they are not filled."""
+    finite = (column.values[np.isfinite(column.values)] for column in chosen.columns)
     still = [
-        float(np.ptp(column.values[np.isfinite(column.values)])) == 0.0  # noqa: RUF069 - as recorded
-        for column in chosen.columns
+        len(values) == 0 or float(np.ptp(values)) == 0.0  # noqa: RUF069 - as recorded
+        for values in finite
     ]
     return 1.0 if any(still) else 0.0
-
-
-def _quantity_of(word: str) -> bool:
-    return any(word.lower() in words for words in WORDS.values())
-
-
-def _words(name: str) -> list[str]:
-    """Return the words of a name in small letters: 'actualQ_{}' is actual, q."""
-    apart = re.sub(r'(?<=[a-z])(?=[A-Z])', ' ', name)
-    apart = re.sub(r'\d+', ' ', apart)
-    return [word.lower() for word in _BREAK.split(apart) if word]

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
-from armid_ros.recording.series import GAP_PERIODS, longest_run, not_finite
+from armid_ros.recording.recording import PositionRange, ReadReport, Recording
+from armid_ros.recording.series import gaps, longest_run, not_finite, unwrapped
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 #: Times later than this count from 1970 [s].
 _EPOCH = 1e8
+#: No stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits [s].
+_LATEST = 9e9
 #: More rows than this part without a number is no glitch but a fault of the file.
 _MAX_NOT_FINITE = 0.2
 
@@ -36,8 +38,9 @@ def measured(plan: TablePlan) -> Recording:
     table = plan.table
     t, start = _times(plan)
     values = {source.quantity: source.values() for source in plan.sources}
-    kept, culprits = _finite(plan, t, values)
-    rows = np.flatnonzero(kept)
+    stamped = np.isfinite(t)
+    kept, culprits = _finite(plan, stamped, values)
+    rows = np.flatnonzero(kept & stamped)
     run = longest_run(np.round(t[rows] * 1e9).astype(np.int64)) or slice(None)
     restarted = len(rows) - len(rows[run])
     rows = rows[run]
@@ -54,8 +57,9 @@ def measured(plan: TablePlan) -> Recording:
     if len(rows) < 2:
         raise RecordingError(f'{table.source}: {len(rows)} rows with numbers are left')
     of = {name: array[rows] for name, array in values.items()}
+    position, wrapped = unwrapped(of['position'])
     q, dq, tau = on_joint_side(
-        plan.settings, plan.joints, of['position'], of.get('velocity'), of.get('effort')
+        plan.settings, plan.joints, position, of.get('velocity'), of.get('effort')
     )
     time = t[rows] - t[rows[0]]
     report = ReadReport(
@@ -64,10 +68,12 @@ def measured(plan: TablePlan) -> Recording:
         duplicates=duplicates,
         out_of_order=late,
         restarted=restarted,
-        nan=int((~kept).sum()),
+        nan=int((~kept & stamped).sum()),
+        unstamped=int((~stamped).sum()),
         not_finite=culprits,
-        gaps=_gaps(time),
+        gaps=gaps(time),
         absent=plan.absent,
+        unwrapped=tuple(plan.joints[k] for k in wrapped),
         damage='; '.join(note for note in table.notes if 'cut off' in note),
     )
     return Recording(
@@ -78,10 +84,17 @@ def measured(plan: TablePlan) -> Recording:
         tau=tau,
         start_ns=start,
         source=table.source,
-        topic='the table',
+        topic=_called(plan),
         report=report,
         others=tuple(_others(plan)),
     )
+
+
+def _called(plan: TablePlan) -> str:
+    """Name the table for messages, with what it has that may be what is missing."""
+    if plan.source('effort') is not None or not plan.unread:
+        return 'the table'
+    return f'the table (--effort names columns of it; not read are {plan.unread})'
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
@@ -90,8 +103,14 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
         assert plan.rate_hz is not None
         return np.arange(len(plan.table)) / plan.rate_hz, 0
     scale = TIME_UNITS[plan.time_unit]
-    values = plan.time.values
-    origin = float(values[np.isfinite(values)][0])
+    values = np.where(np.abs(plan.time.values * scale) < _LATEST, plan.time.values, np.nan)
+    stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))
+    if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:
+        values[: stamped[0]] = np.nan  # simulation time before /clock
+    there = values[np.isfinite(values)]
+    if not len(there):
+        raise RecordingError(f'{plan.table.source}: column {plan.time.name} has no time in it')
+    origin = float(there[0])
     epoch = origin * scale > _EPOCH
     # Differences first: counted from 1970, nanoseconds do not fit into a float.
     return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 0
@@ -99,27 +118,28 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
 
 def _finite(
     plan: TablePlan,
-    t: FloatArray,
+    stamped: npt.NDArray[np.bool_],
     values: Mapping[QuantityName, FloatArray],
 ) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
     """Return where everything is a number, and whose values are not; refuse when many are not."""
-    bad, culprits = not_finite(plan.joints, values.items(), len(t))
-    good = np.isfinite(t) & ~bad
-    lost = int((~good).sum())
-    if lost > _MAX_NOT_FINITE * len(t):
+    bad, culprits = not_finite(plan.joints, values.items(), len(stamped))
+    lost = int((bad | ~stamped).sum())
+    if lost > _MAX_NOT_FINITE * len(stamped):
         for source in plan.sources:
             for column in source.chosen.columns:
                 empty = np.flatnonzero(~np.isfinite(column.values))
-                if len(empty) > _MAX_NOT_FINITE * len(t):
+                if len(empty) > _MAX_NOT_FINITE * len(stamped):
+                    where = plan.table.where(int(empty[0]))
                     raise RecordingError(
-                        f'{plan.table.source}: column {column.name} has no number in {len(empty)} '
-                        f'of {len(t)} rows, first in {plan.table.where(int(empty[0]))}; leave '
+                        f'{plan.table.source}: column {column.name} has no number in '
+                        f'{len(empty)} of {len(stamped)} rows, first in {where}; leave '
                         f'{source.quantity} out with --{source.quantity} none, or mend the file'
                     )
         raise RecordingError(
-            f'{plan.table.source}: {lost} of {len(t)} rows have a value that is no number'
+            f'{plan.table.source}: {lost} of {len(stamped)} rows have a value, or a time, that is '
+            f'no number ({"; ".join(culprits) or "time"})'
         )
-    return good, culprits
+    return ~bad, culprits
 
 
 def _others(plan: TablePlan) -> Iterator[PositionRange]:
@@ -131,9 +151,3 @@ def _others(plan: TablePlan) -> Iterator[PositionRange]:
         values = column.values[np.isfinite(column.values)] * source.factor[0]
         if len(values):
             yield PositionRange(joint, float(values.min()), float(values.max()))
-
-
-def _gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)

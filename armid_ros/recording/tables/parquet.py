@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-import json
 from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import finite, load_json, read_text, reading
+from armid_ros.recording.settings import DEFAULT
 from armid_ros.recording.tables.extra import imported
 from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
@@ -19,7 +20,8 @@ INFO = Path('meta', 'info.json')
 
 def read_parquet(path: Path) -> Table:
     """Read a Parquet file; columns of lists become as many columns as they have elements."""
-    return Table(str(path), tuple(_columns(path, {})), 'Parquet')
+    columns, words = _columns(path, {})
+    return Table(str(path), columns, 'Parquet', words=words)
 
 
 def read_lerobot(path: Path, episode: int | None = None) -> Table:
@@ -34,18 +36,17 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
         Its number; the first by default.
 
     """
-    try:
-        info = json.loads((path / INFO).read_text(encoding='utf-8'))
+    with reading(path / INFO, RecordingError):
+        info = load_json(read_text(path / INFO, RecordingError))
         features: Mapping[str, Any] = info['features']
-    except (OSError, ValueError, KeyError) as error:
-        raise RecordingError(
-            f'{path / INFO}: not the description of a dataset: {error}'
-        ) from error
-    names = {key: _element_names(feature) for key, feature in features.items()}
-    total = int(info.get('total_episodes', 1))
+        names = {key: _element_names(feature) for key, feature in features.items()}
+        total = int(info.get('total_episodes', 1))
+        rate = finite(info['fps'], 'fps') if 'fps' in info else None
+        if rate is not None and rate <= 0.0:
+            raise RecordingError(f'fps is {rate:g}, and has to be positive')
     chosen = 0 if episode is None else episode
     for file in _files(path, chosen):
-        columns = list(_columns(file, names))
+        columns, _ = _columns(file, names)
         index = next((c.values for c in columns if c.name == 'episode_index'), None)
         rows = np.ones(len(columns[0].values), np.bool_) if index is None else index == chosen
         if rows.any():
@@ -55,7 +56,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
                 if not _is_index(c.name)
             )
             notes = (f'episode {chosen} of 0 to {total - 1}',)
-            return Table(str(path), kept, 'LeRobot dataset', rate_hz=info.get('fps'), notes=notes)
+            return Table(str(path), kept, 'LeRobot dataset', rate_hz=rate, notes=notes)
     raise RecordingError(f'{path}: no episode {chosen}; the dataset has 0 to {total - 1}')
 
 
@@ -82,31 +83,49 @@ def _element_names(feature: Mapping[str, Any]) -> list[str]:
     return [str(name) for name in names] if isinstance(names, list) else []
 
 
-def _columns(path: Path, names: Mapping[str, Sequence[str]]) -> Iterator[TableColumn]:
+def _columns(
+    path: Path, names: Mapping[str, Sequence[str]]
+) -> tuple[tuple[TableColumn, ...], dict[str, Sequence[str]]]:
+    """Return the columns with numbers, and the cells of those with words."""
     parquet = imported('pyarrow.parquet', path, 'Parquet')
     types = imported('pyarrow', path, 'Parquet').types
-    try:
-        table = parquet.read_table(path)
-    except (OSError, ValueError) as error:
-        raise RecordingError(f'{path}: Parquet cannot be read: {error}') from error
+    stated = parquet.read_metadata(path)
+    groups = [stated.row_group(k) for k in range(stated.num_row_groups)]
+    cells = sum(g.column(k).num_values for g in groups for k in range(g.num_columns))
+    DEFAULT.require(8 * max(cells, stated.num_rows), f'{path}: what it states to hold')
+    table = parquet.read_table(path)
     while any(types.is_struct(field.type) for field in table.schema):
         table = table.flatten()
-    for field in table.schema:
-        column = table.column(field.name).combine_chunks()
+    columns: list[TableColumn] = []
+    words: dict[str, Sequence[str]] = {}
+    for field, chunked in zip(table.schema, table.columns, strict=True):
+        column = chunked.combine_chunks()
         if types.is_timestamp(field.type):
-            yield TableColumn(field.name, column.cast('int64').to_numpy(), unit=field.type.unit)
+            values = column.cast('int64').to_numpy(zero_copy_only=False)
+            columns.append(TableColumn(field.name, values.astype(float), unit=field.type.unit))
         elif types.is_integer(field.type) or types.is_floating(field.type):
-            yield TableColumn(field.name, column.to_numpy(zero_copy_only=False).astype(float))
+            values = column.to_numpy(zero_copy_only=False).astype(float)
+            columns.append(TableColumn(field.name, values))
+        elif types.is_string(field.type) or types.is_large_string(field.type):
+            words[field.name] = [one or '' for one in column.to_pylist()]
         elif types.is_list(field.type) or types.is_fixed_size_list(field.type):
-            yield from _elements(path, field.name, column.to_pylist(), names.get(field.name, ()))
+            labels = names.get(field.name, ())
+            for name, cells in _elements(path, field.name, column.to_pylist(), labels):
+                if any(isinstance(cell, str) for cell in cells):
+                    words[name] = [str(cell or '') for cell in cells]
+                else:
+                    numbers = np.array(cells, dtype=float)
+                    columns.append(TableColumn(name, numbers, field.name))
+    there = tuple(one for one in columns if np.isfinite(one.values).any())
+    return there, words | {one.name: () for one in columns if one not in there}
 
 
 def _elements(
-    path: Path, name: str, rows: Sequence[Sequence[float] | None], labels: Sequence[str]
-) -> Iterator[TableColumn]:
-    """Yield a column for each element of lists of equal length."""
+    path: Path, name: str, rows: Sequence[Sequence[Any] | None], labels: Sequence[str]
+) -> Iterator[tuple[str, list[Any]]]:
+    """Yield name and cells of each element of lists of equal length; None where a row has none."""
     width = max((len(row) for row in rows if row is not None), default=0)
-    if not width or any(isinstance(row[0], (str, list, dict)) for row in rows if row):
+    if any(isinstance(row[0], (list, dict)) for row in rows if row):
         return
     short = next((k for k, row in enumerate(rows) if row is not None and len(row) != width), None)
     if short is not None:
@@ -114,7 +133,6 @@ def _elements(
             f'{path}: row {short}, column {name}: a list of {len(rows[short] or ())}, the others '
             f'have {width}'
         )
-    values = np.array([[np.nan] * width if row is None else row for row in rows], dtype=float)
     for k in range(width):
         label = labels[k] if len(labels) == width else str(k)
-        yield TableColumn(f'{name}[{label}]', values[:, k], name)
+        yield f'{name}[{label}]', [None if row is None else row[k] for row in rows]

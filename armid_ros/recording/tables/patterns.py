@@ -80,6 +80,12 @@ def choose(
             f'{table.listed()}'
         )
     columns, labels = list(found), list(found.values())
+    twice = [column.name for column in columns if labels.count(found[column]) > 1]
+    if twice:
+        raise RecordingError(
+            f"{table.source}: for {what}, '{pattern}' fits {' and '.join(twice)} for one joint; "
+            'name the columns with commas, or give each a name of its own'
+        )
     if joints is None:
         return ChosenColumns(tuple(columns), tuple(labels), pattern)
     names = [renamed(label, rename) for label in labels]
@@ -155,8 +161,14 @@ def _by_placeholder(table: Table, pattern: str) -> dict[TableColumn, str]:
     for column in table.columns:
         match = expression.fullmatch(column.bare_name) or expression.fullmatch(column.name)
         if match:
-            found[column] = match[1]
+            found[column] = match[1].strip('[]')
     if found and any(label.isdigit() for label in found.values()):
         found = {column: label for column, label in found.items() if label.isdigit()}
-        return dict(sorted(found.items(), key=lambda pair: int(pair[1])))
+        return dict(sorted(found.items(), key=lambda pair: by_number(pair[1])))
     return found
+
+
+def by_number(label: str) -> tuple[int, str]:
+    """Return what sorts labels of digits by their number, of whatever length."""
+    digits = label.lstrip('0')
+    return len(digits), digits

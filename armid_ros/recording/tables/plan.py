@@ -10,11 +10,12 @@ import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
+from armid_ros.recording.series import LARGEST
 from armid_ros.recording.tables.guess import guess, guess_time, Incomplete, incomplete, named_time
 from armid_ros.recording.tables.patterns import choose, ChosenColumns
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import QuantityName
+from armid_ros.recording.tables.words import CURRENTS, is_quantity, QuantityName, words_of
 import numpy as np
 import numpy.typing as npt
 
@@ -119,6 +120,13 @@ class TablePlan:
         of = {one.quantity: f' of {", ".join(one.lacking)}' for one in self.incomplete}
         return tuple(name + of.get(name, '') for name in _OTHERS if self.source(name) is None)
 
+    @property
+    def unread(self) -> str:
+        """Return the names of the columns that are not read, in words."""
+        taken = [column for source in self.sources for column in source.chosen.columns]
+        rest = [one for one in self.table.columns if one is not self.time and one not in taken]
+        return replace(self.table, columns=tuple(rest)).listed() if rest else ''
+
     def lines(self) -> list[str]:
         """Return the plan for a person, in lines."""
         table = self.table
@@ -144,6 +152,8 @@ class TablePlan:
                 why = [f': {one}' for one in self.incomplete if one.quantity == quantity]
                 lines.append(f'  {quantity:9s} none{"".join(why)}')
         lines.append(f'  joints    {", ".join(self.joints)}')
+        if self.unread:
+            lines.append(f'  not read  {self.unread}')
         lines += [f'  note: {note}' for note in (*table.notes, *self.notes)]
         return lines[:1] + [_wrapped(line) for line in lines[1:]]
 
@@ -218,6 +228,14 @@ def _without_positions(
             f'--rename, or leave joints out with --joints. Its columns are {table.listed()}'
         )
     of_joints = f' of {", ".join(joints)}' if joints else ''
+    for name, cells in table.words.items():
+        series = set(cells)
+        if 2 <= len(series) <= len(cells) // 10 and any(map(is_quantity, words_of(min(series)))):
+            return (
+                f'{table.source}: the table is in long form, one value a row: column {name} says '
+                f'of which series ({", ".join(sorted(series)[:3])}, ...); export one column a '
+                'series, or pivot it: one row a stamp'
+            )
     return (
         f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
         f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
@@ -241,6 +259,8 @@ def _source(
         if not guesses:
             return None
         chosen = guesses[0].chosen
+        for column in chosen.columns:
+            table.column(column.bare_name)  # which has to be one
         taken = {id(column) for column in chosen.columns}
         rivals = tuple(
             dict.fromkeys(
@@ -251,7 +271,7 @@ def _source(
             )
         )[:4]
     unit = next((column.unit for column in chosen.columns if column.unit), '')
-    if not unit and 'curr' in chosen.pattern.lower():
+    if not unit and set(words_of(chosen.pattern)) & set(CURRENTS):
         unit = 'A'
     plain = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}[quantity]
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
@@ -308,15 +328,16 @@ def _doubts(
 ) -> list[str]:
     doubts = []
     for source in sources:
-        text = source.chosen.pattern.lower()
-        amps = source.unit in ('A', 'mA') or 'curr' in text or 'load' in text
+        amps = source.unit in ('A', 'mA') or 'load' in source.chosen.pattern.lower()
         if source.quantity == 'effort' and amps and not settings.effort_scale:
             doubts.append(
                 f"efforts '{source.chosen.pattern}' seem to be currents; --current-gain makes "
                 'them N m'
             )
         if source.quantity == 'position' and source.unit == 'rad':
-            doubts += _far(np.fmax.reduce(np.abs(source.values())), settings, slides)
+            values = np.abs(source.values())
+            reach = np.fmax.reduce(np.where(values < LARGEST, values, np.nan))
+            doubts += _far(reach, settings, slides)
     return doubts
 
 
@@ -353,6 +374,7 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     else:
         column = guess_time(table)
     if column is not None:
+        table.column(column.name)  # which has to be one
         _require_forwards(table, column)
         return column, settings.time_unit or _time_unit(table, column), None
     rate = settings.rate_hz or table.rate_hz

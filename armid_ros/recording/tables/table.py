@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import re
 
 from armid_ros.errors import RecordingError
+from armid_ros.files.documents import LARGEST
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +44,7 @@ class TableColumn:
     name : str
         As in the file; an element of an array is 'q[0]', or '[0]' where the array has no name.
     values : ndarray, shape (N,)
-        NaN where the file has no number.
+        NaN where the file has no number, or one beyond all quantities.
     array : str
         Name of the array it is an element of; empty for a column of its own.
     unit : str
@@ -58,7 +59,9 @@ class TableColumn:
 
     def __post_init__(self) -> None:
         """Freeze the values, and take the unit from the name where none was given."""
-        object.__setattr__(self, 'values', read_only(self.values))
+        with np.errstate(invalid='ignore'):  # of rubbish that is a signalling NaN
+            values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
+        object.__setattr__(self, 'values', read_only(values))
         object.__setattr__(
             self, 'unit', normal_unit(self.unit) or unit_of(self.array or self.name)
         )
@@ -88,8 +91,8 @@ class Table:
         Samples per second, where the file says so and not each row.
     notes : tuple of str
         What reading it met.
-    empty : tuple of str
-        Columns without a number in them.
+    words : mapping of str to sequence of str
+        Columns of words, and those without anything in them.
 
     """
 
@@ -99,7 +102,7 @@ class Table:
     first_line: int | None = None
     rate_hz: float | None = None
     notes: tuple[str, ...] = ()
-    empty: tuple[str, ...] = ()
+    words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse tables that are empty or ragged."""
@@ -120,11 +123,26 @@ class Table:
         return tuple(column.name for column in self.columns)
 
     def column(self, name: str) -> TableColumn | None:
-        """Return the column of a name, with or without the unit in brackets; None if none has."""
-        for column in self.columns:
-            if name in (column.name, column.bare_name):
-                return column
-        return None
+        """
+        Return the column of a name, with or without the unit in brackets; None if none has.
+
+        Raises
+        ------
+        RecordingError
+            Several have it, with different values.
+
+        """
+        named = [column for column in self.columns if column.name == name]
+        named = named or [column for column in self.columns if column.bare_name == name]
+        for other in named[1:]:
+            if not np.array_equal(other.values, named[0].values, equal_nan=True):
+                row = int(np.argmax(other.values != named[0].values))
+                raise RecordingError(
+                    f"{self.source}: {len(named)} columns are called '{name}', with different "
+                    f'values, first in {self.where(row)}: {named[0].values[row]:g} and '
+                    f'{other.values[row]:g}; give each a name of its own'
+                )
+        return named[0] if named else None
 
     def where(self, row: int) -> str:
         """Return where a row is, for a message."""
@@ -134,18 +152,19 @@ class Table:
         """Return the names of the columns, elements of arrays in short, for a message."""
         names: dict[str, int] = {}
         for column in self.columns:
-            key = (
-                f'{column.array.removeprefix("[]")}[..]'
-                if column.name.endswith(']')
-                else column.name
-            )
+            key = f'{column.array.removeprefix("[]")}[..]' if column.array else column.name
             names[key] = names.get(key, 0) + 1
         shown = [
             f'{key[:-4]}[0..{count - 1}]' if key.endswith('[..]') else key
             for key, count in names.items()
         ]
+        shown = [' '.join(name.split())[:80] for name in shown]
         more = f' and {len(shown) - 40} more' if len(shown) > 40 else ''
-        empty = f'; without a number: {", ".join(self.empty[:40])}' if self.empty else ''
+        words = [
+            f"{name[:80]} ('{said[0][:40]}')" if len(said) and said[0] else name[:80]
+            for name, said in self.words.items()
+        ]
+        empty = f'; without a number: {", ".join(words[:40])}' if words else ''
         bare = self.first_line is not None and any(c.array == '[]' for c in self.columns)
         header = (
             f'; a header line with names is missing above line {self.first_line}' if bare else ''
@@ -178,7 +197,7 @@ def unit_of(name: str) -> str:
 
 
 def table_of_arrays(
-    source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str, **facts: object
+    source: str, arrays: Mapping[str, npt.NDArray[np.generic]], described: str
 ) -> Table:
     """
     Make a table of named arrays, of which samples run along the axis that most have in common.
@@ -191,8 +210,6 @@ def table_of_arrays(
         Numeric ones; scalars and those of other lengths are passed over.
     described : str
         What kind of file it is.
-    **facts
-        Further attributes of the table.
 
     """
     usable = {
@@ -204,7 +221,9 @@ def table_of_arrays(
     columns: list[TableColumn] = []
     for name, values in usable.items():
         columns += _columns_of(name, values.astype(np.float64), length)
-    return Table(source, tuple(columns), described, **facts)  # type: ignore[arg-type]
+    there = tuple(column for column in columns if np.isfinite(column.values).any())
+    words: dict[str, Sequence[str]] = {one.name: () for one in columns if one not in there}
+    return Table(source, there, described, words=words)
 
 
 def _common_length(source: str, arrays: Sequence[npt.NDArray[np.generic]]) -> int:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 import csv
 import io
 from pathlib import Path
@@ -25,6 +26,8 @@ _WIDE = {
     b'\xfe\xff': 'UTF-16',
 }
 _EMPTY = ('', 'nan', 'na', 'n/a', 'null', 'none', '-')
+_LIST = re.compile(r'[\[(]([^\[\]()]*)[\])]\s*\)?$')
+_COMMAS = re.compile(r'[,;\s]+')
 _DECIMAL_COMMA = re.compile(r'[-+]?\d+,\d+([eE][-+]?\d+)?')
 #: A column with fewer numbers than this share is one of words.
 _NUMERIC = 0.5
@@ -48,16 +51,26 @@ def read_text(path: Path) -> Table:
     names = _names(header, separator, len(cells), path, first)
     unit_cells = _split(units, separator) if units else [''] * len(names)
     unit_cells += [''] * (len(names) - len(unit_cells))
-    values, notes = _numbers(path, rows, separator, names, first + 1)
+    widths = [_width(cell) for cell in cells]
+    heads = [
+        (name if width is None else f'{name}[{k}]', unit, '' if width is None else name)
+        for name, unit, width in zip(names, unit_cells, widths, strict=True)
+        for k in range(1 if width is None else width)
+    ]
+    names = [name for name, _, _ in heads]
+    values, words, notes = _numbers(path, rows, separator, names, widths, first + 1)
     columns = tuple(
-        TableColumn(name, column, '' if header else '[]', unit)
-        for name, column, unit in zip(names, values.T, unit_cells, strict=True)
+        TableColumn(name, column, array if header else '[]', unit)
+        for (name, unit, array), column in zip(heads, values.T, strict=True)
         if np.isfinite(column).any()
     )
-    there = {column.name for column in columns}
-    empty = tuple(name for name in names if name not in there)
+    words |= {
+        name: ()
+        for name, column in zip(names, values.T, strict=True)
+        if not np.isfinite(column).any() and name not in words
+    }
     described = f'text with {_SEPARATORS[separator]}'
-    return Table(str(path), columns, described, first_line=first + 1, notes=notes, empty=empty)
+    return Table(str(path), columns, described, first_line=first + 1, notes=notes, words=words)
 
 
 def _lines(path: Path) -> list[str]:
@@ -116,7 +129,8 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
 def _has_numbers(line: str) -> bool:
     """Whether more of a line is numbers than not."""
     cells = [cell for cell in _split(line, _separator([line])) if cell.lower() not in _EMPTY]
-    return sum(_is_number(cell) for cell in cells) > len(cells) / 2
+    values = (_elements(cell) or [cell] for cell in cells)
+    return sum(all(map(_is_number, some)) for some in values) > len(cells) / 2
 
 
 def _as_many(header: str, row: str) -> bool:
@@ -134,6 +148,19 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _elements(cell: str) -> list[str] | None:
+    """Return the elements of a list, as '[1, 2]', '(1, 2)' and '[1 2]'; None of other cells."""
+    found = _LIST.search(cell) if cell[:1] in ('[', '(', 'a') else None
+    return (
+        None if found is None else [part.strip('\'"') for part in _COMMAS.split(found[1]) if part]
+    )
+
+
+def _width(cell: str) -> int | None:
+    elements = _elements(cell)
+    return None if elements is None else len(elements)
 
 
 def _separator(lines: list[str]) -> str:
@@ -159,25 +186,26 @@ def _names(header: str, separator: str, width: int, path: Path, first: int) -> l
             f'{path}: {len(names)} names ({", ".join(names[:6])} ...) stand above {width} values '
             f'in line {first + 1}'
         )
-    unique: list[str] = []
-    for k, name in enumerate(names):
-        name = name or f'[{k}]'
-        unique.append(name if name not in unique else f'{name}#{names[: k + 1].count(name)}')
-    return unique
+    return [name or f'[{k}]' for k, name in enumerate(names)]
 
 
 def _numbers(
-    path: Path, rows: list[str], separator: str, names: list[str], first_line: int
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the values, shape (N, columns), and what was met."""
+    path: Path,
+    rows: list[str],
+    separator: str,
+    names: list[str],
+    widths: list[int | None],
+    first_line: int,
+) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
+    """Return the values, shape (N, columns), cells of words by column, and what was met."""
     delimiter = None if separator == ' ' else separator
     try:
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
         if values.shape[1] == len(names):
-            return values, ()
+            return values, {}, ()
     except ValueError:
         pass
-    return _cell_by_cell(path, rows, separator, names, first_line)
+    return _cell_by_cell(path, rows, separator, names, widths, first_line)
 
 
 def _number(cell: str, separator: str) -> float:
@@ -190,14 +218,19 @@ def _number(cell: str, separator: str) -> float:
 
 
 def _cell_by_cell(
-    path: Path, rows: list[str], separator: str, names: list[str], first_line: int
-) -> tuple[FloatArray, tuple[str, ...]]:
+    path: Path,
+    rows: list[str],
+    separator: str,
+    names: list[str],
+    widths: list[int | None],
+    first_line: int,
+) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
     values = np.full((len(rows), len(names)), np.nan)
-    words: dict[int, tuple[int, str]] = {}
+    said: dict[int, dict[int, str]] = {}
     notes: list[str] = []
     for k, line in enumerate(rows):
         cells = _split(line, separator)
-        if len(cells) != len(names):
+        if len(cells) != len(widths):
             if k == len(rows) - 1:
                 notes.append(f'line {first_line + k} is cut off and left out')
                 values = values[:k]
@@ -205,19 +238,34 @@ def _cell_by_cell(
             if not cells or line.lstrip().startswith(_COMMENTS):
                 continue
             raise RecordingError(
-                f'{path}: line {first_line + k} has {len(cells)} values, the others {len(names)}'
+                f'{path}: line {first_line + k} has {len(cells)} values, the others {len(widths)}'
             )
-        for j, cell in enumerate(cells):
+        for j, cell in enumerate(_taken_apart(cells, widths, f'{path}: line {first_line + k}')):
             try:
                 values[k, j] = _number(cell, separator)
             except ValueError:
-                words.setdefault(j, (first_line + k, cell))
-    for j, (line_number, cell) in words.items():
+                said.setdefault(j, {})[k] = cell
+    for j, of in said.items():
         if np.isfinite(values[:, j]).mean() >= _NUMERIC:
+            k, cell = next(iter(of.items()))
             raise RecordingError(
-                f"{path}: line {line_number}, column {names[j]}: '{cell}' is no number"
+                f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
             )
-    return values, (*notes, *_gaps(values, names, first_line))
+    words: dict[str, Sequence[str]] = {
+        names[j]: [of.get(k, '') for k in range(len(values))] for j, of in said.items()
+    }
+    return values, words, (*notes, *_gaps(values, names, first_line))
+
+
+def _taken_apart(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
+    """Yield cells, and the elements of those that are lists."""
+    for k, (cell, width) in enumerate(zip(cells, widths, strict=True)):
+        elements = [cell] if width is None else _elements(cell) or []
+        if len(elements) != (1 if width is None else width):
+            raise RecordingError(
+                f'{where}, column {k + 1}: a list of {len(elements)}, the first has {width}'
+            )
+        yield from elements
 
 
 def _gaps(values: FloatArray, names: list[str], first_line: int) -> list[str]:

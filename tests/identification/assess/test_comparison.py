@@ -7,6 +7,7 @@ from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import compare
 from armid_ros.identification.parameters_file import ParameterFile, read_parameters
+from armid_ros.report.compare_report import tell
 import numpy as np
 import pytest
 
@@ -331,3 +332,22 @@ def test_numbers_that_no_estimate_has_are_refused(tmp_path, changes, message):
     assert read_parameters(written(tmp_path)).std == [0.1]
     with pytest.raises(ModelError, match=rf'identification.json: .*{message}'):
         read_parameters(written(tmp_path, **changes))
+
+
+@pytest.mark.parametrize('inverse', [False, True])
+def test_currents_beside_newton_metres_are_a_unit_and_no_change_of_the_arm(inverse):
+    rng = np.random.default_rng(0)
+    gains = {'hip': 13.3, 'knee': 11.1, 'foot': 10.6}
+    kinds = ('viscous_coefficient', 'coulomb_torque', 'offset')
+    names = [ParameterName(kind, joint, 'N m') for joint in gains for kind in kinds]
+    values = rng.uniform(0.5, 2.0, len(names))
+    torque = {name: (v, 0.01 * v) for name, v in zip(names, values, strict=True)}
+    current = {n: (v / gains[n.joint], s / gains[n.joint]) for n, (v, s) in torque.items()}
+    files = [ParameterFile(k, 'arm', t, 5.0) for k, t in (('a', torque), ('b', current))]
+    comparison = compare(*(files[::-1] if inverse else files))
+    expected = {j: gain if inverse else 1.0 / gain for j, gain in gains.items()}
+    assert comparison.factors == pytest.approx(expected)
+    (said,) = tell(comparison)
+    assert 'currents' in said
+    payload = dict(torque) | {names[0]: (3.0 * values[0], 0.01)}
+    assert compare(files[0], ParameterFile('c', 'arm', payload, 5.0)).factors == {}

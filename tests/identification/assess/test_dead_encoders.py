@@ -99,6 +99,23 @@ def test_a_velocity_that_stays_while_its_position_moves_is_dead(arm, joint):
     assert f'in run the velocity of {arm.robot.joints[joint]} stays at 0' in text
 
 
+@pytest.mark.parametrize(
+    ('stated', 'dead'), [(1.0, False), (0.98, False), (0.0, True), (-1.0, True)]
+)
+def test_a_constant_speed_is_dead_where_it_is_not_the_way_gone(arm, stated, dead):
+    """A turntable goes round; its velocity does not change by one count."""
+    run, speed = record(arm, 1), 0.7
+    q, dq = run.q.copy(), run.dq.copy()
+    q[:, 0] = q[0, 0] + speed * run.t
+    dq[:, 0] = stated * speed
+    turning = replace(run, q=q, dq=dq)
+    found = [text for text in dead_encoders(arm.robot, turning) if 'velocity' in text]
+    assert bool(found) == dead
+    remarks = [one.text for one in inspect(turning, rng=np.random.default_rng(0)).remarks]
+    assert any('one of the two is dead' in text for text in remarks) == dead
+    assert not any('are zero while' in text for text in remarks)
+
+
 def test_a_driver_that_measures_no_velocities_is_not_dead(arm):
     recording = record(arm, 1)
     assert said(arm.robot, replace(recording, dq=0.0 * recording.dq)) == []

@@ -76,11 +76,12 @@ def test_currents_are_in_no_one_unit(arm, run):
     joints = arm.robot.joints
     gains = np.array([0.083, 0.025, 0.09, 0.125, 0.3, 0.5])
     currents = replace(run, tau=run.tau / gains)
-    said = factors_apart(arm, filtered(currents), filtered(run))
+    said = factors_apart(arm, filtered(currents), filtered(run), 'N mm')
     assert f'12 in {joints[0]}, 40 in {joints[1]}' in said and 'currents?' in said
-    for factor in (1.0, 1e3):
-        tau = factor * run.tau
-        assert factors_apart(arm, filtered(replace(run, tau=tau)), filtered(run)) == ''
+    assert said.endswith('--current-gain 0.083,0.025,0.09,0.125,0.3,0.5')
+    for factor, unit in ((1.0, ''), (1e3, 'N mm')):
+        scaled = filtered(replace(run, tau=factor * run.tau))
+        assert factors_apart(arm, scaled, filtered(run), unit) == ''
 
 
 def moved(motion, joints, pose):

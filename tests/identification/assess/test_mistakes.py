@@ -19,7 +19,7 @@ from armid_ros.identification.assess.hypotheses import (
 )
 from armid_ros.identification.assess.known_gravity import known_gravity
 from armid_ros.identification.assess.mistakes import find_mistake, suspected_mistake
-from armid_ros.identification.assess.torque_units import unit_of
+from armid_ros.identification.rows.checks import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
@@ -287,6 +287,15 @@ def test_currents_for_torques(robot, sound, factor):
     assert stated == pytest.approx(factor, rel=0.2)
 
 
+def test_currents_are_no_unit_and_have_the_gain_of_each_joint(robot, sound):
+    """Of gains near that of kgf m, as those of a UR10e."""
+    gains = np.array([13.3, 11.1, 10.6, 9.5, 12.0, 11.0])
+    said = mistake_in(robot, replace(sound, tau=sound.tau / gains))
+    assert 'kgf' not in said and 'currents?' in said
+    stated = [float(one) for one in said.split('--current-gain ')[1].split(' ')[0].split(',')]
+    np.testing.assert_allclose(stated[:4], gains[:4], rtol=0.1)
+
+
 @pytest.mark.parametrize(
     ('factor', 'unit'),
     [(1e3, 'N mm'), (1e2, 'N cm'), (1e-3, 'kN m'), (57.3, 'N m times 57.3')],
@@ -306,7 +315,8 @@ def test_a_unit_of_all_torques_is_no_gravity_and_no_current(robot, factor, unit,
 @pytest.mark.parametrize(('factor', 'unit'), [(0.102, 'kgf m'), (9.9, 'kgf cm'), (8.9, 'lbf in')])
 def test_a_unit_of_force_times_length_is_a_unit(factor, unit):
     assert unit_of(factor).split(' or ')[0] == unit
-    assert unit_of(1.25 * factor)
+    assert unit_of(1.15 * factor) and unit_of(factor, [factor, 1.15 * factor])
+    assert unit not in unit_of(factor, [factor, 1.3 * factor])
 
 
 @pytest.mark.parametrize('factor', [1.62 / 9.81, 0.5, 0.7, 1.1, 1.5, 5.0, 20.0])

@@ -1,0 +1,118 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What exports of messages write into cells: names of joints, stamps in two columns, dates.
+
+``rostopic echo -p`` writes name0, name1, position0, position1; bagpy and pandas write lists.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+import re
+
+from armid_ros.motion import FloatArray
+from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.tables.words import TIMES, words_of
+import numpy as np
+import numpy.typing as npt
+
+_NAME = re.compile(r'(.*?)(?:joint_)?names?[\[_.]?(\d+)\]?', re.IGNORECASE)
+_NUMBERED = re.compile(r'(.*?)[\[_.]?(\d+)\]?')
+_SECONDS = re.compile(r'(.*?)(?:s|secs?|seconds)', re.IGNORECASE)
+_NANOSECONDS = re.compile(r'(.*?)(?:ns|nsecs?|nanosecs?|nanoseconds)', re.IGNORECASE)
+
+
+def settled(table: Table) -> Table:
+    """Return a table whose columns have the names and the times that are in its cells."""
+    return _with_stamps(_with_dates(_with_names(table)))
+
+
+def _with_names(table: Table) -> Table:
+    """Call values by the joints that cells name, whose order may change from row to row."""
+    for prefix, named in _names(table.words).items():
+        values: dict[str, dict[str, TableColumn]] = {}
+        for column in table.columns:
+            match = _NUMBERED.fullmatch(column.name)
+            if match and match[1].startswith(prefix) and match[2] in named:
+                values.setdefault(match[1], {})[match[2]] = column
+        whole = {key: columns for key, columns in values.items() if columns.keys() == named.keys()}
+        if not whole:
+            continue
+        first = [str(cells[0]) for cells in named.values()]
+        every = np.unique(np.concatenate(list(named.values()))).tolist()
+        joints = [joint for joint in dict.fromkeys([*first, *every]) if joint]
+        apart = [
+            TableColumn(f'{key}[{joint}]', _of_joint(joint, named, columns), key)
+            for key, columns in whole.items()
+            for joint in joints
+        ]
+        taken = {column for columns in whole.values() for column in columns.values()}
+        rest = [column for column in table.columns if column not in taken]
+        table = replace(table, columns=(*rest, *apart))
+    return table
+
+
+def _names(words: Mapping[str, Sequence[str]]) -> dict[str, dict[str, npt.NDArray[np.str_]]]:
+    """Return columns of names by what precedes 'name', each by its number."""
+    found: dict[str, dict[str, npt.NDArray[np.str_]]] = {}
+    for name, cells in words.items():
+        match = _NAME.fullmatch(name)
+        if match and len(cells):
+            found.setdefault(match[1], {})[match[2]] = np.array(cells)
+    return found
+
+
+def _of_joint(
+    joint: str, named: Mapping[str, npt.NDArray[np.str_]], columns: Mapping[str, TableColumn]
+) -> FloatArray:
+    values = np.full(len(next(iter(named.values()))), np.nan)
+    for number, cells in named.items():
+        values = np.where(cells == joint, columns[number].values, values)
+    return values
+
+
+def _with_dates(table: Table) -> Table:
+    """Read columns of dates as seconds since 1970."""
+    dates = []
+    for name, cells in table.words.items():
+        try:
+            if not len(cells) or not cells[0][:4].isdigit():
+                continue
+            seconds = [datetime.fromisoformat(cell).timestamp() for cell in cells]
+        except ValueError:
+            continue
+        dates.append(TableColumn(name, np.array(seconds), unit='s'))
+    read = {column.name for column in dates}
+    words = {name: cells for name, cells in table.words.items() if name not in read}
+    return replace(table, columns=(*table.columns, *dates), words=words)
+
+
+def _with_stamps(table: Table) -> Table:
+    """Put seconds and nanoseconds of one stamp into one column."""
+    for seconds, nanoseconds, name in _pairs(table.columns):
+        finite = nanoseconds.values[np.isfinite(nanoseconds.values)]
+        whole = np.all(finite == np.rint(finite)) and np.all((finite >= 0.0) & (finite < 1e9))
+        if not whole or not np.any(finite):
+            continue
+        stamp = TableColumn(name, seconds.values + 1e-9 * nanoseconds.values, unit='s')
+        rest = [one for one in table.columns if one not in (seconds, nanoseconds)]
+        table = replace(table, columns=(stamp, *rest))
+    return table
+
+
+def _pairs(columns: Sequence[TableColumn]) -> Iterator[tuple[TableColumn, TableColumn, str]]:
+    """Yield columns that may be the seconds and nanoseconds of one stamp, and its name."""
+    arrays: dict[str, list[TableColumn]] = {}
+    for column in columns:
+        if column.array and any(word in TIMES for word in words_of(column.array)):
+            arrays.setdefault(column.array, []).append(column)
+    yield from ((*two, name) for name, two in arrays.items() if len(two) == 2)  # type: ignore
+    starts = {match[1]: column for column in columns if (match := _SECONDS.fullmatch(column.name))}
+    for column in columns:
+        match = _NANOSECONDS.fullmatch(column.name)
+        if match and match[1] in starts:
+            yield starts[match[1]], column, match[1].strip(' ._/') or 'time'

@@ -1,0 +1,176 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Names, stamps and dates that exports of messages write into cells are those of the recording."""
+
+from datetime import datetime, UTC
+from itertools import chain
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.anything import read_anything
+from armid_ros.recording.tables import ColumnSettings, open_table, plan
+import numpy as np
+import pytest
+
+from .conftest import assert_holds, JOINTS
+
+START = 1_455_208_158
+
+
+def stamps(motion):
+    """Return seconds and nanoseconds of a motion since 1970."""
+    return np.divmod(START * 10**9 + np.round(motion[0] * 1e9).astype(np.int64), 10**9)
+
+
+def rows(motion, order=lambda k: (0, 1)):
+    """Yield stamp, names, positions, velocities and torques of messages, each in an order."""
+    _, *values = motion
+    for k, (sec, nanosec) in enumerate(zip(*stamps(motion), strict=True)):
+        o = list(order(k))
+        yield sec, nanosec, [JOINTS[i] for i in o], *(v[k, o].tolist() for v in values)
+
+
+def as_rostopic_echoes(folder, motion):
+    kinds = [
+        f'field.{what}{k}' for what in ('name', 'position', 'velocity', 'effort') for k in (0, 1)
+    ]
+    text = ','.join(['%time', 'field.header.seq', 'field.header.stamp', *kinds]) + '\n'
+    for sec, nanosec, *fields in rows(motion, lambda k: (1, 0)):
+        cells = [f'{sec + 1}{nanosec:09d}', 7, f'{sec}{nanosec:09d}', *chain(*fields)]
+        text += ','.join(map(str, cells)) + '\n'
+    (folder / 'run.csv').write_text(text)
+    return 'run.csv'
+
+
+def as_lists(write):
+    def lists(folder, motion):
+        text = 'Time,header.stamp.secs,header.stamp.nsecs,name,position,velocity,effort\n'
+        for sec, nanosec, *fields in rows(motion, lambda k: (k % 2, 1 - k % 2)):
+            cells = (f'"{write(field)}"' for field in fields)
+            text += f'{sec + 1},{sec},{nanosec},{",".join(cells)}\n'
+        (folder / 'run.csv').write_text(text)
+        return 'run.csv'
+
+    return lists
+
+
+def as_parquet(folder, motion):
+    pyarrow = pytest.importorskip('pyarrow')
+    from pyarrow import parquet
+
+    heads = ('stamp_sec', 'stamp_nanosec', 'name', 'position', 'velocity', 'effort')
+    columns = zip(*rows(motion, lambda k: (k % 2, 1 - k % 2)), strict=True)
+    table = pyarrow.table(
+        {head: list(column) for head, column in zip(heads, columns, strict=True)}
+    )
+    parquet.write_table(table, folder / 'run.parquet')
+    return 'run.parquet'
+
+
+def as_hdf5(folder, motion):
+    h5py = pytest.importorskip('h5py')
+    with h5py.File(folder / 'run.h5', 'w') as file:
+        file['sec'], file['nanosec'] = stamps(motion)
+        for name, values in zip(('pos_J', 'vel_J', 'eff_J'), motion[1:], strict=True):
+            file[name] = values
+    return 'run.h5'
+
+
+def with_short_names(folder, motion):
+    text = 'sec,nanosec,pos_J1,pos_J2,vel_J1,vel_J2,trq_J1,trq_J2\n'
+    for sec, nanosec, _, *fields in rows(motion):
+        text += f'{sec},{nanosec},{",".join(map(str, chain(*fields)))}\n'
+    (folder / 'run.csv').write_text(text)
+    return 'run.csv'
+
+
+def with_dates(folder, motion):
+    text = 'mode,stamp,q1,q2,dq1,dq2,tau1,tau2\n'
+    for sec, nanosec, _, *fields in rows(motion):
+        date = datetime.fromtimestamp(sec, UTC).strftime(
+            f'%Y-%m-%dT%H:%M:%S.{nanosec // 1000:06d}Z'
+        )
+        text += f'run,{date},{",".join(map(str, chain(*fields)))}\n'
+    (folder / 'run.csv').write_text(text)
+    return 'run.csv'
+
+
+@pytest.mark.parametrize(
+    'write',
+    [
+        as_rostopic_echoes,
+        as_lists(str),
+        as_lists(lambda field: str(tuple(field))),
+        as_lists(lambda field: f'[{" ".join(map(str, field))}]'),
+        as_parquet,
+        as_hdf5,
+        with_short_names,
+        with_dates,
+    ],
+)
+def test_each_joint_has_its_own_values_at_the_stamps_of_the_driver(write, tmp_path, motion):
+    recording = read_anything(tmp_path / write(tmp_path, motion), joints=JOINTS)
+    assert_holds(recording, motion)
+    assert recording.start_ns == pytest.approx(START * 10**9, abs=1000)
+    assert len(recording) == len(motion[0])
+
+
+def test_joints_that_cells_name_are_not_taken_for_others(tmp_path, motion):
+    path = tmp_path / as_rostopic_echoes(tmp_path, motion)
+    with pytest.raises(RecordingError, match=r'field.position'):
+        read_anything(path, joints=('hip', 'knee'))
+    assert plan(open_table(path), ColumnSettings()).joints == ('elbow', 'shoulder')
+    asked = ColumnSettings(position='field.position{}', velocity='none', effort='none')
+    np.testing.assert_allclose(read_anything(path, joints=JOINTS, columns=asked).q, motion[1])
+
+
+@pytest.mark.parametrize(
+    ('columns', 'asked'),
+    [
+        ('tau1,tau2,tau1', {}),
+        ('tau1 [Nm],tau2,tau1 [A]', {}),
+        ('tau1,tau2,tau1', {'effort': 'tau{}'}),
+        ('tau1,tau2,tau1', {'effort': 'tau1,tau2'}),
+    ],
+)
+def test_two_columns_of_one_name_are_refused_where_they_differ(tmp_path, columns, asked):
+    ramp = np.arange(50.0)
+    for last, differs in ((ramp + 4.0, True), (ramp, False)):
+        values = np.column_stack([0.01 * ramp, ramp, ramp, ramp, ramp, last])
+        path = tmp_path / f'{differs}.csv'
+        np.savetxt(path, values, delimiter=',', header=f't,q1,q2,{columns}', comments='')
+        if differs:
+            with pytest.raises(RecordingError, match='tau1'):
+                plan(open_table(path), ColumnSettings(**asked))
+        elif not asked:
+            assert plan(open_table(path), ColumnSettings()).source('effort') is not None
+
+
+def test_what_is_not_read_is_listed_with_the_words_in_it(tmp_path):
+    text = 't,mode,q1,q2,heat[0],heat[1],eff1,eff2\n'
+    text += ''.join(f'{0.01 * k},run,{k},{k},20,21,{k},{k}\n' for k in range(50))
+    (tmp_path / 'run.csv').write_text(text)
+    found = plan(open_table(tmp_path / 'run.csv'), ColumnSettings())
+    assert found.unread == "heat[0], heat[1]; without a number: mode ('run')"
+    lines = ' '.join(' '.join(found.lines()).split())
+    assert f'not read {found.unread}' in lines
+
+
+@pytest.mark.parametrize('word', ['eff', 'trq', 'torque', 'tau', 'cur', 'current', 'i', 'load'])
+def test_abbreviations_of_efforts_are_known(tmp_path, word):
+    text = f't,q1,q2,{word}_J1,{word}_J2\n'
+    text += ''.join(f'{0.01 * k},{k},{k},{2 * k},{3 * k}\n' for k in range(50))
+    (tmp_path / 'run.csv').write_text(text)
+    found = plan(open_table(tmp_path / 'run.csv'), ColumnSettings())
+    assert found.source('effort').chosen.pattern == f'{word}_J{{}}'
+    assert any('currents' in note for note in found.notes) == (
+        word in ('cur', 'current', 'i', 'load')
+    )
+
+
+def test_a_table_of_one_value_a_row_is_called_so(tmp_path):
+    text = 'elapsed time,topic,value\n'
+    for k in range(100):
+        text += f'{0.01 * (k // 2)},/joint_states.position[{k % 2}],{k}\n'
+    (tmp_path / 'run.csv').write_text(text)
+    with pytest.raises(RecordingError, match=r'long form.* column topic'):
+        read_anything(tmp_path / 'run.csv', joints=JOINTS)

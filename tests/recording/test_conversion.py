@@ -1,0 +1,186 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What holds a JointState in another form is read by its schema, or refused; all of it or said."""
+
+import json
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording import read_recording
+from armid_ros.recording.contents import bag_contents
+from armid_ros.recording.joint_state.encoder import joint_state_cdr
+from armid_ros.recording.message_types import JOINT_STATE, message_type
+from armid_ros.recording.ros1 import copy_renamed
+from mcap.writer import Writer as McapFileWriter
+import numpy as np
+import pytest
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+import zstandard
+
+from .conftest import JOINTS
+
+HEADER = 'std_msgs/Header header'
+STANDARD = message_type(JOINT_STATE).definition
+PARTS = STANDARD[STANDARD.index('\n===') :]
+STATE = [HEADER, 'string[] name', *(f'float64[] {x}' for x in ('position', 'velocity', 'effort'))]
+
+
+def write(path, name, kind, definition, encoding, messages, stamps, topic='/joint_states'):
+    with path.open('wb') as stream:
+        writer = McapFileWriter(stream)
+        writer.start()
+        schema = writer.register_schema(name, kind, definition.encode())
+        channel = writer.register_channel(topic, encoding, schema)
+        for stamp, message in zip(stamps.tolist(), messages, strict=True):
+            writer.add_message(channel, stamp, message, stamp)
+        writer.finish()
+    return path
+
+
+def fields_of(recording, stamps):
+    """Yield stamp, positions, velocities and efforts of each message."""
+    for k, stamp in enumerate(stamps.tolist()):
+        yield divmod(stamp, 10**9), recording.q[k], recording.dq[k], recording.tau[k]
+
+
+def by_schema(path, recording, stamps, lines, name='sensor_msgs/msg/JointState', **more):
+    """Write messages of a schema of one's own, in CDR."""
+    store = get_typestore(Stores.EMPTY)
+    definition = '\n'.join(lines) + PARTS
+    store.register(get_types_from_msg(definition, name))
+    types, messages = store.types, []
+    for (sec, nanosec), q, dq, tau in fields_of(recording, stamps):
+        header = types['std_msgs/msg/Header'](
+            types['builtin_interfaces/msg/Time'](sec, nanosec), ''
+        )
+        values = {'name': list(JOINTS), 'position': q, 'velocity': dq, 'effort': tau}
+        values = {key: of for key, of in values.items() if any(f' {key}' in x for x in lines)}
+        message = types[name](header=header, **values, **more)
+        messages.append(bytes(store.serialize_cdr(message, name)))
+    return write(path, name, 'ros2msg', definition, 'cdr', messages, stamps)
+
+
+def exchanged_fields(path, recording, stamps):
+    return by_schema(path, recording, stamps, [*STATE[:2], STATE[4], STATE[3], STATE[2]])
+
+
+def one_more_field(path, recording, stamps):
+    lines = [HEADER, 'string mode', *STATE[1:]]
+    return by_schema(path, recording, stamps, lines, mode='position control')
+
+
+def ros1(path, recording, stamps):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types, messages = store.types, []
+    for k, ((sec, nanosec), q, dq, tau) in enumerate(fields_of(recording, stamps)):
+        stamp = types['builtin_interfaces/msg/Time'](sec, nanosec)
+        header = types['std_msgs/msg/Header'](k, stamp, 'base')
+        message = types[JOINT_STATE](header, list(JOINTS), q, dq, tau)
+        messages.append(bytes(store.serialize_ros1(message, JOINT_STATE)))
+    return write(path, 'sensor_msgs/JointState', 'ros1msg', '', 'ros1', messages, stamps)
+
+
+def in_json(path, recording, stamps):
+    messages = [
+        json.dumps({
+            'header': {'stamp': {'sec': sec, 'nanosec': nanosec}}, 'name': list(JOINTS),
+            'position': q.tolist(), 'velocity': dq.tolist(), 'effort': tau.tolist(),
+        }).encode()
+        for (sec, nanosec), q, dq, tau in fields_of(recording, stamps)
+    ]  # fmt: skip
+    kind = 'sensor_msgs/msg/JointState'
+    return write(path, kind, 'jsonschema', '{}', 'json', messages, stamps)
+
+
+def inside_another_type(path, recording, stamps):
+    name = 'franka_msgs/msg/FrankaRobotState'
+    own = 'sensor_msgs/JointState desired_joint_state\nsensor_msgs/JointState measured_joint_state'
+    split = '\n' + '=' * 80 + '\n'
+    definition = f'{own}{split}MSG: sensor_msgs/JointState\n{STANDARD}'
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(definition, name))
+    types, messages = store.types, []
+    for (sec, nanosec), q, dq, tau in fields_of(recording, stamps):
+        header = types['std_msgs/msg/Header'](
+            types['builtin_interfaces/msg/Time'](sec, nanosec), ''
+        )
+        state = types[JOINT_STATE](header, list(JOINTS), q, dq, tau)
+        desired = types[JOINT_STATE](header, list(JOINTS), 0 * q, dq, tau)
+        message = types[name](desired_joint_state=desired, measured_joint_state=state)
+        messages.append(bytes(store.serialize_cdr(message, name)))
+    return write(path, name, 'ros2msg', definition, 'cdr', messages, stamps, '/robot_state')
+
+
+def messages_packed_by_zstd(path, recording, stamps):
+    messages = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
+    packed = [zstandard.compress(message) for message in messages]
+    return write(path, JOINT_STATE, 'ros2msg', STANDARD, 'cdr', packed, stamps)
+
+
+def file_packed_by_zstd(path, recording, stamps):
+    messages = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
+    write(path, JOINT_STATE, 'ros2msg', STANDARD, 'cdr', messages, stamps)
+    packed = path.with_name('bag.mcap.zst')
+    packed.write_bytes(zstandard.compress(path.read_bytes()))
+    return packed
+
+
+@pytest.mark.parametrize(
+    'made',
+    [
+        exchanged_fields, one_more_field, ros1, in_json, inside_another_type,
+        messages_packed_by_zstd, file_packed_by_zstd,
+    ],
+)  # fmt: skip
+def test_what_holds_a_joint_state_is_read(made, swinging, stamps, tmp_path, assert_same):
+    path = made(tmp_path / 'bag.mcap', swinging, stamps)
+    read = read_recording(path, joints=JOINTS)
+    assert_same(read, swinging)
+    assert read.report.clean
+    assert any(topic.joints == JOINTS for topic in bag_contents(path))
+
+
+@pytest.mark.parametrize('made', [exchanged_fields, ros1])
+def test_joints_of_another_schema_are_not_renamed(made, swinging, stamps, tmp_path):
+    path = made(tmp_path / 'bag.mcap', swinging, stamps)
+    with pytest.raises(RecordingError, match='/joint_states is no'):
+        copy_renamed(path, tmp_path / 'out', [('elbow', 'knee')])
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.parametrize('lacking', ['name', 'position'])
+def test_a_schema_without_names_or_positions_is_refused(lacking, swinging, stamps, tmp_path):
+    lines = [line for line in STATE if not line.endswith(lacking)]
+    path = by_schema(tmp_path / 'bag.mcap', swinging, stamps, lines)
+    with pytest.raises(RecordingError, match=rf'/joint_states: its schema .* no {lacking}'):
+        read_recording(path, joints=JOINTS)
+
+
+def test_an_encoding_that_nobody_reads_is_named(swinging, stamps, tmp_path):
+    path = tmp_path / 'bag.mcap'
+    write(path, JOINT_STATE, 'protobuf', '', 'protobuf', [b'\x01'] * len(stamps), stamps)
+    with pytest.raises(RecordingError, match="serialised as 'protobuf'; CDR of ROS 2"):
+        read_recording(path, joints=JOINTS)
+
+
+def test_a_file_behind_a_file_is_said(swinging, stamps, tmp_path):
+    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
+    half, path = len(stamps) // 2, tmp_path / 'both.mcap'
+    parts = [
+        write(tmp_path / 'part.mcap', JOINT_STATE, 'ros2msg', STANDARD, 'cdr', messages[of],
+              stamps[of]).read_bytes()
+        for of in (slice(half), slice(half, None))
+    ]  # fmt: skip
+    path.write_bytes(b''.join(parts))
+    report = read_recording(path, joints=JOINTS).report
+    assert report.samples == half
+    assert f'{len(parts[1])} bytes follow' in report.damage and not report.clean
+
+
+def test_arms_on_topics_of_their_own_are_one_recording(make_swing, stamps, write_bag, messages_of):
+    left, right = make_swing(joints=('left_1', 'left_2')), make_swing(joints=('right_1',))
+    messages = messages_of(left, stamps, topic='/left/joint_states')
+    bag = write_bag(messages + messages_of(right, stamps, topic='/right/joint_states'))
+    joints = ('right_1', 'left_1', 'left_2')
+    read = read_recording(bag, joints=joints)
+    np.testing.assert_array_equal(read.q, np.column_stack([right.q, left.q]))
+    assert read.topic == '/left/joint_states + /right/joint_states'

@@ -1,0 +1,105 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Angles within one turn become continuous; messages without a time and rubbish are left out."""
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording import Recording, write_recording
+from armid_ros.recording.anything import read_anything
+from armid_ros.recording.series import unwrapped
+from armid_ros.recording.tables import ColumnSettings
+import numpy as np
+import pytest
+
+JOINTS = ('turntable', 'elbow')
+
+
+def motion(samples=2000):
+    t = np.arange(samples) * 0.005
+    return t, np.column_stack([2.5 + 1.5 * np.sin(t), 0.5 * np.cos(2.0 * t)])
+
+
+def as_bag(folder, t, q, tau):
+    recording = Recording(joints=JOINTS, t=t, q=q, tau=tau, start_ns=10**18)
+    write_recording(folder / 'bag', recording)
+    return folder / 'bag'
+
+
+def as_table(folder, t, q, tau):
+    values = np.column_stack([t, q, tau])
+    head = 't,' + ','.join(f'{what}_{joint}' for what in ('pos', 'tau') for joint in JOINTS)
+    np.savetxt(folder / 'run.csv', values, delimiter=',', header=head, comments='')
+    return folder / 'run.csv'
+
+
+@pytest.mark.parametrize('write', [as_bag, as_table])
+@pytest.mark.parametrize('lowest', [-np.pi, 0.0])
+def test_a_joint_kept_within_one_turn_is_continuous_and_said_once(write, lowest, tmp_path):
+    t, q = motion()
+    wrapped = q.copy()
+    wrapped[:, 0] = (q[:, 0] - lowest) % (2.0 * np.pi) + lowest
+    read = read_anything(write(tmp_path, t, wrapped, q), joints=JOINTS)
+    off = (read.q[:, 0] - q[:, 0]) / (2.0 * np.pi)
+    assert np.ptp(off) < 1e-12 and off[0] == pytest.approx(round(off[0]), abs=1e-9)
+    np.testing.assert_allclose(read.q[:, 1], q[:, 1], atol=1e-12)
+    jumps = np.abs(np.diff(wrapped[:, 0])).max() > 6.0
+    assert read.report.unwrapped == (('turntable',) if jumps else ())
+    assert read.report.unharmed
+    assert read.report.describe().count('turntable') == jumps
+
+
+def test_degrees_are_made_continuous_too(tmp_path):
+    t, q = motion()
+    path = as_table(tmp_path, t, np.rad2deg((q + np.pi) % (2.0 * np.pi) - np.pi), q)
+    read = read_anything(path, joints=JOINTS, columns=ColumnSettings(degrees=True))
+    assert np.ptp(read.q[:, 0] - q[:, 0]) < 1e-9 and read.report.unwrapped == ('turntable',)
+
+
+@pytest.mark.parametrize('jump', [3.5, 5.0, 7.5, 12.0])
+def test_a_jump_that_is_no_whole_turn_stays(jump):
+    _, q = motion()
+    q[700:900, 0] += jump
+    same, joints = unwrapped(q)
+    assert same is q and joints == []
+
+
+@pytest.mark.parametrize('table', [False, True])
+def test_messages_before_the_first_stamp_are_left_out(table, tmp_path, write_bag, messages_of):
+    """Simulation time is zero before /clock, of the driver and of the recorder alike."""
+    t, q = motion(4001)
+    late = np.arange(4001) >= 150
+    if table:
+        path = as_table(tmp_path, np.where(late, t + 1.7e9, 0.0), q, q)
+    else:
+        recording = Recording(joints=JOINTS, t=t, q=q, tau=q)
+        stamps = np.where(late, 10**18 + np.round(t * 1e9).astype(np.int64), 0)
+        path = write_bag(messages_of(recording, stamps, log=stamps))
+    read = read_anything(path, joints=JOINTS)
+    assert (len(read), read.report.unstamped, read.clock) == (3851, 150, 'header')
+    np.testing.assert_allclose(read.q, q[150:])
+
+
+@pytest.mark.parametrize('write', [as_bag, as_table])
+@pytest.mark.parametrize('value', [1e300, 1e157, -1e18])
+def test_values_beyond_all_quantities_are_no_numbers(write, value, tmp_path):
+    t, q = motion()
+    tau = q.copy()
+    tau[[3, 70], 1] = value
+    read = read_anything(write(tmp_path, t, q, tau), joints=JOINTS)
+    assert read.report.nan == 2 and 'effort of elbow in 2' in read.report.not_finite
+    assert np.abs(read.tau).max() < 10.0
+
+
+@pytest.mark.parametrize('write', [as_bag, as_table])
+def test_efforts_beyond_all_quantities_throughout_are_refused(write, tmp_path):
+    t, q = motion()
+    with pytest.raises(RecordingError, match='elbow'):
+        read_anything(write(tmp_path, t, q, q * [1.0, 1e300]), joints=JOINTS)
+
+
+def test_rows_with_a_time_of_rubbish_are_left_out(tmp_path, recwarn):
+    t, q = motion()
+    stamps = t.copy()
+    stamps[[0, 500]] = 1e157
+    read = read_anything(as_table(tmp_path, stamps, q, q), joints=JOINTS)
+    assert len(read) == 1998 and read.report.unstamped == 2
+    assert not recwarn.list
