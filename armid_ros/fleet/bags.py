@@ -112,7 +112,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
             length = len(file_name(arm).encode())
             if not 0 < length <= LONGEST_NAME:
                 raise FleetError(
-                    f'{url}: its arm has the name {arm!r}, of {length} bytes in a path; a name has '
+                    f'{url}: its arm is named {arm!r}, of {length} bytes in a path; a name has '
                     f"1 to {LONGEST_NAME}: choose a part of the path with --arm 'robots/([^/]+)/'"
                 )
             plain = at if url.startswith('file://') else url

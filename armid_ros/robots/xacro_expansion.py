@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 import json
 from pathlib import Path
+import signal
 import subprocess
 import sys
 from typing import Any
@@ -22,14 +23,20 @@ from typing import Any
 from armid_ros.errors import RobotError
 from armid_ros.files.regular import TEXT_LIMIT
 
-#: The longest that an expansion may take [s]; the largest descriptions take one or two.
+#: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
+#: How many times as long it may wait, for other processes or for a file.
+_WAIT = 6.0
 #: The most memory [bytes].
 MEMORY_LIMIT = 2 << 30
 
 
 def expand_xacro(
-    path: Path, arguments: Mapping[str, str], *, time_limit: float = TIME_LIMIT
+    path: Path,
+    arguments: Mapping[str, str],
+    packages: Mapping[str, str] | None = None,
+    *,
+    time_limit: float = TIME_LIMIT,
 ) -> str:
     """
     Return what a xacro file expands to.
@@ -40,8 +47,10 @@ def expand_xacro(
         The file; it is trusted as a program is, except for time and memory.
     arguments : mapping of str to str
         Values of <xacro:arg>.
+    packages : mapping of str to str, optional
+        Folders of packages by name, where `package_folders` would not find them.
     time_limit : float
-        The longest that it may take [s].
+        Processor time that it may take [s].
 
     Raises
     ------
@@ -52,6 +61,7 @@ def expand_xacro(
     request = {
         'path': str(path),
         'arguments': dict(arguments),
+        'packages': dict(packages or {}),
         'seconds': time_limit,
         'memory': MEMORY_LIMIT,
         'characters': TEXT_LIMIT,
@@ -64,13 +74,18 @@ def expand_xacro(
             capture_output=True,
             encoding='utf-8',
             errors='replace',
-            timeout=time_limit,
+            timeout=_WAIT * time_limit,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise RobotError(f'{path}: xacro: not expanded within {time_limit:g} s') from error
+        raise RobotError(f'{path}: xacro: not expanded within {_WAIT * time_limit:g} s') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
+    if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
+        raise RobotError(
+            f'{path}: xacro: not expanded within {time_limit:g} s of processor time and '
+            f'{MEMORY_LIMIT >> 20} MiB'
+        )
     answer = _answer(done.stdout)
     if 'text' not in answer:
         reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'

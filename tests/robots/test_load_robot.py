@@ -473,12 +473,11 @@ class TestXacroIsAProgram:
         path = tmp_path / 'endless.xacro'
         path.write_text(
             '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">'
-            '<xacro:property name="x" value="${[0] * 10**8}"/>'
             f'<xacro:include filename="{tmp_path}/fifo"/></robot>'
         )
         os.mkfifo(tmp_path / 'fifo')
-        with pytest.raises(RobotError, match=r'endless.xacro: xacro: not expanded within 0.5 s'):
-            expand_xacro(path, {}, time_limit=0.5)
+        with pytest.raises(RobotError, match=r'endless.xacro: xacro: not expanded within 1.8 s'):
+            expand_xacro(path, {}, time_limit=0.3)
 
     def test_one_that_takes_all_memory_is_stopped(self, tmp_path: Path) -> None:
         path = tmp_path / 'large.xacro'
