@@ -13,8 +13,19 @@ import pytest
 LOCKS = {
     'build': ['build'],
     'run': ['run', 'ros'],
-    'test': ['test', 'convert', 'docs', 'fleet', 'residual', 'view', 'run', 'ros'],
-    'bench': ['bench', 'test', 'convert', 'docs', 'fleet', 'residual', 'view', 'run', 'ros'],
+    'test': ['test', 'convert', 'docs', 'fleet', 'residual', 'mujoco', 'view', 'run', 'ros'],
+    'bench': [
+        'bench',
+        'test',
+        'convert',
+        'docs',
+        'fleet',
+        'residual',
+        'mujoco',
+        'view',
+        'run',
+        'ros',
+    ],
 }
 
 
@@ -60,7 +71,7 @@ def test_the_constraints_are_the_versions_of_the_tests(root):
     assert {normal(name): version for name, version in pins.items()} == pinned(root, 'bench')
 
 
-@pytest.mark.parametrize('group', ['run', 'convert', 'fleet', 'residual', 'view'])
+@pytest.mark.parametrize('group', ['run', 'convert', 'fleet', 'residual', 'view', 'mujoco'])
 def test_requirements_of_users_have_a_lowest_and_a_highest_version(root, group):
     lines = (root / 'requirements' / f'{group}.in').read_text().splitlines()
     for line in filter(lambda line: not line.startswith('#'), lines):
