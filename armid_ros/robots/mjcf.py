@@ -26,7 +26,7 @@ import pinocchio as pin
 
 _EARTH = (0.0, 0.0, -9.81)
 #: What comes before the root element of an MJCF, and its name.
-_ROOT = re.compile(r'(?:\s|<\?.*?\?>|<!--.*?-->)*<mujoco[\s/>]', re.DOTALL)
+_ROOT = re.compile(r'(?:\s|<\?(?>.*?\?>)|<!--(?>.*?-->))*+<mujoco[\s/>]', re.DOTALL)
 
 
 def is_mjcf(text: str) -> bool:

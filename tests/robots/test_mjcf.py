@@ -171,6 +171,14 @@ def test_what_has_no_place_in_a_urdf_is_said(written, text, said):
     assert any(said in note for note in load_robot(path).notes)
 
 
+def test_a_long_urdf_is_told_from_an_mjcf_at_once(written):
+    robot = load_robot('humanoid_arm')
+    comments = '<!-- <mujoco> -->\n' * 5000
+    urdf = robot.urdf.replace('<robot', comments + '<robot', 1)
+    assert load_robot(written(urdf)).joints == robot.joints
+    assert load_robot(written(comments + ARMS['full inertia'])).joints == ('j1', 'j2')
+
+
 def test_without_mujoco_the_package_to_install_is_named(written, monkeypatch):
     monkeypatch.setitem(sys.modules, 'mujoco', None)
     with pytest.raises(RobotError, match=r'armid_ros\[mujoco\]'):
