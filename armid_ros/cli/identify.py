@@ -11,7 +11,8 @@ import time
 from typing import Any
 
 from armid_ros.arm import ArmModel, save_model
-from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
+from armid_ros.arm.export_check import torque_check
 from armid_ros.cli import options
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
@@ -171,6 +172,12 @@ def identify(
     misfit = known_misfit(result, work.recordings, work.held_out)
     save_model(staged.folder / 'model.yaml', result.arm, source, result.estimate, misfit)
     exports = _export(result.arm, staged.folder) if bodies.physical else {}
+    if exports:
+        document['exports'] = {
+            name: {**torque_check(one, result.arm, seed), 'left_out': list(one.left_out)}
+            for name, one in exports.items()
+        }
+    without_place = {name: one.without_place for name, one in exports.items()}
     page = identification_report(
         result,
         description=arm,
@@ -178,7 +185,7 @@ def identify(
         recordings=work.recordings,
         validation=work.validation,
         validation_recordings=work.held_out,
-        assessment=Assessment(work.verification, work.graded, work.scores, exports),
+        assessment=Assessment(work.verification, work.graded, work.scores, without_place),
         provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
     write_file(staged.folder / 'report.html', page)
@@ -236,9 +243,7 @@ def _work(
     return _Work(recordings, held_out, result, validation, graded, verification, scores)
 
 
-def _print(
-    out: Path, document: dict[str, Any], work: _Work, exports: dict[str, tuple[str, ...]]
-) -> None:
+def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
     """Print what a person would stop at, then the table, then the rest."""
     result = work.result
     say(f'{work.graded.word}:')
@@ -260,16 +265,24 @@ def _print(
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
+    for name, check in document.get('exports', {}).items():
+        left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
+        torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
+        torque = torque or (
+            f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
+            f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
+        )
+        say(f'{name}: {torque}{left_out}')
     files = ['model.yaml', 'identification.json', 'report.html', *exports]
     say(f'{out}: {", ".join(files)}')
 
 
-def _export(arm: ArmModel, out: Path) -> dict[str, tuple[str, ...]]:
-    """Write the arm for other programs; return what each file has no place for, by its name."""
+def _export(arm: ArmModel, out: Path) -> dict[str, Exported]:
+    """Write the arm for other programs; return the files by name."""
     made = {'identified.urdf': arm_urdf(arm), 'identified.mjcf.xml': arm_mjcf(arm)}
     for name, exported in made.items():
         write_file(out / name, exported.text)
-    return {name: exported.without_place for name, exported in made.items()}
+    return made
 
 
 def _print_certificate(certificate: PhysicalCertificate) -> None:
@@ -311,7 +324,7 @@ def _tell(
     result: Identification,
     verification: Verification | None,
     robot_notes: tuple[str, ...],
-    exports: dict[str, tuple[str, ...]],
+    exports: dict[str, Exported],
 ) -> None:
     for note in (*robot_notes, *result.notes):
         say(f'note: {note}')
@@ -319,8 +332,8 @@ def _tell(
     if unseen:
         named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
         say(f'not identified: {named}')
-    for name, lines in exports.items():
-        kinds = dict.fromkeys(line.split(':')[0] for line in lines)
+    for name, one in exports.items():
+        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
         if kinds:
             say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
     if verification is not None:
