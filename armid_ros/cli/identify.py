@@ -43,6 +43,12 @@ from armid_ros.identification.estimators.side_by_side import (
     MethodScore,
 )
 from armid_ros.identification.identified_from import with_contents
+from armid_ros.identification.known_payload import (
+    corrected,
+    drive_gains,
+    DriveGains,
+    payloads_of,
+)
 from armid_ros.identification.output import SCHEMA
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
@@ -90,6 +96,8 @@ class FitOptions:
         Whether only weight and effects are fitted.
     verifies, strict : bool
         Whether the result is verified, and whether an unusable one is an error.
+    payloads : tuple of str
+        What is carried in which bag.
 
     """
 
@@ -99,6 +107,7 @@ class FitOptions:
     quasi_static: bool
     verifies: bool
     strict: bool
+    payloads: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -161,11 +170,13 @@ def identify(
     settings = IdentificationSettings(fit.method, filters.settings(), known)
     compared = () if fit.methods is None else estimators_of(fit.methods)
     with progress('reading') as tick:
-        work = _work(arm, data, settings, compared, fit.verifies, seed, tick)
+        work = _work(arm, data, settings, compared, fit, seed, tick)
     result = work.result
     document = identification_document(
         result, robot.robot_source, work.validation, work.verification, work.graded
     )
+    if work.gains:
+        document['drive_gains'] = work.gains.document()
     if work.scores:
         document['methods'] = [score.document() for score in work.scores]
     source = options.kept_source(robot.robot_source, loaded, staged.folder)
@@ -211,6 +222,7 @@ class _Work:
     graded: Grade
     verification: Verification | None
     scores: Sequence[MethodScore]
+    gains: DriveGains | None
 
 
 def _work(
@@ -218,7 +230,7 @@ def _work(
     data: IdentificationData,
     settings: IdentificationSettings,
     compared: Sequence[Estimator],
-    verifies: bool,
+    options_of_fit: FitOptions,
     seed: int,
     tick: Tick,
 ) -> _Work:
@@ -228,19 +240,27 @@ def _work(
     held_out = options.read(data.validate, arm.robot, data.topic)
     require_once(recordings, held_out)
     check_held_out(arm.robot, held_out)
+    gains = None
+    if options_of_fit.payloads:
+        bags, signals = [*data.bags, *data.validate], settings.signals
+        read = [*recordings, *held_out]
+        loaded = payloads_of(options_of_fit.payloads, bags, read, arm.robot)
+        gains = drive_gains(arm, recordings, loaded, signals, rng)
+        recordings = corrected(arm, recordings, loaded, gains, signals)
+        held_out = corrected(arm, held_out, loaded, gains, signals)
     tick(0.0, 'identifying')
     result = run(arm, recordings, settings, rng=rng, progress=tick)
     validation = {r.source: result.predict([r]) for r in held_out}
     tick(1.0, 'grading')
     graded = grade(result, arm, recordings, validation, held_out)
     verification = None
-    if verifies:
+    if options_of_fit.verifies:
         verification = verify(result, arm, recordings, held_out, rng=rng, progress=tick)
     comparison = ComparisonSettings(compared, settings.signals, seed)
     scores = compare_methods(
         arm, recordings, held_out, comparison, clock=time.process_time, progress=tick
     )
-    return _Work(recordings, held_out, result, validation, graded, verification, scores)
+    return _Work(recordings, held_out, result, validation, graded, verification, scores, gains)
 
 
 def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
@@ -253,6 +273,8 @@ def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, 
     trends = residual_trends(result.arm.robot.joints, shown)
     if trends:
         say(f'  {" ".join(trends.values())} The model lacks something there.')
+    for line in work.gains.sentences() if work.gains else ():
+        say(line)
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)
