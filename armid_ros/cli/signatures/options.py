@@ -33,7 +33,10 @@ gravity = click.option(
     '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
 )
 joints = click.option(
-    '--joints', default=None, metavar='A,B,...', help='Driven joints; all but grippers by default.'
+    '--joints',
+    default=None,
+    metavar='A,B,...',
+    help='Driven joints; all but grippers by default. A name with a comma is in double quotes.',
 )
 effects = click.option(
     '--effects',
