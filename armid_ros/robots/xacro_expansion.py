@@ -25,8 +25,8 @@ from armid_ros.files.regular import TEXT_LIMIT
 
 #: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
-#: How many times as long it may wait, for other processes or for a file.
-_WAIT = 6.0
+#: How long it may last, with other processes on the machine [s]; what waits for a file ends so.
+PATIENCE = 300.0
 #: The most memory [bytes].
 MEMORY_LIMIT = 2 << 30
 
@@ -37,6 +37,7 @@ def expand_xacro(
     packages: Mapping[str, str] | None = None,
     *,
     time_limit: float = TIME_LIMIT,
+    patience: float = PATIENCE,
 ) -> str:
     """
     Return what a xacro file expands to.
@@ -51,6 +52,8 @@ def expand_xacro(
         Folders of packages by name, where `package_folders` would not find them.
     time_limit : float
         Processor time that it may take [s].
+    patience : float
+        How long it may last [s].
 
     Raises
     ------
@@ -74,11 +77,11 @@ def expand_xacro(
             capture_output=True,
             encoding='utf-8',
             errors='replace',
-            timeout=_WAIT * time_limit,
+            timeout=patience,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise RobotError(f'{path}: xacro: not expanded within {_WAIT * time_limit:g} s') from error
+        raise RobotError(f'{path}: xacro: not expanded within {patience:g} s') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
     if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
