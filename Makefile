@@ -114,6 +114,7 @@ lock: $(STAMPS)/test  ## pin the requirements anew, with hashes, for Python 3.11
 	cd requirements && ../$(UV) -c bench.txt test.in -o test.txt
 	cd requirements && ../$(UV) -c bench.txt run.in ros.in -o run.txt
 	cd requirements && ../$(UV) -c bench.txt build.in -o build.txt
+	sed -nE 's/^([a-z][^ ]*==[^;\\]*[^ ;\\])( ;[^\\]*[^ \\])? *\\$$/\1\2/p' requirements/bench.txt >requirements/constraints.txt
 
 chaos: $(STAMPS)/armid_ros $(STAMPS)/test  ## 100 random schedules of events around the identifier
 	ARMID_CHAOS=100 $(BIN)/pytest tests/ros/test_chaos.py

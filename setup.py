@@ -64,6 +64,7 @@ setup(
         'notebook': requirements('notebook'),
         'fleet': requirements('fleet'),
         'residual': requirements('residual'),
+        'mujoco': requirements('mujoco'),
         'test': requirements('test'),
         'bench': requirements('bench'),
     },

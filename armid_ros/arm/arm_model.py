@@ -22,6 +22,7 @@ from armid_ros.effects import (
 from armid_ros.effects.timing import smoothed
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
+from armid_ros.files.cells import parted
 from armid_ros.model import (
     BaseParameters,
     gravity_sensitivity,
@@ -125,7 +126,7 @@ class ArmModel:
             robot = load_robot(robot, gravity=gravity, joints=joints)
         arm = cls(robot)
         if isinstance(effects, str):
-            effects = [effects] if ':' in effects else [e for e in effects.split(',') if e.strip()]
+            effects = [effects] if ':' in effects else [e for e in parted(effects) if e.strip()]
         for effect in effects:
             if isinstance(effect, Effect):
                 arm = arm.with_effect(effect)

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.model.mjcf_export import export_mjcf
 from armid_ros.model.urdf_export import export_urdf
+from armid_ros.robots import held_joints
 import numpy as np
 
 
@@ -26,11 +27,17 @@ class Exported:
     without_place : tuple of str
         Parameters of effects that the format has no place for, one a line; a comment in the file
         lists them too.
+    left_out : tuple of str
+        What of the description is not in the file.
+    values : mapping of str to mapping of str to float
+        By joint: 'damping' [N m s/rad], 'friction' [N m] and 'armature' [kg m^2] of the file.
 
     """
 
     text: str
     without_place: tuple[str, ...]
+    left_out: tuple[str, ...]
+    values: Mapping[str, Mapping[str, float]]
 
 
 def arm_urdf(arm: ArmModel) -> Exported:
@@ -53,7 +60,8 @@ def arm_urdf(arm: ArmModel) -> Exported:
         friction=found.get('friction'),
         remarks=_remarks('a URDF', missing),
     )
-    return Exported(text, missing)
+    left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
+    return Exported(text, missing, left_out, found)
 
 
 def arm_mjcf(arm: ArmModel) -> Exported:
@@ -68,14 +76,19 @@ def arm_mjcf(arm: ArmModel) -> Exported:
     """
     missing = _without_place(arm, lambda effect: effect.mjcf_attribute)
     found = _of_joints(arm, lambda effect: effect.mjcf_attribute)
+    found['friction'] = found.pop('frictionloss', {})
+    left_out = ['shapes', 'the base link']
+    if np.any(np.isfinite(arm.robot.velocity_limit)):
+        left_out.append('velocity limits')
+    left_out += [f'joint {joint.name}' for joint in held_joints(arm.robot)]
     text = export_mjcf(
         arm.body,
         damping=found.get('damping'),
-        friction=found.get('frictionloss'),
+        friction=found.get('friction'),
         armature=found.get('armature'),
-        remarks=_remarks('MuJoCo', missing),
+        remarks=(*_remarks('MuJoCo', missing), f'without {", ".join(left_out)}'),
     )
-    return Exported(text, missing)
+    return Exported(text, missing, tuple(left_out), found)
 
 
 def _of_joints(arm: ArmModel, place: Callable[[Effect], str]) -> dict[str, dict[str, float]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from armid_ros.cli import columns, options
 from armid_ros.cli.terminal import say
 from armid_ros.errors import RecordingError
+from armid_ros.files.cells import listed
 from armid_ros.recording import write_recording
 from armid_ros.recording.ros1 import convert_ros1, Copied, copy_renamed, is_ros1
 from armid_ros.recording.tables import (
@@ -54,7 +55,7 @@ def _table(
     table = side_by_side([open_table(path, episode=said.episode) for path in files])
     names = None if robot is None else robot.joints
     if robot is None and joints:
-        names = tuple(joints.split(','))
+        names = listed(joints)
     settled = plan(table, said, names, None if robot is None else list(robot.prismatic))
     for line in settled.lines():
         say(line)

@@ -11,7 +11,8 @@ import time
 from typing import Any
 
 from armid_ros.arm import ArmModel, save_model
-from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
+from armid_ros.arm.export_check import torque_check
 from armid_ros.cli import options
 from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
@@ -42,6 +43,12 @@ from armid_ros.identification.estimators.side_by_side import (
     MethodScore,
 )
 from armid_ros.identification.identified_from import with_contents
+from armid_ros.identification.known_payload import (
+    corrected,
+    drive_gains,
+    DriveGains,
+    payloads_of,
+)
 from armid_ros.identification.output import SCHEMA
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
@@ -89,6 +96,8 @@ class FitOptions:
         Whether only weight and effects are fitted.
     verifies, strict : bool
         Whether the result is verified, and whether an unusable one is an error.
+    payloads : tuple of str
+        What is carried in which bag.
 
     """
 
@@ -98,6 +107,7 @@ class FitOptions:
     quasi_static: bool
     verifies: bool
     strict: bool
+    payloads: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -160,17 +170,25 @@ def identify(
     settings = IdentificationSettings(fit.method, filters.settings(), known)
     compared = () if fit.methods is None else estimators_of(fit.methods)
     with progress('reading') as tick:
-        work = _work(arm, data, settings, compared, fit.verifies, seed, tick)
+        work = _work(arm, data, settings, compared, fit, seed, tick)
     result = work.result
     document = identification_document(
         result, robot.robot_source, work.validation, work.verification, work.graded
     )
+    if work.gains:
+        document['drive_gains'] = work.gains.document()
     if work.scores:
         document['methods'] = [score.document() for score in work.scores]
     source = options.kept_source(robot.robot_source, loaded, staged.folder)
     misfit = known_misfit(result, work.recordings, work.held_out)
     save_model(staged.folder / 'model.yaml', result.arm, source, result.estimate, misfit)
     exports = _export(result.arm, staged.folder) if bodies.physical else {}
+    if exports:
+        document['exports'] = {
+            name: {**torque_check(one, result.arm, seed), 'left_out': list(one.left_out)}
+            for name, one in exports.items()
+        }
+    without_place = {name: one.without_place for name, one in exports.items()}
     page = identification_report(
         result,
         description=arm,
@@ -178,7 +196,7 @@ def identify(
         recordings=work.recordings,
         validation=work.validation,
         validation_recordings=work.held_out,
-        assessment=Assessment(work.verification, work.graded, work.scores, exports),
+        assessment=Assessment(work.verification, work.graded, work.scores, without_place),
         provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
     write_file(staged.folder / 'report.html', page)
@@ -204,6 +222,7 @@ class _Work:
     graded: Grade
     verification: Verification | None
     scores: Sequence[MethodScore]
+    gains: DriveGains | None
 
 
 def _work(
@@ -211,7 +230,7 @@ def _work(
     data: IdentificationData,
     settings: IdentificationSettings,
     compared: Sequence[Estimator],
-    verifies: bool,
+    options_of_fit: FitOptions,
     seed: int,
     tick: Tick,
 ) -> _Work:
@@ -221,24 +240,30 @@ def _work(
     held_out = options.read(data.validate, arm.robot, data.topic)
     require_once(recordings, held_out)
     check_held_out(arm.robot, held_out)
+    gains = None
+    if options_of_fit.payloads:
+        bags, signals = [*data.bags, *data.validate], settings.signals
+        read = [*recordings, *held_out]
+        loaded = payloads_of(options_of_fit.payloads, bags, read, arm.robot)
+        gains = drive_gains(arm, recordings, loaded, signals, rng)
+        recordings = corrected(arm, recordings, loaded, gains, signals)
+        held_out = corrected(arm, held_out, loaded, gains, signals)
     tick(0.0, 'identifying')
     result = run(arm, recordings, settings, rng=rng, progress=tick)
     validation = {r.source: result.predict([r]) for r in held_out}
     tick(1.0, 'grading')
     graded = grade(result, arm, recordings, validation, held_out)
     verification = None
-    if verifies:
+    if options_of_fit.verifies:
         verification = verify(result, arm, recordings, held_out, rng=rng, progress=tick)
     comparison = ComparisonSettings(compared, settings.signals, seed)
     scores = compare_methods(
         arm, recordings, held_out, comparison, clock=time.process_time, progress=tick
     )
-    return _Work(recordings, held_out, result, validation, graded, verification, scores)
+    return _Work(recordings, held_out, result, validation, graded, verification, scores, gains)
 
 
-def _print(
-    out: Path, document: dict[str, Any], work: _Work, exports: dict[str, tuple[str, ...]]
-) -> None:
+def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
     """Print what a person would stop at, then the table, then the rest."""
     result = work.result
     say(f'{work.graded.word}:')
@@ -250,6 +275,8 @@ def _print(
     trends = residual_trends(result.arm.robot.joints, shown)
     if trends:
         say(f'  {" ".join(trends.values())} The model lacks something there.')
+    for line in work.gains.sentences() if work.gains else ():
+        say(line)
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)
@@ -262,16 +289,24 @@ def _print(
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
+    for name, check in document.get('exports', {}).items():
+        left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
+        torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
+        torque = torque or (
+            f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
+            f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
+        )
+        say(f'{name}: {torque}{left_out}')
     files = ['model.yaml', 'identification.json', 'report.html', *exports]
     say(f'{out}: {", ".join(files)}')
 
 
-def _export(arm: ArmModel, out: Path) -> dict[str, tuple[str, ...]]:
-    """Write the arm for other programs; return what each file has no place for, by its name."""
+def _export(arm: ArmModel, out: Path) -> dict[str, Exported]:
+    """Write the arm for other programs; return the files by name."""
     made = {'identified.urdf': arm_urdf(arm), 'identified.mjcf.xml': arm_mjcf(arm)}
     for name, exported in made.items():
         write_file(out / name, exported.text)
-    return {name: exported.without_place for name, exported in made.items()}
+    return made
 
 
 def _print_certificate(certificate: PhysicalCertificate) -> None:
@@ -313,7 +348,7 @@ def _tell(
     result: Identification,
     verification: Verification | None,
     robot_notes: tuple[str, ...],
-    exports: dict[str, tuple[str, ...]],
+    exports: dict[str, Exported],
 ) -> None:
     for note in (*robot_notes, *result.notes):
         say(f'note: {note}')
@@ -321,8 +356,8 @@ def _tell(
     if unseen:
         named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
         say(f'not identified: {named}')
-    for name, lines in exports.items():
-        kinds = dict.fromkeys(line.split(':')[0] for line in lines)
+    for name, one in exports.items():
+        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
         if kinds:
             say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
     if verification is not None:

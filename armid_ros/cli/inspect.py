@@ -12,6 +12,7 @@ from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
+from armid_ros.files.cells import listed
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.inspection.output import SCHEMA
@@ -72,7 +73,7 @@ def _without_robot(
 ) -> Recording:
     """Read the joints that are named, or all that the topic or the table has."""
     said = columns.settings()
-    wanted = joints.split(',') if joints else None
+    wanted = list(listed(joints)) if joints else None
     if is_table(bag):
         settled = plan(open_table(bag, episode=said.episode), said, wanted)
         for line in settled.lines():

@@ -15,6 +15,7 @@ from armid_ros.cli.signatures.options import CRC, FORCE, MEMORY
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, Staged, staged, write_file
+from armid_ros.files.cells import listed, parted
 from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
@@ -96,7 +97,7 @@ def open_robot(
     tell: bool = True,
 ) -> Robot:
     """Load the robot that --robot, --gravity and --joints ask for; say what is not driven."""
-    robot = _loaded(source, gravity, tuple(joints.split(',')) if joints else None, bags)
+    robot = _loaded(source, gravity, listed(joints) if joints else None, bags)
     if tell and joints is None:
         notes = click.get_current_context().meta.setdefault(NOTES, [])
         notes += [visible(f'note: {line}') for line in driven_in_words(robot)]
@@ -145,7 +146,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
     """Add the effects that --effects names, but for those that the arm has."""
-    for name in filter(None, names.split(',')):
+    for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
             arm = arm.with_effect(effect)

@@ -15,6 +15,7 @@ from armid_ros.cli import columns, options
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import say
 from armid_ros.errors import ArmidError, OutputError
+from armid_ros.files.cells import listed
 from armid_ros.robots import Robot
 from armid_ros.view import log_scene, make_scene, open_stream, rerun
 from armid_ros.view.scene import Scene
@@ -60,8 +61,8 @@ def view(
         _live(
             {
                 'robot': robot.robot_source if robot.robot_source != '-' else '',
-                'joints': robot.joints.split(',') if robot.joints else [],
-                'mark': mark.split(',') if mark else [],
+                'joints': list(listed(robot.joints)) if robot.joints else [],
+                'mark': list(listed(mark)) if mark else [],
                 'out': str(out or ''),
             },
             namespace,
@@ -70,7 +71,7 @@ def view(
     assert bag is not None
     arm = _arm(bag, model, robot)
     (recording,) = columns.read([bag], arm.robot, topic)
-    marked = tuple(mark.split(',')) if mark else _named(model)
+    marked = listed(mark) if mark else _named(model)
     scene = make_scene(arm, recording, marked)
     if out is None:
         stream = open_stream(scene.name)

@@ -34,6 +34,7 @@ from armid_ros.effects.springs import JointSpring, SoftLimit
 from armid_ros.effects.timing import TimeDelay, TorqueLag
 from armid_ros.effects.transmission import Backlash, JointElasticity
 from armid_ros.errors import meant, ModelError
+from armid_ros.files.cells import listed, parted
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -161,7 +162,7 @@ def make_effect(text: str, robot: Robot) -> Effect:
 
     """
     name, _, joints = text.strip().partition('@')
-    return CATALOGUE.find(name).on(robot, tuple(joints.split('+')) if joints else None)
+    return CATALOGUE.find(name).on(robot, listed(joints, '+') if joints else None)
 
 
 #: Two texts that `parse_effect` takes, for those who are asked for one.
@@ -187,7 +188,8 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
         If effect, joint, quantity or shape do not exist or a value is not a number.
 
     """
-    head, _, assignments = text.partition(':')
+    head, *rest = parted(text, ':')
+    assignments = ':'.join(rest)
     effect = make_effect(head, robot)
     quantities = [quantity.name for quantity in effect.quantities]
     shapes = [shape.name for shape in effect.shapes]

@@ -20,6 +20,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.files import finite, load_yaml, read_text, reading, write_file
+from armid_ros.files.cells import cell_name, csv_cell
 import numpy as np
 import yaml
 
@@ -139,13 +140,13 @@ def _to_csv(excitation: Excitation) -> str:
     text.write(f'# n_periods,{excitation.n_periods}\n')
     text.write(f'# run_in [s],{excitation.run_in!r}\n')
     numbers = range(1, trajectory.harmonics + 1)
-    writer = csv.writer(text, lineterminator='\n')
     head = ['joint', 'q0', *(f'a{k}' for k in numbers), *(f'b{k}' for k in numbers)]
-    writer.writerow([*head, 'start'])
+    text.write(','.join([*head, 'start']) + '\n')
     for j, joint in enumerate(trajectory.joints):
         values = [trajectory.q0[j], *trajectory.a[j], *trajectory.b[j]]
         start = '' if excitation.start is None else repr(float(excitation.start[j]))
-        writer.writerow([joint, *(repr(float(value)) for value in values), start])
+        cells = [csv_cell(joint), *(repr(float(value)) for value in values), start]
+        text.write(','.join(cells) + '\n')
     return text.getvalue()
 
 
@@ -166,7 +167,7 @@ def _from_csv(text: str) -> Excitation:
 
     starts = [float(row['start']) if row['start'] else math.nan for row in rows]
     trajectory = FourierTrajectory(
-        tuple(row['joint'] for row in rows),
+        tuple(cell_name(row['joint']) for row in rows),
         float(run['period [s]']),
         np.array(column('q0')),
         np.array([column(f'a{k}') for k in range(1, harmonics + 1)]).T,

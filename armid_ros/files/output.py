@@ -112,6 +112,30 @@ def result_folder(
     """
     made = [one for one in (path, *path.parents) if not os.path.lexists(one)]
     try:
+        with locked(path):
+            _try_to_write(path)
+            if not force:
+                _refuse_other_results(path, schema, robot)
+                refuse_foreign(path, schema, also)
+            yield path
+    finally:
+        with suppress(OSError):  # what failed before it wrote anything leaves no folder behind
+            for one in made:
+                one.rmdir()
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """
+    Make a folder if it is not there, and lock it against other runs.
+
+    Raises
+    ------
+    OutputError
+        It cannot be made or opened, or another run holds it.
+
+    """
+    try:
         path.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except (FileExistsError, NotADirectoryError) as error:
@@ -119,28 +143,18 @@ def result_folder(
     except OSError as error:
         raise OutputError(f'{path}: cannot be made or opened: {error.strerror}') from error
     try:
-        _lock(path, descriptor)
-        _try_to_write(path)
-        if not force:
-            _refuse_other_results(path, schema, robot)
-            refuse_foreign(path, schema, also)
-        yield path
-    finally:
-        os.close(descriptor)
-        with suppress(OSError):  # what failed before it wrote anything leaves no folder behind
-            for one in made:
-                one.rmdir()
-
-
-def _lock(path: Path, descriptor: int) -> None:
-    try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
+        os.close(descriptor)
         raise OutputError(
             f'{path}: another run is writing into it; wait for its end or name another folder'
         ) from error
     except OSError:  # a file system without locks
         pass
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _try_to_write(path: Path) -> None:

@@ -4,24 +4,29 @@
 Results of several files as one: all of a run, or all of the one before.
 
 A run writes into a folder of its own inside the folder of its results, which is on the same file
-system wherever that is mounted. Its files are moved to their places once all of them are written;
-a run that fails, or is interrupted, leaves what was there before.
+system wherever that is mounted. Once all files are written, the whole folder is exchanged; a run
+that fails, or is interrupted or killed, leaves what was there before.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, ExitStack, suppress
+import ctypes
 from dataclasses import dataclass, field
+import errno
 from fnmatch import fnmatch
 import os
 from pathlib import Path
 import shutil
 
 from armid_ros.errors import OutputError
-from armid_ros.files.output import DOCUMENTS
+from armid_ros.files.output import DOCUMENTS, locked
 from armid_ros.files.own import STAGING
+
+#: Of renameat2(2).
+_AT_FDCWD, _RENAME_EXCHANGE = -100, 2
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,7 @@ class Staged:
     replaced: tuple[str, ...] = ()
     spared: tuple[Path, ...] = ()
     _kept: set[str] = field(default_factory=set)
+    _locks: ExitStack = field(default_factory=ExitStack)
 
     @property
     def alone(self) -> bool:
@@ -55,10 +61,12 @@ class Staged:
 
     def keep(self) -> None:
         """
-        Move what was written to its place.
+        Make what was written the result, with one rename of the folder.
 
-        The document that says what the folder is goes first and comes last: files that another
-        process finds without it are no result yet.
+        Other files of the folder are linked into the new one, which then takes the place of the
+        old one. Where a folder cannot be exchanged (the current one, a mount point, a file system
+        without hard links), the files are moved one by one: the document that names the result
+        goes first and comes last, so that a run that is killed in between leaves no document.
 
         Raises
         ------
@@ -69,6 +77,8 @@ class Staged:
         names = sorted(os.listdir(self.folder), key=lambda name: (name in DOCUMENTS, name))
         self._kept.update(names)
         try:
+            if self._exchanged(names):
+                return
             for name in DOCUMENTS:
                 if name in names:
                     (self.out / name).unlink(missing_ok=True)
@@ -78,6 +88,31 @@ class Staged:
                 _move(self.folder / name, self.out / name)
         except OSError as error:
             raise OutputError(f'{self.out}: cannot be written: {error.strerror}') from error
+
+    def _exchanged(self, names: Collection[str]) -> bool:
+        """Exchange the folder for one with the result and what stays, if that is possible."""
+        out = self.out.resolve()
+        if Path.cwd().is_relative_to(out) or not _same_owner(out, self.folder):
+            return False
+        new = out.with_name(f'.{out.name}{STAGING}')
+        goes = {STAGING, *names, *(path.name for path in self._earlier())}
+        kept = [path for path in out.iterdir() if path.name not in goes]
+        try:
+            _remove(new)  # of a run that was killed
+            new.mkdir()
+            for path in (*kept, *self.folder.iterdir()):
+                _link(path, new / path.name)
+            (new / STAGING).mkdir()
+            shutil.copystat(out, new)
+            self._locks.enter_context(locked(new))
+            _exchange(new, out)
+        except (OSError, OutputError, shutil.Error):
+            with suppress(OSError):
+                _remove(new)
+            return False
+        with suppress(OSError):
+            _remove(new)
+        return True
 
     def _earlier(self) -> list[Path]:
         """Return files of an earlier result that this one has not; folders may be recordings."""
@@ -117,11 +152,12 @@ def staged(
         folder.mkdir()
     except OSError as error:
         raise OutputError(f'{out}: cannot be made or written to: {error.strerror}') from error
-    try:
-        yield Staged(out, folder, tuple(replaced), tuple(spared))
-    finally:
-        with suppress(OSError):
-            _remove(folder)
+    with ExitStack() as locks:
+        try:
+            yield Staged(out, folder, tuple(replaced), tuple(spared), _locks=locks)
+        finally:
+            with suppress(OSError):
+                _remove(folder)
 
 
 def _move(source: Path, target: Path) -> None:
@@ -133,6 +169,29 @@ def _move(source: Path, target: Path) -> None:
         shutil.rmtree(aside)
     else:
         source.replace(target)
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a file, or the files of a folder, a second name."""
+    if source.is_dir() and not source.is_symlink():
+        shutil.copytree(source, target, symlinks=True, copy_function=os.link)
+    else:
+        os.link(source, target, follow_symlinks=False)
+
+
+def _exchange(first: Path, second: Path) -> None:
+    """Exchange two folders in one step; OSError where kernel or file system cannot."""
+    rename = getattr(ctypes.CDLL(None, use_errno=True), 'renameat2', None)
+    if rename is None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+    if rename(_AT_FDCWD, os.fsencode(first), _AT_FDCWD, os.fsencode(second), _RENAME_EXCHANGE):
+        code = ctypes.get_errno()
+        raise OSError(code, os.strerror(code), str(second))
+
+
+def _same_owner(first: Path, second: Path) -> bool:
+    one, other = first.stat(), second.stat()
+    return (one.st_uid, one.st_gid) == (other.st_uid, other.st_gid)
 
 
 def _remove(path: Path) -> None:

@@ -19,6 +19,8 @@ from armid_ros.fleet.store import opened
 SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 #: A date in a path: 2026-01-31, 2026_01_31 or 20260131.
 _DATE = re.compile(r'(?<!\d)(20\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)')
+#: Bytes of an arm in the name of a folder or page; file systems take 255 together.
+LONGEST_NAME = 240
 _WILD = re.compile(r'[*?\[]')
 #: What stores call the version of a file, the surest first.
 _VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'created')
@@ -65,7 +67,12 @@ def part_of(data_set: str, bag: BagFile, day: str) -> str:
 
 def folder_of(arm: str) -> str:
     """Return the partition of an arm."""
-    return f'arm={quote(arm, safe="")}'
+    return f'arm={file_name(arm)}'
+
+
+def file_name(arm: str) -> str:
+    """Return the name of an arm as part of a path; letters and digits of any script stay."""
+    return ''.join(char if char.isalnum() else quote(char, safe='') for char in arm)
 
 
 def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[BagFile]:
@@ -85,7 +92,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
     Raises
     ------
     FleetError
-        There is no bag, or a bag has no arm.
+        There is no bag, or a bag has no arm, or one whose name is empty or too long.
 
     """
     regular = None if arm_pattern is None else _compiled(arm_pattern)
@@ -102,6 +109,12 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         for at, size, version in bags:
             url = filesystem.unstrip_protocol(at)
             arm = _arm(path, at) if regular is None else _searched(regular, url)
+            length = len(file_name(arm).encode())
+            if not 0 < length <= LONGEST_NAME:
+                raise FleetError(
+                    f'{url}: its arm is named {arm!r}, of {length} bytes in a path; a name has '
+                    f"1 to {LONGEST_NAME}: choose a part of the path with --arm 'robots/([^/]+)/'"
+                )
             plain = at if url.startswith('file://') else url
             found[plain] = BagFile(arm, plain, _day(at), size, version)
     return sorted(found.values())
@@ -161,7 +174,7 @@ def _searched(regular: re.Pattern[str], url: str) -> str:
     match = regular.search(url)
     if match is None:
         raise FleetError(f'{url}: --arm {regular.pattern} finds no arm in it')
-    return match.group(1)
+    return match.group(1) or ''
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:

@@ -76,6 +76,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 @contextmanager
 def _embedded(workers: int | None) -> Iterator[Client]:
     count = workers or len(os.sched_getaffinity(0))
+    os.environ['PYTHONSAFEPATH'] = '1'  # no worker runs a module of the current folder
     with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
         with (
             dask.config.set(_QUIET),

@@ -16,7 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from armid_ros.estimate import ParameterName
-from armid_ros.fleet.bags import BagFile, folder_of
+from armid_ros.fleet.bags import BagFile, file_name, folder_of
 from armid_ros.fleet.changes import HistoryChange
 from armid_ros.fleet.scatter import ParameterHistory
 from armid_ros.fleet.store import Store
@@ -290,4 +290,4 @@ def _anchor(arm: str, url: str) -> str:
 
 
 def _file(arm: str) -> str:
-    return f'{quote(arm, safe="")}.html'
+    return f'{file_name(arm)}.html'

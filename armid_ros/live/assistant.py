@@ -216,7 +216,7 @@ class Assistant:
 
     def _start(self) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, '-c', f'from {__name__} import main; main()'],
+            [sys.executable, '-P', '-c', f'from {__name__} import main; main()'],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | _ONE_THREAD,

@@ -12,6 +12,8 @@ what is left, so that the file read again has exactly the parameters that were p
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.sax.saxutils import escape
 
 from armid_ros.errors import ModelError
 from armid_ros.model.pseudo_inertia import (
@@ -23,6 +25,7 @@ from armid_ros.model.pseudo_inertia import (
 from armid_ros.model.xml_edit import Element, XmlText
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot, robot_from_urdf
+from armid_ros.robots.meshes import find_mesh
 import numpy as np
 import scipy.linalg
 
@@ -54,7 +57,8 @@ def export_urdf(
     Returns
     -------
     str
-        URDF. Only <inertial> and <dynamics> differ, and the comment at the end.
+        URDF. Only <inertial> and <dynamics> differ, the comment at the end, names of meshes, which
+        become absolute, and <ros2_control>, which is left out.
 
     Raises
     ------
@@ -85,6 +89,9 @@ def export_urdf(
         }
         if values:
             _set_dynamics(document, joint, values)
+    for element in document.root.all('ros2_control'):  # hosts and passwords of drives
+        document.remove(element)
+    _set_meshes(document, document.root, robot.path)
     if remarks:
         lines = [line.replace('--', '- -') for line in remarks]
         document.append(document.root, ['<!--', *(f'  {line}' for line in lines), '-->'])
@@ -212,6 +219,17 @@ def _set_dynamics(document: XmlText, joint: Element, values: Mapping[str, str]) 
         return
     row = ' '.join(f'{key}="{value}"' for key, value in values.items())
     document.append(joint, [f'<dynamics {row}/>'])
+
+
+def _set_meshes(document: XmlText, element: Element, urdf: Path | None) -> None:
+    """Name meshes by where they are, as the file will lie in another folder."""
+    for child in element.children:
+        name = child.attributes.get('filename', '')
+        if child.name == 'mesh' and '://' not in name:
+            found = find_mesh(name, urdf)
+            if found is not None:
+                document.set_attributes(child, {'filename': f'file://{escape(str(found))}'})
+        _set_meshes(document, child, urdf)
 
 
 def _check(robot: Robot, urdf: str) -> None:

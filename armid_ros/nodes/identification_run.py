@@ -48,7 +48,7 @@ Wait = tuple[str, Callable[[], Any]]
 
 def start_program(program: Program) -> subprocess.Popen[bytes]:
     """Begin an armid command in a process of its own."""
-    return subprocess.Popen([sys.executable, '-m', 'armid_ros.cli', *program])
+    return subprocess.Popen([sys.executable, '-P', '-m', 'armid_ros.cli', *program])
 
 
 class IdentificationRunNode(ArmidNode):

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from itertools import product
 
+from armid_ros.files.cells import csv_cell
 from armid_ros.residual.learn import JointResidual, Residual
 import numpy as np
 
@@ -40,7 +41,8 @@ def _joint_lines(one: JointResidual) -> list[str]:
         axes[2] = np.zeros(1)
     inputs = np.array(list(product(*axes)))
     torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+    name = csv_cell(one.joint)
     return [
-        f'{one.joint},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
+        f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
         for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
     ]

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -130,7 +131,12 @@ class CollisionModel:
         return read_only(clearances), closest
 
 
-def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> CollisionModel:
+def collision_model(
+    robot: Robot,
+    *,
+    srdf: str | Path | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> CollisionModel:
     """
     Return the collision bodies of a robot and the pairs of links that may touch.
 
@@ -146,6 +152,8 @@ def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> Collisio
     srdf : str or Path, optional
         File with <disable_collisions>. By default the one with the URDF's or the robot's name
         (or the only one) beside the URDF or in ../srdf.
+    progress : callable, optional
+        Called with the share that is done, 0 to 1, while meshes become convex bodies.
 
     Raises
     ------
@@ -153,7 +161,7 @@ def collision_model(robot: Robot, *, srdf: str | Path | None = None) -> Collisio
         If a file cannot be read or a collision body is not valid.
 
     """
-    geometry, missing = collision_geometry(robot)
+    geometry, missing = collision_geometry(robot, progress)
     disabled = _disabled_pairs(robot, Path(srdf) if srdf is not None else _find_srdf(robot))
     description = robot.description
     joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}

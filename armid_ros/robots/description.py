@@ -77,6 +77,7 @@ class Joint:
     effort: float
     damping: float
     friction: float
+    armature: float
     mimic: Mimic | None
 
     @property
@@ -124,7 +125,10 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
             f'{source}: malformed XML at line {line}, column {column + 1}: {reason}'
         ) from None
     if root.tag != 'robot':
-        raise RobotError(f'{source}: not a URDF: its root element is <{root.tag}>, not <robot>')
+        hint = '; an MJCF is loaded by its path' if root.tag == 'mujoco' else ''
+        raise RobotError(
+            f'{source}: not a URDF: its root element is <{root.tag}>, not <robot>{hint}'
+        )
     return root
 
 
@@ -276,6 +280,10 @@ class _Reader:
         xyz, rpy = self.origin(element, where)
         lower, upper, velocity, effort = self.limits(element, kind, where)
         dynamics = element.find('dynamics')
+        damping, friction, armature = (
+            0.0 if dynamics is None else self.finite(dynamics, key, where, 0.0)
+            for key in ('damping', 'friction', 'armature')
+        )
         return Joint(
             name=name,
             kind=kind,
@@ -288,8 +296,9 @@ class _Reader:
             upper=upper,
             velocity=velocity,
             effort=effort,
-            damping=0.0 if dynamics is None else self.finite(dynamics, 'damping', where, 0.0),
-            friction=0.0 if dynamics is None else self.finite(dynamics, 'friction', where, 0.0),
+            damping=damping,
+            friction=friction,
+            armature=armature,
             mimic=self.mimic(element, where),
         )
 

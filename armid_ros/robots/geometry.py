@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,7 +19,9 @@ import pinocchio as pin
 _Meshes = dict[tuple[Path, tuple[float, float, float]], tuple[coal.CollisionGeometry, ...]]
 
 
-def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, dict[str, str]]:
+def collision_geometry(
+    robot: Robot, progress: Callable[[float], None] | None = None
+) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
     Return the collision bodies of a robot, and notes on those that had to be left out.
 
@@ -46,7 +49,10 @@ def collision_geometry(robot: Robot) -> tuple[pin.GeometryModel, dict[str, str]]
         for index, frame in enumerate(robot.model.frames)
         if frame.type == pin.FrameType.BODY
     }
-    for link in parse_xml(robot.urdf, robot.name).findall('link'):
+    links = parse_xml(robot.urdf, robot.name).findall('link')
+    for done, link in enumerate(links):
+        if progress is not None:
+            progress(done / len(links))
         name = link.get('name', '')
         frame = robot.model.frames[frames[name]]
         for number, element in enumerate(link.findall('collision')):

@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 import shlex
 from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 from armid_ros.errors import RobotError
 from armid_ros.files import read_text, reading
@@ -23,6 +24,7 @@ from armid_ros.robots.description import (
     Vector,
 )
 from armid_ros.robots.gravity import parse_gravity
+from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.shipped import shipped_path, shipped_robots
@@ -30,6 +32,8 @@ from armid_ros.robots.xacro_expansion import expand_xacro
 import numpy as np
 import pinocchio as pin
 
+#: What a folder of a package begins with among the arguments of a description.
+PACKAGE = 'package:'
 NO_INERTIA = 1e-12  # kg m^2 or kg; the smallest motor rotor is five orders above
 
 
@@ -46,10 +50,13 @@ def load_robot(
     Parameters
     ----------
     source : str or Path
-        A shipped name (see `shipped_robots`), the path of a URDF or xacro file, or the text of a
-        URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program: it
-        can read any file and the environment, so name only one that you trust. It is expanded in
-        a process of its own, for 20 s at most; a text is never expanded.
+        A shipped name (see `shipped_robots`), the path of a URDF, xacro or MJCF file, or the text
+        of a URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program,
+        which can read any file and the environment, so name only one that you trust. It is
+        expanded in a process of its own, for 20 s of processor time at most; a text never is.
+        Packages that it refers to are looked for around it, in ROS_PACKAGE_PATH and in
+        AMENT_PREFIX_PATH. Behind a path may be arguments and folders of other packages:
+        'arm.xacro tool:=true package:grippers:=../grippers'.
     gravity : str or array_like, shape (3,)
         'earth', 'moon', 'x,y,z' or a vector [m/s^2], in the frame of the base link.
     joints : sequence of str, optional
@@ -80,7 +87,7 @@ def load_robot(
     """
     if isinstance(source, str) and source.lstrip().startswith('<'):
         return robot_from_urdf(source, gravity=gravity, joints=joints)
-    source, given = _xacro_arguments(source)
+    source, given, packages = _written_out(source)
     xacro_arguments = {**given, **(xacro_arguments or {})}
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
@@ -90,11 +97,17 @@ def load_robot(
             f'{", ".join(shipped_robots())}'
         )
     text = read_text(path, RobotError)
-    if path.suffix == '.xacro' or '<xacro:' in text:
-        text = expand_xacro(path, xacro_arguments or {})
+    notes: tuple[str, ...] = ()
+    if is_mjcf(text) and not xacro_arguments:
+        text, notes = urdf_of_mjcf(path)
+    elif path.suffix == '.xacro' or '<xacro:' in text:
+        text = expand_xacro(path, xacro_arguments, packages)
     elif xacro_arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
-    return robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
+    for name, folder in packages.items():
+        text = text.replace(f'package://{name}/', f'file://{escape(folder)}/')
+    robot = robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
+    return replace(robot, notes=notes + robot.notes)
 
 
 def robot_from_urdf(
@@ -147,6 +160,7 @@ def robot_from_urdf(
         urdf=text,
         urdf_damping=np.array([joint.damping for joint in driven]),
         urdf_friction=np.array([joint.friction for joint in driven]),
+        urdf_armature=np.array([joint.armature for joint in driven]),
         notes=description.notes + locked + several_arms(description, driven),
         path=path,
     )
@@ -155,18 +169,24 @@ def robot_from_urdf(
     return replace(robot, notes=robot.notes + _inertia_notes(robot))
 
 
-def _xacro_arguments(source: str | Path) -> tuple[str | Path, dict[str, str]]:
-    """Take a path and arguments apart that are written as for xacro: 'arm.xacro tool:=true'."""
+def _written_out(source: str | Path) -> tuple[str | Path, dict[str, str], dict[str, str]]:
+    """Take path, arguments and packages apart: 'arm.xacro tool:=true package:grippers:=/a/b'."""
     if not isinstance(source, str) or ':=' not in source:
-        return source, {}
+        return source, {}, {}
     first, *rest = shlex.split(source)
-    arguments = {}
+    arguments, packages = {}, {}
     for text in rest:
         name, assigned, value = text.partition(':=')
         if not assigned or not name:
             raise RobotError(f"{source}: '{text}' is no argument; write name:=value")
-        arguments[name] = value
-    return first, arguments
+        package = name.removeprefix(PACKAGE)
+        if package == name:
+            arguments[name] = value
+        elif not Path(value).is_dir():
+            raise RobotError(f"{source}: the package '{package}' is no folder: {value}")
+        else:
+            packages[package] = str(Path(value).resolve())
+    return first, arguments, packages
 
 
 def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:

@@ -13,14 +13,14 @@ The bodies together contain the mesh: a clearance never looks larger than it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
-import os
 from pathlib import Path
 
 from armid_ros.errors import RobotError
 from armid_ros.files import is_file
 from armid_ros.motion import FloatArray
+from armid_ros.robots.packages import package_folders
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -35,13 +35,14 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
     """
     Return the file a URDF's mesh name means, or None when it is nowhere.
 
-    'package://NAME/...' is looked for in AMENT_PREFIX_PATH and ROS_PACKAGE_PATH, and beside the
-    directories that hold the URDF; a relative path starts at the URDF.
+    'package://NAME/...' is looked for as `package_folders` says; a relative path starts at the
+    URDF.
 
     """
+    candidates: Iterable[Path]
     if name.startswith('package://'):
-        inside = name.removeprefix('package://').lstrip('/')
-        candidates = [root / inside for root in _package_roots(urdf)]
+        package, _, inside = name.removeprefix('package://').lstrip('/').partition('/')
+        candidates = (folder / inside for folder in package_folders(package, urdf))
     else:
         beside = Path() if urdf is None else urdf.resolve().parent
         candidates = [beside / name.removeprefix('file://')]
@@ -160,14 +161,3 @@ def _hull(points: FloatArray) -> coal.ConvexBase:
     corners = coal.StdVec_Vec3s()
     corners.extend(list(points))
     return coal.Convex.convexHull(corners, True, 'Qt')
-
-
-def _package_roots(urdf: Path | None) -> Iterator[Path]:
-    """Directories that may hold a package."""
-    for prefix in filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)):
-        yield Path(prefix) / 'share'
-    for directory in filter(None, os.environ.get('ROS_PACKAGE_PATH', '').split(os.pathsep)):
-        yield Path(directory)
-        yield Path(directory).parent
-    if urdf is not None:
-        yield from urdf.resolve().parents

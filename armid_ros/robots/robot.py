@@ -55,8 +55,9 @@ class Robot:
         True where a joint slides.
     urdf : str
         The description, xacro expanded.
-    urdf_damping, urdf_friction : ndarray, shape (n,)
-        What the description says in ``<dynamics>`` [N m s/rad, N m]; zero where it says nothing.
+    urdf_damping, urdf_friction, urdf_armature : ndarray, shape (n,)
+        What the description says in ``<dynamics>`` [N m s/rad, N m, kg m^2]; zero where it says
+        nothing. A URDF of an MJCF has the armature there too.
     notes : tuple of str
         What was assumed or is doubtful in the description, for a person to read.
     path : Path or None
@@ -85,6 +86,7 @@ class Robot:
     urdf: str = field(repr=False)
     urdf_damping: FloatArray = field(repr=False)
     urdf_friction: FloatArray = field(repr=False)
+    urdf_armature: FloatArray = field(repr=False)
     notes: tuple[str, ...] = ()
     path: Path | None = None
 
@@ -104,6 +106,7 @@ class Robot:
             'torque_limit',
             'urdf_damping',
             'urdf_friction',
+            'urdf_armature',
         ):
             object.__setattr__(self, name, read_only(getattr(self, name)))
             if getattr(self, name).shape != (len(self.joints),):

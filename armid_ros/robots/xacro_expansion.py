@@ -25,14 +25,19 @@ from armid_ros.files.regular import TEXT_LIMIT
 
 #: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
-#: A process that waits, as for a pipe, uses none; it is ended after so many times that limit.
-_WAITING = 30.0
+#: How long it may last, with other processes on the machine [s]; what waits for a file ends so.
+PATIENCE = 300.0
 #: The most memory [bytes].
 MEMORY_LIMIT = 2 << 30
 
 
 def expand_xacro(
-    path: Path, arguments: Mapping[str, str], *, time_limit: float = TIME_LIMIT
+    path: Path,
+    arguments: Mapping[str, str],
+    packages: Mapping[str, str] | None = None,
+    *,
+    time_limit: float = TIME_LIMIT,
+    patience: float = PATIENCE,
 ) -> str:
     """
     Return what a xacro file expands to.
@@ -43,8 +48,12 @@ def expand_xacro(
         The file; it is trusted as a program is, except for time and memory.
     arguments : mapping of str to str
         Values of <xacro:arg>.
+    packages : mapping of str to str, optional
+        Folders of packages by name, where `package_folders` would not find them.
     time_limit : float
         Processor time that it may take [s].
+    patience : float
+        How long it may last [s].
 
     Raises
     ------
@@ -55,6 +64,7 @@ def expand_xacro(
     request = {
         'path': str(path),
         'arguments': dict(arguments),
+        'packages': dict(packages or {}),
         'seconds': time_limit,
         'memory': MEMORY_LIMIT,
         'characters': TEXT_LIMIT,
@@ -67,19 +77,21 @@ def expand_xacro(
             capture_output=True,
             encoding='utf-8',
             errors='replace',
-            timeout=_WAITING * time_limit,
+            timeout=patience,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        waited = f'not expanded within {_WAITING * time_limit:g} s; does it include a pipe?'
-        raise RobotError(f'{path}: xacro: {waited}') from error
+        raise RobotError(f'{path}: xacro: not expanded within {patience:g} s') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
+    if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
+        raise RobotError(
+            f'{path}: xacro: not expanded within {time_limit:g} s of processor time and '
+            f'{MEMORY_LIMIT >> 20} MiB'
+        )
     answer = _answer(done.stdout)
     if 'text' not in answer:
-        slow = done.returncode == -signal.SIGXCPU
-        limit = f'{time_limit:g} s of processor time' if slow else f'{MEMORY_LIMIT >> 20} MiB'
-        reason = answer.get('error') or f'not expanded within {limit}'
+        reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
         raise RobotError(f'{path}: xacro: {reason}')
     return str(answer['text'])
 

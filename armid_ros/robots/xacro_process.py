@@ -10,12 +10,20 @@ memory and processor time before it reads a line of the file.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import json
-import math
 import os
+from pathlib import Path
 import resource
+import runpy
+import signal
 import sys
 from typing import Any
+
+#: What stands for the folder of a package that is not found.
+NOWHERE = '/package-not-found/'
+#: What includes and macros are called that describe drives and simulators, and no link or joint.
+DRIVES = ('ros2_control', 'ros_control', 'gazebo', 'transmission')
 
 
 def main() -> None:
@@ -23,8 +31,9 @@ def main() -> None:
     request = json.load(sys.stdin)
     answers = os.fdopen(os.dup(1), 'w', encoding='utf-8')
     os.dup2(2, 1)  # what an expansion prints is no answer
-    seconds, memory = math.ceil(request['seconds']), int(request['memory'])
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
+    seconds, memory = float(request['seconds']), int(request['memory'])
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     json.dump(expanded(request), answers)
     answers.close()
@@ -33,13 +42,17 @@ def main() -> None:
 def expanded(request: dict[str, Any]) -> dict[str, str]:
     """Return the text that a file expands to, or the error why it does not."""
     answer: dict[str, str] = {}
+    missing: dict[str, str] = {}
     try:
-        import xacro
+        import xacro.substitution_args
 
-        document = xacro.process_file(request['path'], mappings=request['arguments'])
-        answer['text'] = str(document.toxml())
-        if len(answer['text']) > request['characters']:
-            answer = {'error': f'it expands to {len(answer["text"])} characters'}
+        _find_packages(xacro, request, missing)
+        document = xacro.process_file(request['path'], mappings=dict(request['arguments']))
+        text = str(document.toxml())
+        answer['text'] = text.replace(f'file://{NOWHERE}', 'package://')
+        answer['text'] = answer['text'].replace(NOWHERE, 'package://')
+        if len(text) > request['characters']:
+            answer = {'error': f'it expands to {len(text)} characters'}
     except ImportError:
         answer['error'] = 'a xacro file needs the Python package xacro'
     except MemoryError:
@@ -49,8 +62,91 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
     except SystemExit:
         answer['error'] = 'it cannot be expanded'
     except Exception as error:  # xacro evaluates Python expressions: anything can come out
-        answer['error'] = ' '.join(str(error).split()) or type(error).__name__
+        answer['error'] = _reason(error, request, missing)
     return answer
+
+
+def _find_packages(xacro: Any, request: dict[str, Any], missing: dict[str, str]) -> None:
+    """
+    Have xacro find packages without ROS, and pass over those of drives and simulators.
+
+    A package that is not found stops an expansion only where a file of it is read: a path to it
+    may be a parameter of a driver.
+
+    """
+    folders = runpy.run_path(str(Path(__file__).with_name('packages.py')))['package_folders']
+    arguments = xacro.substitution_args
+    include_files, macro_call = xacro.get_include_files, xacro.handle_macro_call
+
+    def find(name: str) -> str:
+        places = folders(name, Path(xacro.filestack[-1]), request['packages'])
+        found = next((place for place in places if place.is_dir()), None)
+        if found is None:
+            missing.setdefault(name, _place(xacro))
+        return NOWHERE + name if found is None else str(found)
+
+    def include(*values: Any) -> Iterator[str]:
+        for file in include_files(*values):
+            if not (NOWHERE in file and any(word in file for word in DRIVES)):
+                yield file
+
+    def call(node: Any, *values: Any) -> bool:
+        try:
+            return bool(macro_call(node, *values))
+        except xacro.XacroException as error:
+            name = node.tagName
+            if not (missing and f'unknown macro name: {name}' == str(error)):
+                raise
+            if not any(word in name for word in DRIVES):
+                raise
+            xacro.replace_node(node, by=None)
+            return True
+
+    arguments._eval_find = arguments._eval_dict['find'] = find
+    xacro.get_include_files, xacro.handle_macro_call = include, call
+
+
+def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) -> str:
+    """Return why a file is not expanded, and what would help."""
+    import xacro.substitution_args
+
+    text = ' '.join(str(error).split()) or type(error).__name__
+    cause = error.exc if isinstance(error, xacro.XacroException) else None
+    if isinstance(cause, xacro.substitution_args.ArgException):
+        name = str(cause)
+        return (
+            f"{_place(xacro)} uses the argument '{name}', which is not given; the arguments "
+            f'are {_arguments(xacro, request["path"], name)}; write '
+            f"--robot '{request['path']} {name}:=VALUE'"
+        )
+    if missing:
+        lines = '; '.join(f"package '{name}' ({file})" for name, file in missing.items())
+        first = next(iter(missing))
+        return f'not found: {lines}; clone or install it, or add --package {first}=FOLDER ({text})'
+    place = _place(xacro)
+    return text if place == request['path'] else f'{place}: {text}'
+
+
+def _place(xacro: Any) -> str:
+    """Return the file that is expanded: that of the macro, if one is."""
+    macros, files = xacro.macrostack, xacro.filestack
+    return str(macros[-1].history[-1][-1] if macros else files[-1])
+
+
+def _arguments(xacro: Any, path: str, missing: str) -> str:
+    """Return the arguments that the files declare, with their defaults."""
+    known = {missing: 'no default'}
+    for file in (path, *xacro.all_includes):
+        try:
+            elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
+        except Exception:  # it is the error of another file that is reported
+            continue
+        for element in elements:
+            default = element.getAttribute('default') if element.hasAttribute('default') else None
+            known[element.getAttribute('name')] = (
+                'no default' if default is None else f"default '{default}'"
+            )
+    return ', '.join(f'{name} ({default})' for name, default in known.items())
 
 
 if __name__ == '__main__':

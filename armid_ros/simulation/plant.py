@@ -303,8 +303,8 @@ def _require_inertia(robot: Robot, moved: FloatArray) -> None:
     still = int(np.argmin(np.abs(moved)))
     if abs(moved[still]) < 1e-15:
         raise ModelError(
-            f'{robot.name}: joint {robot.joints[still]} moves no inertia, so no force can be too '
-            f"small for it; give link '{robot.links[still]}' an <inertial>"
+            f"{robot.name}: joint '{robot.joints[still]}' moves no mass and no inertia, so "
+            f"its acceleration is infinite; give link '{robot.links[still]}' an <inertial>"
         )
 
 

@@ -13,7 +13,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 import os
 from pathlib import Path
+import socket
+import subprocess
 import sys
+import time
 from types import ModuleType
 from typing import Any
 
@@ -26,6 +29,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 TIMELINE = 'time'
+#: Where a viewer listens: rerun's own way to start one binds it to all interfaces.
+_HOST, _PORT = '127.0.0.1', 9876
+#: How long a viewer may take to listen, and how often is tried [s].
+_PATIENCE, _TRY_EVERY = 20.0, 0.1
 #: Colours: of what was measured, predicted, left, of links, and of what is marked.
 _MEASURED, _PREDICTED, _RESIDUAL = (140, 145, 150), (213, 94, 0), (0, 114, 178)
 #: Later than any recording begins that counts from its own start [s].
@@ -88,10 +95,29 @@ def open_stream(name: str, out: Path | None = None) -> Any:
     stream = rr.RecordingStream('armid', recording_id=None)
     stream.send_recording_name(name)
     if out is None:
-        stream.spawn()
+        stream.connect_grpc(_started_viewer())
     else:
         stream.save(out)
     return stream
+
+
+def _started_viewer() -> str:
+    """Start a viewer that this machine alone can reach, unless one listens; return its URL."""
+    command = [sys.executable, '-P', '-m', 'rerun_cli', '--expect-data-soon']
+    deadline, viewer = time.monotonic() + _PATIENCE, None
+    while True:
+        try:
+            socket.create_connection((_HOST, _PORT), timeout=1.0).close()
+            return f'rerun+http://{_HOST}:{_PORT}/proxy'
+        except OSError as error:
+            ended = viewer is not None and viewer.poll() is not None
+            if ended or time.monotonic() > deadline:
+                raise ArmidError(f'the viewer of rerun does not start: {error}') from error
+        if viewer is None:
+            viewer = subprocess.Popen(
+                [*command, '--bind', _HOST, '--port', str(_PORT)], start_new_session=True
+            )
+        time.sleep(_TRY_EVERY)
 
 
 def log_scene(scene: Scene, stream: Any) -> None:

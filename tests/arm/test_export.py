@@ -1,7 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.arm.export_check import torque_check
 from armid_ros.effects import make_effect
 from armid_ros.robots import load_robot, robot_from_urdf
 import mujoco
@@ -53,3 +56,39 @@ def test_a_payload_is_part_of_its_link(arm):
     loaded = arm.with_effect(make_effect('payload', arm.robot), payload)
     bare, full = (robot_from_urdf(arm_urdf(a).text).rigid_parameters for a in (arm, loaded))
     assert abs(full[50] - bare[50] - 0.5) < 1e-12
+
+
+CONTROL = (
+    '<ros2_control name="arm"><hardware><param name="password">secret</param></hardware>'
+    '</ros2_control>'
+)
+
+
+@pytest.mark.parametrize('export', [arm_urdf, arm_mjcf])
+@pytest.mark.parametrize('joints', [None, ('shoulder_pitch', 'elbow_pitch')])
+def test_the_torque_in_mujoco_is_that_of_the_arm(export, joints):
+    robot = load_robot('humanoid_arm', joints=joints)
+    arm = ArmModel(robot)
+    for name, value in VALUES.items():
+        arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
+    exported = export(arm)
+    check = torque_check(exported, arm)
+    assert check['states'] == 50
+    assert check['share'] < 1e-9
+    heavier = replace(exported, text=exported.text.replace('mass="', 'mass="1', 1))
+    heavier = replace(heavier, text=heavier.text.replace('<mass value="', '<mass value="1'))
+    assert torque_check(heavier, arm)['share'] > 1e-3
+    broken = replace(exported, text=exported.text[:-20])
+    assert 'MuJoCo' in torque_check(broken, arm)['not_checked']
+
+
+def test_an_exported_urdf_has_its_meshes_and_no_password(tmp_path):
+    (tmp_path / 'shape.stl').write_bytes(b'')
+    text = load_robot('humanoid_arm').urdf
+    visual = '<visual><geometry><mesh filename="shape.stl"/></geometry></visual>'
+    text = text.replace('</link>', f'{visual}</link>', 1)
+    (tmp_path / 'arm.urdf').write_text(text.replace('</robot>', f'{CONTROL}</robot>'))
+    exported = arm_urdf(ArmModel(load_robot(tmp_path / 'arm.urdf')))
+    assert 'secret' not in exported.text
+    assert exported.left_out == ('ros2_control',)
+    assert f'"file://{tmp_path}/shape.stl"' in exported.text

@@ -295,3 +295,34 @@ def test_a_run_that_fails_leaves_the_result_that_was_there(bags, tmp_path, monke
         'identification.json',
         'report.html',
     }
+
+
+def test_a_known_payload_fixes_the_gains_of_the_drives(tmp_path):
+    arm = ArmModel(load_robot(ROBOT))
+    gains = 1.0 + np.array([0.05, 0.08, 0.1, 0.06, 0.09, 0.07])
+    gain = make_effect('torque_gain', arm.robot)
+    payload = np.concatenate([[1.0], np.zeros(9)])
+    loaded = arm.with_effect(make_effect('payload', arm.robot), payload)
+    bags = [
+        bag_of(tmp_path / name, one.with_effect(gain, gains - 1.0), seed)
+        for seed, (name, one) in enumerate((('a', arm), ('b', loaded)))
+    ]
+    link, out = arm.robot.links[-1], tmp_path / 'out'
+    done = armid(
+        'identify', *bags, '--robot', ROBOT, '--payload', f'b=1.0@{link}', '--out', out,
+        '--physical', '--no-verify',
+    )  # fmt: skip
+    document = json.loads((out / 'identification.json').read_text())
+    rows = {row['joint']: row for row in document['drive_gains']}
+    found = [row for row in rows.values() if row['gain'] is not None]
+    assert len(found) >= 4
+    for joint, wanted in zip(arm.robot.joints, gains, strict=True):
+        if rows[joint]['gain'] is not None:
+            lower, upper = rows[joint]['interval']
+            assert lower - 0.01 < wanted < upper + 0.01
+    assert f'drive gain of {found[0]["joint"]}' in done.output
+    assert '--effort-scale' in done.output
+    for export in document['exports'].values():
+        assert export['share'] < 1e-9
+    for text in ('b', 'z=1@forearm', 'b=1@nowhere'):
+        armid('identify', *bags, '--robot', ROBOT, '--payload', text, '--out', out, code=2)

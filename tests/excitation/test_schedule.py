@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trajectories, runs and their files."""
 
+import csv
+from dataclasses import replace
+
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     Excitation,
@@ -110,6 +113,16 @@ def test_file_holds_the_run_to_the_last_bit(trajectory, start, name, tmp_path):
     assert back.joints == run.joints
     np.testing.assert_array_equal(read.q, motion.q)
     np.testing.assert_array_equal(read.ddq, motion.ddq)
+
+
+@pytest.mark.parametrize('first', ["=cmd|'/C calc'!A0", '+a', '-a', '@a', '#a', "'a", 'a,"b"'])
+def test_a_name_is_no_formula_of_a_spreadsheet_and_is_read_as_it_was(trajectory, first, tmp_path):
+    joints = (first, *trajectory.joints[1:])
+    save_excitation(Excitation(replace(trajectory, joints=joints)), tmp_path / 'run.csv')
+    with open(tmp_path / 'run.csv', newline='') as stream:
+        cells = [row[0] for row in csv.reader(stream) if not row[0].startswith('# ')]
+    assert not cells[1].startswith(('=', '+', '-', '@', '#'))
+    assert load_excitation(tmp_path / 'run.csv').joints == joints
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,15 @@
 """A result of several files is that of one run, whatever ends the next one."""
 
 import errno
+import itertools
+import os
 from pathlib import Path
+import signal
+import sys
 
 from armid_ros.errors import OutputError
 from armid_ros.files import settled, staged, write_file
+from armid_ros.files.output import locked
 from armid_ros.files.own import STAGING
 import pytest
 
@@ -22,6 +27,8 @@ def contents(folder):
 @pytest.fixture
 def out(tmp_path):
     """Return a folder with a result of Monday."""
+    tmp_path /= 'out'
+    tmp_path.mkdir()
     for name in ('identification.json', 'model.yaml', 'identified.urdf', 'notes.txt'):
         (tmp_path / name).write_text('monday')
     (tmp_path / 'recording').mkdir()
@@ -53,6 +60,87 @@ def test_a_result_that_is_kept_replaces_the_earlier_one(out):
         'recording/a.mcap': 'monday',
     }
     assert not (out / STAGING).exists()
+
+
+@pytest.fixture
+def killed_at():
+    """Kill a process of its own at its n-th call of the system; return whether it came so far."""
+
+    def run(number, work):
+        child = os.fork()
+        if child == 0:
+            calls = itertools.count(1)
+
+            def kill(event, _):
+                if event.startswith(('os.', 'shutil.', 'ctypes.', 'open')) and (
+                    next(calls) == number
+                ):
+                    os.kill(os.getpid(), signal.SIGKILL)
+
+            sys.addaudithook(kill)
+            work()
+            os._exit(0)
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+
+    return run
+
+
+@pytest.mark.filterwarnings('ignore:.*fork:DeprecationWarning')
+def test_a_run_that_is_killed_leaves_all_of_one_result(out, killed_at):
+    """The kill comes before every call of the system, one after the other."""
+
+    def replace(content):
+        with staged(out, ('*.json', 'model.yaml', 'identified.urdf')) as result:
+            for name in ('identification.json', 'model.yaml', 'report.html'):
+                write_file(result.folder / name, content)
+            (result.folder / 'trajectory').mkdir()
+            write_file(result.folder / 'trajectory' / 'a.mcap', content)
+            result.keep()
+
+    replace('0')
+    seen = set()
+    for number in itertools.count(1):
+        killed = killed_at(number, lambda content=str(number): replace(content))
+        results = {
+            path: text
+            for path, text in contents(out).items()
+            if not path.startswith((STAGING, 'notes', 'recording'))
+        }
+        assert sorted(results) == [
+            'identification.json',
+            'model.yaml',
+            'report.html',
+            'trajectory/a.mcap',
+        ]
+        assert len(set(results.values())) == 1, number
+        assert contents(out)['notes.txt'] == contents(out)['recording/a.mcap'] == 'monday'
+        seen |= set(results.values())
+        if not killed:
+            break
+    assert len(seen) > 2  # killed after the exchange as well
+    assert [path.name for path in out.parent.iterdir() if path.name.startswith('.')] == []
+
+
+def test_the_current_folder_keeps_its_identity(out, monkeypatch):
+    """A shell that stands in the folder must not stand in a removed one afterwards."""
+    monkeypatch.chdir(out)
+    before = out.stat().st_ino
+    with staged(Path(), ('*.json', 'model.yaml', 'identified.urdf')) as result:
+        write_file(result.folder / 'model.yaml', 'tuesday')
+        result.keep()
+    assert out.stat().st_ino == before
+    assert (out / 'model.yaml').read_text() == 'tuesday'
+
+
+def test_the_folder_stays_locked_and_keeps_its_mode(out):
+    out.chmod(0o750)
+    with staged(out) as result:
+        write_file(result.folder / 'model.yaml', 'tuesday')
+        result.keep()
+        with pytest.raises(OutputError, match='another run'):
+            with locked(out):
+                pass
+    assert out.stat().st_mode & 0o777 == 0o750
 
 
 def test_what_is_kept_later_goes_beside_what_was_kept_before(out):
@@ -89,6 +177,7 @@ def test_no_document_vouches_for_files_that_are_half_moved(out, monkeypatch):
         with staged(out) as result:
             for name in ('model.yaml', 'identification.json'):
                 write_file(result.folder / name, 'tuesday')
+            monkeypatch.chdir(out)  # a folder that is not exchanged
             monkeypatch.setattr(Path, 'replace', full)
             result.keep()
     assert not (out / 'identification.json').exists()

@@ -3,7 +3,7 @@
 """Which bags a URL with wildcards stands for, whose they are, and of which day."""
 
 from armid_ros.errors import FleetError
-from armid_ros.fleet.bags import find_bags
+from armid_ros.fleet.bags import find_bags, folder_of
 import pytest
 
 
@@ -17,6 +17,8 @@ def store(tmp_path):
         'line_1/arm_b/20260107/rosbag2_x/metadata.yaml',
         'line_1/arm_b/notes.txt',
         'line_1/arm_b/video/film.mp4',
+        f'line_2/{"长" * 84}/run.mcap',
+        f'line_2/{"机械臂" * 9}长/run.mcap',
     ):
         file = tmp_path / path
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -39,8 +41,14 @@ def test_where_the_wildcard_is_the_bag_the_arm_is_its_folder(store):
 
 
 def test_a_pattern_says_which_part_of_a_url_is_the_arm(store):
-    bags = find_bags([f'{store}/**/*.mcap'], r'arm_(\w+)/')
+    bags = find_bags([f'{store}/line_1/**/*.mcap'], r'arm_(\w+)/')
     assert [bag.arm for bag in bags] == ['a', 'b']
+
+
+def test_a_name_in_any_script_fits_into_the_name_of_a_folder(store):
+    (bag,) = find_bags([f'{store}/line_2/机*/*'])
+    assert len(bag.arm) == 28
+    (store / folder_of(bag.arm)).mkdir()
 
 
 def test_a_folder_that_is_a_bag_counts_once_and_its_files_do_not(store):
@@ -64,6 +72,9 @@ def test_the_version_changes_with_the_bag(store):
         ('{store}/line_1/*/*/*', 'arm', 'has no group'),
         ('{store}/line_1/*/*/*', 'robot_(.)', 'finds no arm'),
         ('{store}/line_1/*/*/*', '(', '--arm'),
+        ('{store}/line_1/*/*/*', '/line_1/()', '--arm'),
+        ('{store}/line_1/*/*/*', '(none)?', '--arm'),
+        ('{store}/line_2/长*/*', None, '--arm'),
     ],
 )
 def test_what_cannot_be_listed_is_said_in_one_line(store, pattern, regular, said):

@@ -13,8 +13,19 @@ import pytest
 LOCKS = {
     'build': ['build'],
     'run': ['run', 'ros'],
-    'test': ['test', 'convert', 'docs', 'fleet', 'residual', 'view', 'run', 'ros'],
-    'bench': ['bench', 'test', 'convert', 'docs', 'fleet', 'residual', 'view', 'run', 'ros'],
+    'test': ['test', 'convert', 'docs', 'fleet', 'residual', 'mujoco', 'view', 'run', 'ros'],
+    'bench': [
+        'bench',
+        'test',
+        'convert',
+        'docs',
+        'fleet',
+        'residual',
+        'mujoco',
+        'view',
+        'run',
+        'ros',
+    ],
 }
 
 
@@ -52,6 +63,19 @@ def test_lock_pins_all_that_is_asked_for(root, lock):
 def test_locks_agree(root, lock):
     """What two of them pin, they pin to one version."""
     assert pinned(root, lock).items() <= pinned(root, 'bench').items()
+
+
+def test_the_constraints_are_the_versions_of_the_tests(root):
+    lines = (root / 'requirements' / 'constraints.txt').read_text().splitlines()
+    pins = dict(line.split(' ')[0].split('==') for line in lines)
+    assert {normal(name): version for name, version in pins.items()} == pinned(root, 'bench')
+
+
+@pytest.mark.parametrize('group', ['run', 'convert', 'fleet', 'residual', 'view', 'mujoco'])
+def test_requirements_of_users_have_a_lowest_and_a_highest_version(root, group):
+    lines = (root / 'requirements' / f'{group}.in').read_text().splitlines()
+    for line in filter(lambda line: not line.startswith('#'), lines):
+        assert re.search(r'>=\d[\d.]*,<\d', line), line
 
 
 @pytest.mark.parametrize('lock', LOCKS)

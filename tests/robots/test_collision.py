@@ -95,6 +95,13 @@ class TestDistances:
         assert sample == int(np.argmin(clearances)) == 19
         assert closest == model.distance(path[19])
 
+    def test_progress_is_said_link_by_link(self) -> None:
+        shares: list[float] = []
+        collision_model(load_robot('humanoid_arm'), progress=shares.append)
+        assert shares == sorted(shares)
+        assert shares[0] == 0.0
+        assert len(shares) > 6
+
     def test_poses_must_fit_the_robot(self) -> None:
         model = collision_model(robot_from_urdf(arm()))
         with pytest.raises(RobotError, match='do not fit 2 driven joints'):

@@ -469,26 +469,15 @@ def test_joints_that_mimic_each_other_are_refused() -> None:
 class TestXacroIsAProgram:
     """It has a limit of time, and only a file that a person names is expanded."""
 
-    @pytest.mark.parametrize(
-        ('endless', 'limit', 'message'),
-        [
-            ('<xacro:include filename="{}/fifo"/>', 0.02, '0.6 s; does it include a pipe?'),
-            ('<link name="${{9 ** 9 ** 9}}"/>', 1.0, '1 s of processor time'),
-        ],
-        ids=['waits', 'computes'],
-    )
-    def test_one_without_end_is_stopped(
-        self, tmp_path: Path, endless: str, limit: float, message: str
-    ) -> None:
+    def test_one_without_end_is_stopped(self, tmp_path: Path) -> None:
         path = tmp_path / 'endless.xacro'
         path.write_text(
             '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">'
-            f'{endless.format(tmp_path)}</robot>'
+            f'<xacro:include filename="{tmp_path}/fifo"/></robot>'
         )
         os.mkfifo(tmp_path / 'fifo')
-        said = re.escape(f'endless.xacro: xacro: not expanded within {message}')
-        with pytest.raises(RobotError, match=said):
-            expand_xacro(path, {}, time_limit=limit)
+        with pytest.raises(RobotError, match=r'endless.xacro: xacro: not expanded within 1.5 s'):
+            expand_xacro(path, {}, patience=1.5)
 
     def test_one_that_takes_all_memory_is_stopped(self, tmp_path: Path) -> None:
         path = tmp_path / 'large.xacro'

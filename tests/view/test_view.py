@@ -4,11 +4,16 @@
 
 from importlib.metadata import files
 import json
+import os
+from pathlib import Path
+import signal
+import socket
+import subprocess
 import sys
 
 import armid_ros as ar
 from armid_ros.cli import main
-from armid_ros.view import bodies, log_scene, make_scene, open_stream
+from armid_ros.view import bodies, log_scene, make_scene, open_stream, rerun_log
 from armid_ros.view.live import LiveLog
 from click.testing import CliRunner
 import numpy as np
@@ -177,3 +182,29 @@ def test_a_window_without_a_screen_is_refused(monkeypatch):
     monkeypatch.setattr(sys, 'platform', 'linux')
     with pytest.raises(ar.ArmidError, match='--out'):
         open_stream('a run')
+
+
+def test_a_window_is_reached_from_this_machine_alone(monkeypatch, tmp_path):
+    """The viewer that is started is the real one, without its window."""
+    started = []
+
+    def start(command, **kwargs):
+        started.append(popen([*command, '--serve-grpc'], **kwargs))
+        return started[0]
+
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    popen = subprocess.Popen
+    monkeypatch.setattr(rerun_log, '_has_screen', lambda: True)
+    monkeypatch.setattr(rerun_log, '_PORT', port)
+    monkeypatch.setattr(subprocess, 'Popen', start)
+    try:
+        open_stream('a run')
+        bound = Path('/proc/net/tcp').read_text() + Path('/proc/net/tcp6').read_text()
+        sockets = [line.split() for line in bound.splitlines()]
+        listening = [one[1] for one in sockets if one[3] == '0A' and one[1][-4:] == f'{port:04X}']
+        assert listening == [f'0100007F:{port:04X}']
+    finally:
+        os.killpg(started[0].pid, signal.SIGTERM)
+        started[0].wait(10)

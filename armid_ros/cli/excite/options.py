@@ -10,6 +10,7 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.cli import options
 from armid_ros.cli.excite.files import CollisionScene, WAYPOINT_RATE
+from armid_ros.cli.terminal import progress
 from armid_ros.effects import parse_effect
 from armid_ros.excitation import (
     DesignSettings,
@@ -120,7 +121,8 @@ class LimitOptions:
 
     def workspace(self, robot: Robot) -> CollisionScene:
         """Return what the robot must not touch."""
-        collision = collision_model(robot)
+        with progress('reading meshes') as tick:
+            collision = collision_model(robot, progress=tick)
         around = load_environment(self.environment, robot) if self.environment else ()
         floor = find_floor(collision, self.floor, around)
         around = (*around, *floor_obstacles(collision, floor, self.clearance))

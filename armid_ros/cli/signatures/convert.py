@@ -15,10 +15,7 @@ import click
     epilog="Example: armid convert run.csv --robot ur10.urdf --effort 'tau{}' --out run"
 )
 @click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    '--robot',
-    'robot_source',
-    metavar='R',
+@options.robot_described(
     help='Shipped name or path of a URDF, whose joints the columns become; without it, joints '
     'are called as the columns are.',
 )

@@ -27,9 +27,7 @@ import click
 @click.option(
     '--experiments', default=48, show_default=True, help='Of 4 s each, that --demo simulates.'
 )
-@click.option(
-    '--robot', 'robot_source', default=TWO_LINKS, show_default=True, metavar='R', help='The arm.'
-)
+@options.robot_described(default=TWO_LINKS, show_default=True, help='The arm.')
 @click.option(
     '--start',
     type=click.Choice(['found', 'before', 'after']),

@@ -57,6 +57,14 @@ import click
     '--physical; may be given several times.',
 )
 @click.option(
+    '--payload',
+    'payloads',
+    multiple=True,
+    metavar='BAG=KG@LINK[:X,Y,Z]',
+    help='What the arm is known to carry in a bag, with its centre in the frame of the link [m]; '
+    'fixes the gains of the drives where another bag is without it. May be given several times.',
+)
+@click.option(
     '--verify/--no-verify',
     'verifies',
     default=True,

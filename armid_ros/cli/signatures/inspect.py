@@ -13,10 +13,7 @@ import click
 
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
 @click.argument('bag', type=click.Path(path_type=Path))
-@click.option(
-    '--robot',
-    'robot_source',
-    metavar='R',
+@options.robot_described(
     help='Shipped name, path of a URDF, or - for the one in the bag; limits and units are '
     'checked with it, and an identification is tried.',
 )

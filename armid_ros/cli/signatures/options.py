@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+import shlex
 from typing import Any, TypeVar
 
 from armid_ros.cli.signatures.choices import USUAL_EFFECTS
@@ -15,6 +16,7 @@ _Command = TypeVar('_Command', bound=Callable[..., Any])
 
 #: Where the context keeps what its commands share.
 FORCE, CRC, MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
+PACKAGES = 'armid.packages'
 
 
 class OutPath(click.Path):
@@ -27,20 +29,14 @@ class OutPath(click.Path):
         return super().convert(value, param, ctx)
 
 
-robot = click.option(
-    '--robot',
-    'robot_source',
-    required=True,
-    metavar='R',
-    help='Shipped name, path of a URDF or xacro ("arm.xacro tool:=true" with '
-    'arguments), or - for the /robot_description in the bag. '
-    'A xacro is a program, which can read any file: name only one that you trust.',
-)
 gravity = click.option(
     '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
 )
 joints = click.option(
-    '--joints', default=None, metavar='A,B,...', help='Driven joints; all but grippers by default.'
+    '--joints',
+    default=None,
+    metavar='A,B,...',
+    help='Driven joints; all but grippers by default. A name with a comma is in double quotes.',
 )
 effects = click.option(
     '--effects',
@@ -95,6 +91,49 @@ seed = click.option(
     help='Of every random number.',
 )
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
+
+
+def robot_described(**values: Any) -> Callable[[_Command], _Command]:
+    """Add --robot, with what differs from any other option, and --package for its description."""
+    source = click.option(
+        '--robot',
+        'robot_source',
+        metavar='R',
+        callback=lambda context, _, value: _with_packages(value, context.meta.get(PACKAGES, [])),
+        **values,
+    )
+    packages = click.option(
+        '--package',
+        multiple=True,
+        metavar='P=FOLDER',
+        is_eager=True,
+        expose_value=False,
+        callback=lambda context, _, values: context.meta.update({PACKAGES: values}),
+        help='Folder of a ROS package that the description refers to; may be given several times.',
+    )
+    return lambda command: source(packages(command))
+
+
+def _with_packages(source: str | None, packages: Sequence[str]) -> str | None:
+    """Write packages behind the path of a description, where any program takes them."""
+    written = []
+    for text in packages:
+        name, _, folder = text.partition('=')
+        if not name or not folder or source in (None, '-'):
+            raise click.BadParameter(
+                f"'{text}' has to be P=FOLDER, with the file of a description as --robot",
+                param_hint='--package',
+            )
+        written.append(shlex.quote(f'package:{name}:={Path(folder).resolve()}'))
+    return ' '.join([source, *written]) if source and written else source
+
+
+robot = robot_described(
+    required=True,
+    help='Shipped name, path of a URDF, MJCF or xacro ("arm.xacro tool:=true" with '
+    'arguments), or - for the /robot_description in the bag. '
+    'A xacro is a program, which can read any file: name only one that you trust.',
+)
 
 
 def folder(command: _Command) -> _Command:

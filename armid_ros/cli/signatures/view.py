@@ -19,9 +19,7 @@ import click
     help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
     'and joints that the diagnosis names are coloured.',
 )
-@click.option(
-    '--robot', 'robot_source', metavar='R', help='As elsewhere; of the model by default.'
-)
+@options.robot_described(help='As elsewhere; of the model by default.')
 @click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
 @click.option('--mark', metavar='A,B,...', help='Joints to be coloured.')
 @click.option('--live', is_flag=True, help='Show joint_states as they come; no BAG.')

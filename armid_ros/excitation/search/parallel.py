@@ -24,8 +24,14 @@ from armid_ros.excitation.search.local import Found, search, Stopped
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: One thread of linear algebra per process: the matrices are small.
-_ONE_THREAD = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
+#: One thread of linear algebra per process, as the matrices are small; and no module of the
+#: current folder in place of an installed one.
+_OF_CHILDREN = (
+    'OMP_NUM_THREADS',
+    'OPENBLAS_NUM_THREADS',
+    'MKL_NUM_THREADS',
+    'PYTHONSAFEPATH',
+)
 
 #: Why searches did not end by themselves.
 INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
@@ -241,9 +247,9 @@ def _nameless_main() -> Iterator[None]:
 
 @contextmanager
 def _undisturbed_children() -> Iterator[None]:
-    """Have processes that start in the meantime use one thread each and leave Ctrl-C to us."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, '1'))
+    """Have processes that start in the meantime find `_OF_CHILDREN`, and leave Ctrl-C to us."""
+    before = {name: os.environ.get(name) for name in _OF_CHILDREN}
+    os.environ.update(dict.fromkeys(_OF_CHILDREN, '1'))
     ours = threading.current_thread() is threading.main_thread()
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if ours else None
     try:

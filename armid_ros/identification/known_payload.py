@@ -1,0 +1,308 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Gains of the drives, from a payload that is known.
+
+Efforts that are all too large by one factor belong to an arm that is as much too heavy: no motion
+tells the two apart. A body of known mass that one recording has and another has not does. Each
+joint measures k (Y pi + p), where p is the torque of the known body: k is the coefficient of p in
+the regression of its effort on its columns and p.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import IdentificationError, meant
+from armid_ros.identification.rows.regression import filtered_torque, regressions
+from armid_ros.identification.rows.signals import (
+    Conditioning,
+    conditioning,
+    segments,
+    SignalSettings,
+)
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+from armid_ros.robots import Robot
+import numpy as np
+import pinocchio as pin
+from scipy.stats import t as student
+
+#: Blocks of a recording whose residuals count as independent of each other.
+_BLOCKS = 20
+#: Share of the payload's torque that the columns of a joint do not explain, at the least.
+_APART = 1e-8
+#: A gain whose standard deviation is larger is not determined.
+_SURE = 0.05
+
+
+@dataclass(frozen=True)
+class KnownPayload:
+    """
+    A point mass on a link.
+
+    Attributes
+    ----------
+    mass : float
+        [kg].
+    link : str
+        Of the description, in whose frame its place is.
+    place : tuple of float
+        Centre of mass [m].
+
+    """
+
+    mass: float
+    link: str
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def parse(cls, text: str) -> tuple[str, KnownPayload]:
+        """
+        Read 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'; return the recording and what it carries.
+
+        Raises
+        ------
+        IdentificationError
+            The text is neither.
+
+        """
+        bag, _, body = text.rpartition('=')
+        mass, _, where = body.partition('@')
+        link, _, place = where.partition(':')
+        try:
+            x, y, z = (float(part) for part in (place or '0,0,0').split(','))
+            payload = cls(float(mass), link, (x, y, z))
+        except ValueError:
+            payload = None
+        if payload is None or not bag or not link or not 0.0 < payload.mass < np.inf:
+            raise IdentificationError(
+                f"--payload '{text}' has to be BAG=KG@LINK, or BAG=KG@LINK:X,Y,Z with its centre "
+                'of mass in the frame of the link [m]'
+            )
+        return bag, payload
+
+    def carried_by(self, robot: Robot) -> Robot:
+        """Return the robot with the payload; IdentificationError if it has no such link."""
+        frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
+        frame = frames.get(self.link)
+        if frame is None or frame.parentJoint == 0:
+            links = [name for name, one in frames.items() if one.parentJoint > 0]
+            raise IdentificationError(
+                f"--payload: no joint moves a link '{self.link}'; links are {', '.join(links)}"
+                f'{meant(self.link, links)}'
+            )
+        center = frame.placement.act(np.array(self.place))
+        body = pin.Inertia(self.mass, center, np.zeros((3, 3))).toDynamicParameters()
+        parameters = robot.rigid_parameters.reshape(-1, 10).copy()
+        parameters[frame.parentJoint - 1] += body
+        return robot.with_inertias(parameters.ravel())
+
+
+@dataclass(frozen=True)
+class DriveGains:
+    """
+    Measured effort over the torque of the drive.
+
+    Attributes
+    ----------
+    joints : tuple of str
+        Joint names.
+    values, std : ndarray, shape (n,)
+        Gains and their standard deviations; 1 and infinite where the payload does not tell.
+    half_width : ndarray, shape (n,)
+        Half of the 95 % interval.
+
+    """
+
+    joints: tuple[str, ...]
+    values: FloatArray
+    std: FloatArray
+    half_width: FloatArray
+
+    def document(self) -> list[dict[str, object]]:
+        """Return the gains for identification.json; null where the payload does not tell."""
+        rows: list[dict[str, object]] = []
+        for joint, gain, std, width in zip(
+            self.joints, self.values, self.std, self.half_width, strict=True
+        ):
+            row: dict[str, object] = {'joint': joint, 'gain': None}
+            if np.isfinite(std):
+                interval = [float(gain - width), float(gain + width)]
+                row |= {'gain': float(gain), 'std': float(std), 'interval': interval}
+            rows.append(row)
+        return rows
+
+    def sentences(self) -> tuple[str, ...]:
+        """Say what they are, in lines."""
+        sure = np.isfinite(self.std)
+        lines = [
+            f'drive gain of {joint}: {gain:.4g} ({gain - width:.4g} to {gain + width:.4g}, 95 %)'
+            for joint, gain, width, one in zip(
+                self.joints, self.values, self.half_width, sure, strict=True
+            )
+            if one
+        ]
+        unknown = [joint for joint, one in zip(self.joints, sure, strict=True) if not one]
+        if unknown:
+            lines.append(f'drive gain not determined, taken as 1: {", ".join(unknown)}')
+        scale = ','.join(f'{1.0 / gain:.4g}' for gain in self.values)
+        lines.append(
+            'the model is that of efforts divided by these gains; for other recordings of these '
+            f'drives: --effort-scale {scale}'
+        )
+        return tuple(lines)
+
+
+def payloads_of(
+    texts: Sequence[str], bags: Sequence[Path], recordings: Sequence[Recording], robot: Robot
+) -> Mapping[str, Robot]:
+    """
+    Return the robot with its payload by the source of the recording that has one.
+
+    Raises
+    ------
+    IdentificationError
+        A text is none, or names no recording or link.
+
+    """
+    found: dict[str, Robot] = {}
+    sources = {str(bag): r.source for bag, r in zip(bags, recordings, strict=True)}
+    for text in texts:
+        name, payload = KnownPayload.parse(text)
+        named = [bag for bag in bags if name in (str(bag), bag.name, bag.stem)]
+        if len(named) != 1:
+            raise IdentificationError(
+                f"--payload '{text}' names {len(named)} recordings; they are "
+                f'{", ".join(map(str, bags))}'
+            )
+        source = sources[str(named[0])]
+        found[source] = payload.carried_by(found.get(source, robot))
+    return found
+
+
+def drive_gains(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    loaded: Mapping[str, Robot],
+    signals: SignalSettings,
+    rng: np.random.Generator,
+) -> DriveGains:
+    """
+    Estimate the gain of each drive.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Structure: robot and effects.
+    recordings : sequence of Recording
+        Data with efforts, of which some have another payload than others.
+    loaded : mapping of str to Robot
+        The robot with its payload, by the source of the recording.
+    signals : SignalSettings
+        Filtering.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
+
+    Raises
+    ------
+    IdentificationError
+        No recording differs from the others in its payload, so that no gain is determined.
+
+    """
+    used = conditioning(list(recordings), signals)
+    rows = regressions(arm, arm.base_parameters(rng).independent, recordings, used)
+    known = np.concatenate(
+        [
+            _torque_of_payload(arm, recording, loaded, used, filtered=True)
+            for recording in recordings
+        ]
+    )
+    columns = np.concatenate([part.columns for part in rows])
+    tau = np.concatenate([part.tau for part in rows])
+    informative = np.concatenate([part.informative for part in rows])
+    blocks = np.concatenate(
+        [
+            number * _BLOCKS + np.arange(len(part.tau)) * _BLOCKS // len(part.tau)
+            for number, part in enumerate(rows)
+        ]
+    )
+    gains = [
+        _gain(columns[use, j], known[use, j], tau[use, j], blocks[use])
+        for j, use in enumerate(informative.T)
+    ]
+    values, std, width = (np.array(one) for one in zip(*gains, strict=True))
+    if not np.any(np.isfinite(std)):
+        raise IdentificationError(
+            '--payload: no gain is determined; it needs the same motion with and without the '
+            'payload, and a payload that the joints feel'
+        )
+    return DriveGains(arm.robot.joints, values, std, width)
+
+
+def _gain(
+    columns: FloatArray, known: FloatArray, tau: FloatArray, blocks: FloatArray
+) -> tuple[float, float, float]:
+    """Return coefficient of the known torque, its deviation, and half of the 95 % interval."""
+    scale = np.linalg.norm(columns, axis=0)
+    columns = columns[:, scale > 0.0] / scale[scale > 0.0]
+    # The coefficient of a column is that of what the other columns leave of it (Frisch, Waugh).
+    rest = known - columns @ np.linalg.lstsq(columns, known, rcond=1e-10)[0]
+    size = float(rest @ rest)
+    if size <= _APART * float(known @ known):
+        return 1.0, np.inf, np.inf
+    gain = float(rest @ tau) / size
+    left = tau - gain * known
+    left = left - columns @ np.linalg.lstsq(columns, left, rcond=1e-10)[0]
+    scores = np.bincount(np.unique(blocks, return_inverse=True)[1], weights=rest * left)
+    count = len(scores)
+    std = float(np.sqrt(count / (count - 1.0) * np.sum(scores**2)) / size)
+    if not std < _SURE * abs(gain):
+        return 1.0, np.inf, np.inf
+    return gain, std, float(student.ppf(0.975, count - 1)) * std
+
+
+def corrected(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    loaded: Mapping[str, Robot],
+    gains: DriveGains,
+    signals: SignalSettings,
+) -> list[Recording]:
+    """Return recordings with the torque of the arm alone: efforts over gains, less the payload."""
+    result = []
+    for recording in recordings:
+        assert recording.tau is not None
+        tau = recording.tau / gains.values
+        if recording.source in loaded:
+            used = conditioning([recording], signals)
+            motions = segments(recording, used)
+            times = np.concatenate([motion.t for motion in motions])
+            torque = _torque_of_payload(arm, recording, loaded, used, filtered=False)
+            tau = tau - np.column_stack([np.interp(recording.t, times, one) for one in torque.T])
+        result.append(replace(recording, tau=tau))
+    return result
+
+
+def _torque_of_payload(
+    arm: ArmModel,
+    recording: Recording,
+    loaded: Mapping[str, Robot],
+    used: Conditioning,
+    *,
+    filtered: bool,
+) -> FloatArray:
+    """Return the torque that the payload of a recording takes, at its rows or at full rate."""
+    found = []
+    for motion in segments(recording, used):
+        robots = (loaded.get(recording.source, arm.robot), arm.robot)
+        with_it, without = (
+            filtered_torque(one, motion, used) if filtered else one.torque(motion)
+            for one in (replace(arm, robot=robot) for robot in robots)
+        )
+        found.append(with_it - without)
+    return np.concatenate(found)
