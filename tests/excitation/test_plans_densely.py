@@ -21,8 +21,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-QUICK = ('ur5_robot',)
+QUICK = ()
 SLOW = (
+    'ur5_robot',
     'ur3_robot', 'ur10_robot', 'ur3e_robot', 'ur5e_robot', 'ur10e_robot', 'panda', 'fr3',
     'kinova', 'gen3_robotiq_2f_85', 'iiwa14', 'z1',
 )  # fmt: skip
