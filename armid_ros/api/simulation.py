@@ -12,6 +12,7 @@ from armid_ros.api.arguments import arm_of, generator, Rng, RobotLike
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
+    CollisionScene,
     Design,
     design,
     DesignSettings,
@@ -20,10 +21,10 @@ from armid_ros.excitation import (
     save_excitation,
     whole_period,
 )
+from armid_ros.excitation.geometry.floor import NO_FLOOR
 from armid_ros.files import write_file
 from armid_ros.motion import Motion
 from armid_ros.recording import read_waypoints, ReadReport, Recording, write_joint_trajectory
-from armid_ros.robots import collision_model
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 import numpy as np
@@ -49,6 +50,8 @@ class ExcitationResult(Shown):
         Everything that the design found.
     arm : ArmModel
         What it was made for.
+    scene : CollisionScene
+        Bodies, floor and surroundings that it was checked against.
 
     Examples
     --------
@@ -61,6 +64,7 @@ class ExcitationResult(Shown):
 
     core: Design
     arm: ArmModel
+    scene: CollisionScene
 
     @property
     def trajectory(self) -> Excitation:
@@ -93,7 +97,12 @@ class ExcitationResult(Shown):
 
         robot = self.arm.robot
         page = excitation_report(
-            self.core, self.arm, robot=robot.name, collision=collision_model(robot)
+            self.core,
+            self.arm,
+            robot=robot.name,
+            collision=self.scene.collision,
+            obstacles=self.scene.obstacles,
+            floor=self.scene.floor,
         )
         write_file(Path(path), page)
         return Path(path)
@@ -133,13 +142,14 @@ def design_excitation(
     periods: int = 2,
     rng: Rng = 0,
     time_budget: float = 60.0,
+    floor: str | float | None = None,
+    environment: str | Path | None = None,
     **settings: Any,
 ) -> ExcitationResult:
     """
-    Find a trajectory that shows the parameters, inside all limits and clear of the arm itself.
+    Find a trajectory that shows the parameters, inside all limits and free of collisions.
 
-    Floor and surroundings are not known to it: before a robot runs it, look at the lowest point in
-    its report, or let ``armid excite`` design it, which keeps clear of both.
+    The arm, its floor and its surroundings are checked as by ``armid excite``.
 
     Parameters
     ----------
@@ -153,6 +163,11 @@ def design_excitation(
         Seed, or source of randomness.
     time_budget : float
         Processor time of each search process [s]; the best so far is kept.
+    floor : str or float, optional
+        Height of the floor above the origin of the base [m], or 'none'; by default the base plane
+        of an arm that stands, or what is shipped with the robot.
+    environment : str or Path, optional
+        YAML with what stands around the arm, or a planning scene of MoveIt.
     **settings
         Further ones of ``armid_ros.excitation.DesignSettings``: ``speed='slow'``, ``starts=1``,
         ``iterations=20``, ``criterion='D'``.
@@ -165,7 +180,8 @@ def design_excitation(
     Raises
     ------
     TrajectoryError
-        No trajectory is inside the limits; the message names the limit or the bodies that touch.
+        No trajectory is inside the limits, with the limit or the bodies that touch; or the height
+        of the floor is unknown.
 
     Examples
     --------
@@ -184,8 +200,10 @@ def design_excitation(
         time_budget=time_budget,
         **settings,
     )
-    found = design(model, known, generator(rng), collision=collision_model(model.robot))
-    return ExcitationResult(found, model)
+    height = None if floor is None else str(floor)
+    scene = CollisionScene.of(model.robot, known.clearance, height, environment)
+    found = design(model, known, generator(rng), collision=scene.bodies)
+    return ExcitationResult(found, model, scene)
 
 
 def simulate(
@@ -265,7 +283,7 @@ def _reference(
     if trajectory is None:
         trajectory = design_excitation(
             ArmModel(arm.robot), duration=12.0, periods=1, rng=rng, starts=1, candidates=10,
-            iterations=1,
+            iterations=1, floor=NO_FLOOR,
         )  # fmt: skip
     if isinstance(trajectory, ExcitationResult):
         trajectory = trajectory.trajectory

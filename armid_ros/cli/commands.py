@@ -49,6 +49,9 @@ COMMANDS = {
         'Design a trajectory that shows the parameters, inside all limits and free of collisions.',
     ),
     'simulate': Listed('record', 'Let a simulated arm follow a trajectory and record it.'),
+    'call': Listed(
+        'call', 'Start, rehearse or stop the run of an excitation_publisher, or set its speed.'
+    ),
     'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
     'diagnose': Listed('diagnose', 'Find which effect a model lacks, and add it.'),
     'elastic': Listed('elastic', 'Identify elastic joints.'),

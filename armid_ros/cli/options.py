@@ -23,6 +23,7 @@ from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import is_table
 from armid_ros.robots import (
     driven_in_words,
+    inertia_doubts,
     load_robot,
     parse_gravity,
     Robot,
@@ -96,11 +97,13 @@ def open_robot(
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
-    """Load the robot that --robot, --gravity and --joints ask for; say what is not driven."""
+    """Load the robot that --robot, --gravity and --joints ask for; say what is doubtful."""
     robot = _loaded(source, gravity, listed(joints) if joints else None, bags)
-    if tell and joints is None:
+    lines = driven_in_words(robot) if joints is None else ()
+    if tell:
         notes = click.get_current_context().meta.setdefault(NOTES, [])
-        notes += [visible(f'note: {line}') for line in driven_in_words(robot)]
+        found = [visible(f'note: {line}') for line in (*lines, *inertia_doubts(robot))]
+        notes += [line for line in found if line not in notes]
     return robot
 
 

@@ -21,6 +21,7 @@ from armid_ros.excitation.geometry.environment import Obstacle, obstacles_alone,
 from armid_ros.excitation.geometry.environment_file import load_environment
 from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
 from armid_ros.excitation.geometry.heights import LowestPoint
+from armid_ros.excitation.joint_limits import with_joint_limits
 from armid_ros.excitation.limits import (
     check_limits,
     Limits,
@@ -34,6 +35,7 @@ from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.rehearsal import Rehearsal, RehearsalReport
 from armid_ros.excitation.run import plan_run, Run
+from armid_ros.excitation.scene import CollisionScene
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import CRITERIA, Information
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
@@ -53,6 +55,7 @@ __all__ = [
     'Approach',
     'CRITERIA',
     'ClearanceModel',
+    'CollisionScene',
     'Design',
     'DesignSettings',
     'Excitation',
@@ -100,5 +103,6 @@ __all__ = [
     'transfer_limits',
     'used_shares',
     'whole_period',
+    'with_joint_limits',
     'with_obstacles',
 ]

@@ -11,7 +11,7 @@ from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.geometry.environment import Obstacle, with_obstacles
 from armid_ros.excitation.geometry.floor import Floor
 from armid_ros.excitation.geometry.heights import lowest_point, LowestPoint
-from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.limits import has_velocity_limit, Limits, SLOW_VELOCITY
 from armid_ros.excitation.run import Run
 from armid_ros.motion import Motion
 from armid_ros.robots import CollisionModel, continuous_joints, Robot
@@ -134,6 +134,14 @@ def not_checked(
         joints = [joint for joint, one in zip(limits.joints, where, strict=True) if one]
         if joints:
             found.append(f'the {name} of {_listed(joints)} (no limit)')
+    slow = [
+        joint
+        for joint, own in zip(limits.joints, has_velocity_limit(collision.robot), strict=True)
+        if not own
+    ]
+    if slow:
+        taken = f'{SLOW_VELOCITY:g} rad/s or m/s'
+        found.append(f'the velocity of {_listed(slow)} (no limit is given; {taken} is taken)')
     massless = _massless(collision.robot)
     if massless:
         found.append(f'the weight of {_listed(massless)} (no inertia)')

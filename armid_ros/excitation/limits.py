@@ -17,6 +17,10 @@ import numpy.typing as npt
 #: time [s], which is 8.7 rad/s^2 for the first joint of a Panda (its data sheet says 15).
 TIME_TO_TOP_SPEED = 0.25
 
+#: Velocity limit of a joint whose description has none, or 0: half a metre a second at the end of
+#: an arm of a metre [rad/s or m/s].
+SLOW_VELOCITY = 0.5
+
 #: Share of the velocity and acceleration limits that a run of each speed class may use.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
 
@@ -87,7 +91,8 @@ class Limits:
         Parameters
         ----------
         robot : Robot
-            Gives position, velocity and torque limits.
+            Gives position, velocity and torque limits; a joint without a velocity limit gets
+            `SLOW_VELOCITY`.
         speed : str or float
             'slow', 'medium' or 'fast', or the share of the velocity and acceleration limits that
             may be used.
@@ -96,8 +101,8 @@ class Limits:
         position_margin : float
             Distance to keep from every position limit, as a share of the joint's range.
         acceleration : array_like, shape (n,), optional
-            Acceleration limits [rad/s^2 or m/s^2]. By default a joint reaches its top speed in
-            0.25 s.
+            Acceleration limits [rad/s^2 or m/s^2]. By default, and where one is NaN, a joint
+            reaches its top speed in 0.25 s.
 
         Raises
         ------
@@ -115,14 +120,16 @@ class Limits:
             raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
         span = robot.upper - robot.lower
         margin = position_margin * np.where(np.isfinite(span), span, 0.0)
-        if acceleration is None:
-            acceleration = robot.velocity_limit / TIME_TO_TOP_SPEED
+        top = np.where(has_velocity_limit(robot), robot.velocity_limit, SLOW_VELOCITY)
+        given = (
+            np.full(robot.n_joints, np.nan) if acceleration is None else np.asarray(acceleration)
+        )
         return cls(
             joints=robot.joints,
             lower=robot.lower + margin,
             upper=robot.upper - margin,
-            velocity=share * robot.velocity_limit,
-            acceleration=share * np.asarray(acceleration, dtype=float),
+            velocity=share * top,
+            acceleration=share * np.where(np.isnan(given), top / TIME_TO_TOP_SPEED, given),
             torque=torque_fraction * robot.torque_limit,
             prismatic=robot.prismatic,
         )
@@ -137,6 +144,11 @@ class Limits:
             'acceleration': f'{length}/s^2',
             'torque': 'N' if slides else 'N m',
         }[quantity]
+
+
+def has_velocity_limit(robot: Robot) -> npt.NDArray[np.bool_]:
+    """Return which joints have a finite, positive velocity limit; others get `SLOW_VELOCITY`."""
+    return np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
 
 
 @dataclass(frozen=True)

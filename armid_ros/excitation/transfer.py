@@ -11,7 +11,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.heights import zero_pose
 from armid_ros.excitation.geometry.paths import clear_line, find_path, PathError
-from armid_ros.excitation.limits import check_limits, Limits, SPEED_CLASSES
+from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
@@ -19,9 +19,8 @@ import numpy.typing as npt
 
 #: Largest velocity and acceleration of a quintic from 0 to 1 in unit time.
 _TOP_VELOCITY, _TOP_ACCELERATION = 1.875, 10.0 / np.sqrt(3.0)
-#: What is slow for a joint whatever its limits are: half a metre a second at the end of an arm of
-#: a metre; and the acceleration that goes with it [rad/s, rad/s^2; m/s, m/s^2].
-_SLOW_VELOCITY, _SLOW_ACCELERATION = 0.5, 1.0
+#: What is slow for a joint whatever its limits are, with `SLOW_VELOCITY` [rad/s^2 or m/s^2].
+_SLOW_ACCELERATION = 1.0
 #: Samples of a way at which its torque is looked at; how it is slowed down, and how often.
 _SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
 #: How far beyond a position limit a joint may be measured before it is said to be [rad or m].
@@ -245,7 +244,7 @@ class TransferPlanner:
         limits = self.limits
         assert limits is not None
         way = np.abs(np.diff(poses, axis=0))
-        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, _SLOW_VELOCITY)
+        velocity = np.where(np.isfinite(limits.velocity), limits.velocity, SLOW_VELOCITY)
         needed = np.maximum(
             (_TOP_VELOCITY * way / velocity).max(axis=1),
             np.sqrt(_TOP_ACCELERATION * way / limits.acceleration).max(axis=1),
@@ -289,7 +288,7 @@ def transfer_limits(
     slow = min(1.0, SPEED_CLASSES['slow'] / share)
     return replace(
         run,
-        velocity=np.minimum(run.velocity, np.maximum(slow * run.velocity, _SLOW_VELOCITY)),
+        velocity=np.minimum(run.velocity, np.maximum(slow * run.velocity, SLOW_VELOCITY)),
         acceleration=np.minimum(
             run.acceleration, np.maximum(slow * run.acceleration, _SLOW_ACCELERATION)
         ),

@@ -73,6 +73,7 @@ def excitation_report(
     after: Sequence[str] = (),
     provenance: Provenance | None = None,
     planned: CheckedRun | None = None,
+    floor: Floor | None = None,
 ) -> str:
     """
     Return report.html of a design.
@@ -94,8 +95,10 @@ def excitation_report(
     provenance : Provenance, optional
         Files, versions, settings, seed.
     planned : CheckedRun, optional
-        The design with the way there and back; by default the excitation alone, which is looked
-        at here, without a floor.
+        The design with the way there and back; by default the excitation alone, which is checked
+        here.
+    floor : Floor, optional
+        Floor for that check; by default none.
 
     Returns
     -------
@@ -108,7 +111,8 @@ def excitation_report(
     whole_run = run or excitation
     motion = whole_run.at(np.linspace(0.0, whole_run.duration, _SAMPLES))
     if planned is None:
-        floor = Floor(None, vertical(arm.robot.gravity), 'environment' if obstacles else 'given')
+        source = 'environment' if obstacles else 'given'
+        floor = floor or Floor(None, vertical(arm.robot.gravity), source)
         checked = fitness(motion, limits, collision, floor, obstacles)
     else:
         checked = planned.fitness

@@ -19,6 +19,8 @@ from armid_ros.robots.selection import (
     driven_in_words,
     held_joints,
     HeldJoint,
+    inertia_doubts,
+    joints_beside_arms,
 )
 from armid_ros.robots.shipped import shipped_robots
 
@@ -27,6 +29,8 @@ __all__ = [
     'robot_from_urdf',
     'shipped_robots',
     'driven_in_words',
+    'inertia_doubts',
+    'joints_beside_arms',
     'continuous_joints',
     'held_joints',
     'HeldJoint',

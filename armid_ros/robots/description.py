@@ -316,7 +316,7 @@ class _Reader:
         for name in ('velocity', 'effort'):
             rate = abs(self.number(limit, name, where, math.inf))
             if rate == 0.0:  # noqa: RUF069 - as described
-                self.notes.append(f'{where}: {name} limit 0; taken as unlimited')
+                self.notes.append(f'{where}: {name} limit 0; taken as not given')
                 rate = math.inf
             rates.append(rate)
         if kind == 'continuous':

@@ -135,12 +135,46 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
 
 
+def inertia_doubts(robot: Robot) -> tuple[str, ...]:
+    """Return one line for every link whose described inertia no mass distribution has."""
+    doubts = {
+        link: inertial.doubt()
+        for link, inertial in robot.description.links.items()
+        if inertial is not None
+    }
+    return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
+
+
 def continuous_joints(robot: Robot) -> tuple[str, ...]:
     """Return the driven joints that are described as turning without end."""
     description = robot.description
     return tuple(
         joint for joint in robot.joints if description.by_name[joint].kind == 'continuous'
     )
+
+
+def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
+    """
+    Return the driven joints that belong to no arm: wheels, a head, a torso that carries arms.
+
+    A limb is a chain of driven joints up to a tip, after the last fork. Limbs of fewer than
+    `SHORTEST_ARM` joints are no arms, nor are joints that carry several arms. Nothing is
+    returned for a robot without any arm.
+
+    """
+    description = robot.description
+    carriers = {n: _carriers(description, [description.by_name[n]]) for n in robot.joints}
+    kept = set(robot.joints)
+    while kept:
+        beyond = {j: {k for k in kept if j in carriers[k]} for j in kept}
+        tips = {j for j in kept if not beyond[j]}
+        limbs = {tip: {j for j in kept if (beyond[j] | {j}) & tips == {tip}} for tip in tips}
+        short = {j for limb in limbs.values() if len(limb) < SHORTEST_ARM for j in limb}
+        if not short:
+            arms = set().union(*limbs.values())
+            return tuple(j for j in robot.joints if j not in arms)
+        kept -= short
+    return ()
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:

@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import options
 from armid_ros.cli.excite.files import (
-    CollisionScene,
     ExcitationPlan,
     require_free,
     SCHEMA,
@@ -31,6 +30,7 @@ from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
+    CollisionScene,
     Design,
     design_speeds,
     DesignProblem,
@@ -38,13 +38,14 @@ from armid_ros.excitation import (
     DesignSettings,
     transfer_limits,
     TransferPlanner,
+    with_joint_limits,
 )
 from armid_ros.excitation.fitness import FIT
 from armid_ros.excitation.search.parallel import INTERRUPTED
 from armid_ros.files import json_text
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.motion import FloatArray
-from armid_ros.robots import Robot
+from armid_ros.robots import joints_beside_arms, Robot
 import click
 import numpy as np
 
@@ -71,18 +72,25 @@ def excite(
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
     refuse_other_options(click.get_current_context())
     loaded = robot.load(search.after)
+    others = () if robot.joints else joints_beside_arms(loaded)
+    if others:
+        names = ','.join(joint for joint in loaded.joints if joint not in others)
+        loaded = replace(robot, joints=names).load(search.after)
+        drives = f'{", ".join(others)}; --joints A,B,... drives them'
+        say(f'not driven, as they belong to no arm: {drives}', 'yellow')
+    loaded, acceleration = with_joint_limits(loaded, limits.joint_limits, limits.velocity)
     space = limits.workspace(loaded)
     if motion.kind in COURSES:
         write_course(motion, space, search.seed, out)
         return
     arm, rival = model.arms(loaded)
-    settings = design_settings(loaded, motion, model, limits, search)
+    settings = design_settings(loaded, acceleration, motion, model, limits, search)
     planners = {
         speed: _planner(arm, settings, speed, space) for speed in dict.fromkeys(motion.speeds)
     }
     given = options.per_joint(limits.start, loaded, '--start')
     start, zero_fault = _start(given, planners[motion.speeds[0]])
-    files = tuple(filter(None, (model.model, limits.environment)))
+    files = tuple(filter(None, (model.model, limits.environment, limits.joint_limits)))
     plan = ExcitationPlan(arm, robot.robot_source, space, start, search.after, files, search.seed)
     folders = {s: out if len(motion.speeds) == 1 else out / f'{s}' for s in motion.speeds}
     for folder in folders.values():

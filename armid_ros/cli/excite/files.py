@@ -13,17 +13,15 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.excitation import (
+    CollisionScene,
     Design,
     Excitation,
     Fitness,
     fitness,
-    Floor,
-    Obstacle,
     plan_run,
     Run,
     save_excitation,
     TransferPlanner,
-    with_obstacles,
 )
 from armid_ros.files import json_text, settled, Staged, write_file
 from armid_ros.files.own import is_plan
@@ -31,7 +29,6 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.report.excitation_report import CheckedRun, excitation_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
-from armid_ros.robots import CollisionModel
 import click
 import numpy as np
 
@@ -40,35 +37,6 @@ WAYPOINT_RATE = 50.0
 SCHEMA = 'armid/excitation/1'
 #: Name of the bag.
 BAG = 'trajectory'
-
-
-@dataclass(frozen=True)
-class CollisionScene:
-    """
-    What a motion must not touch.
-
-    Attributes
-    ----------
-    collision : CollisionModel
-        Bodies of the robot.
-    floor : Floor
-        What it stands on.
-    obstacles : sequence of Obstacle
-        What stands around it, the floor among it.
-    clearance : float
-        Between bodies [m].
-
-    """
-
-    collision: CollisionModel
-    floor: Floor
-    obstacles: Sequence[Obstacle]
-    clearance: float
-
-    @property
-    def bodies(self) -> CollisionModel:
-        """Return the bodies of the robot together with what stands around it."""
-        return with_obstacles(self.collision, self.obstacles)
 
 
 @dataclass(frozen=True)

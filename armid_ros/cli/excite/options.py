@@ -9,17 +9,12 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli import options
-from armid_ros.cli.excite.files import CollisionScene, WAYPOINT_RATE
+from armid_ros.cli.excite.files import WAYPOINT_RATE
 from armid_ros.cli.terminal import progress
 from armid_ros.effects import parse_effect
-from armid_ros.excitation import (
-    DesignSettings,
-    find_floor,
-    floor_obstacles,
-    load_environment,
-    whole_period,
-)
-from armid_ros.robots import collision_model, Robot
+from armid_ros.excitation import CollisionScene, DesignSettings, whole_period
+from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 
 #: Of the run-in and the run-out [s], and at most this share of the duration.
 _RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
@@ -103,6 +98,10 @@ class LimitOptions:
     ----------
     start, acceleration, torque_noise : str or None
         Pose, limits and standard deviations, one number or one a joint.
+    joint_limits : Path or None
+        joint_limits.yaml of MoveIt.
+    velocity : tuple of str
+        Velocity limits, 'joint:=value' [rad/s or m/s].
     clearance : float
         Between links [m].
     environment : Path or None
@@ -114,6 +113,8 @@ class LimitOptions:
 
     start: str | None
     acceleration: str | None
+    joint_limits: Path | None
+    velocity: tuple[str, ...]
     torque_noise: str | None
     clearance: float
     environment: Path | None
@@ -122,11 +123,9 @@ class LimitOptions:
     def workspace(self, robot: Robot) -> CollisionScene:
         """Return what the robot must not touch."""
         with progress('reading meshes') as tick:
-            collision = collision_model(robot, progress=tick)
-        around = load_environment(self.environment, robot) if self.environment else ()
-        floor = find_floor(collision, self.floor, around)
-        around = (*around, *floor_obstacles(collision, floor, self.clearance))
-        return CollisionScene(collision, floor, around, self.clearance)
+            return CollisionScene.of(
+                robot, self.clearance, self.floor, self.environment, progress=tick
+            )
 
 
 @dataclass(frozen=True)
@@ -156,6 +155,7 @@ class SearchOptions:
 
 def design_settings(
     robot: Robot,
+    acceleration: FloatArray | None,
     motion: MotionOptions,
     model: ModelOptions,
     limits: LimitOptions,
@@ -171,7 +171,9 @@ def design_settings(
         criterion=motion.criterion,
         target=motion.target,
         focus=tuple(name.partition('@')[0] for name in model.focus.split(',') if name),
-        acceleration=options.per_joint(limits.acceleration, robot, '--acceleration'),
+        acceleration=acceleration
+        if limits.acceleration is None
+        else options.per_joint(limits.acceleration, robot, '--acceleration'),
         noise=options.per_joint(limits.torque_noise, robot, '--torque-noise'),
         clearance=limits.clearance,
         starts=search.starts,

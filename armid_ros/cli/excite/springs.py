@@ -7,11 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli import options
-from armid_ros.cli.excite.files import BAG, CollisionScene, require_free, SCHEMA
+from armid_ros.cli.excite.files import BAG, require_free, SCHEMA
 from armid_ros.cli.excite.options import MotionOptions
 from armid_ros.cli.terminal import say
 from armid_ros.elastic.plant.courses import multisine_course, step_course
-from armid_ros.excitation import Limits, not_checked
+from armid_ros.excitation import CollisionScene, Limits, not_checked
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 import click

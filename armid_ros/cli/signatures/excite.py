@@ -126,6 +126,17 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     help='Limit of each joint [rad/s^2 or m/s^2]; top speed in 0.25 s by default.',
 )
 @click.option(
+    '--joint-limits',
+    type=click.Path(path_type=Path),
+    help='joint_limits.yaml of MoveIt: velocity and acceleration limits.',
+)
+@click.option(
+    '--velocity',
+    multiple=True,
+    metavar='JOINT:=V',
+    help='Velocity limit of a joint [rad/s or m/s]. May be given several times.',
+)
+@click.option(
     '--torque-noise',
     metavar='N[,...]',
     help='Standard deviation at each joint [N m or N]; 1 % of the torque limit by default.',

@@ -134,7 +134,15 @@ def floor_obstacles(
 
 
 def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tuple[str, ...]:
-    """Return the moving links that no pose takes further from the floor than a margin [m]."""
+    """
+    Return the moving links that no pose takes further from the floor than a margin [m].
+
+    Raises
+    ------
+    TrajectoryError
+        If that are all links: the floor is above the arm.
+
+    """
     assert floor.height is not None
     robot = collision.robot
     lower, upper = _range(robot)
@@ -142,7 +150,13 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
     highest: dict[str, FloatArray] = {}
     for link, lowest, _ in link_heights(collision, floor.up, q):
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
-    return tuple(link for link, lowest in highest.items() if lowest.max() < floor.height + margin)
+    touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
+    if len(touching) == len(highest):
+        raise TrajectoryError(
+            f'{robot.name}: no pose takes any link above the floor, {floor}; --floor Z is its '
+            'height above the origin of the base [m]'
+        )
+    return touching
 
 
 def _range(robot: Robot) -> tuple[FloatArray, FloatArray]:

@@ -8,30 +8,28 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
+    CollisionScene,
     design,
     DesignSettings,
     Excitation,
     excitation_faults,
-    find_floor,
-    floor_obstacles,
     Limits,
-    load_environment,
     load_excitation,
-    not_checked,
     SPEED_CLASSES,
     trajectory_faults,
     transfer_limits,
     TransferPlanner,
     whole_period,
-    with_obstacles,
+    with_joint_limits,
 )
+from armid_ros.motion import FloatArray
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.robots import collision_model, CollisionModel, load_robot, Robot
+from armid_ros.robots import CollisionModel, joints_beside_arms, load_robot, Robot
 import numpy as np
 
 Values = Callable[[str], Any]
@@ -42,7 +40,15 @@ _SAMPLES, _PER_HARMONIC = 100, 8
 EXCITATION_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
     NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
-    NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+    NodeParameter(
+        'model',
+        '',
+        'model.yaml of the arm with its payload and friction, for the torque limits; empty: the '
+        'rigid body of the description alone.',
+    ),
+    NodeParameter('joints', [''], 'Driven joints; without names, those of arms.'),
+    NodeParameter('joint_limits', '', 'joint_limits.yaml of MoveIt; empty: none.'),
+    NodeParameter('velocity', [''], 'Velocity limits, joint:=value [rad/s or m/s].'),
     NodeParameter(
         'file',
         '',
@@ -107,6 +113,8 @@ class Surroundings:
         Plans the way to an excitation.
     unchecked : tuple of str
         What cannot be checked.
+    acceleration : ndarray, shape (n,), or None
+        Acceleration limits that are given [rad/s^2 or m/s^2].
 
     """
 
@@ -114,6 +122,7 @@ class Surroundings:
     bodies: CollisionModel
     planner: TransferPlanner
     unchecked: tuple[str, ...]
+    acceleration: FloatArray | None
 
 
 def make_surroundings(value: Values) -> Surroundings:
@@ -133,15 +142,21 @@ def make_surroundings(value: Values) -> Surroundings:
     """
     joints = tuple(filter(None, value('joints'))) or None
     robot = load_robot(value('robot'), gravity=value('gravity'), joints=joints)
-    collision, margin = collision_model(robot), value('clearance')
-    around = load_environment(value('environment'), robot) if value('environment') else ()
-    floor = find_floor(collision, value('floor'), around)
-    around = (*around, *floor_obstacles(collision, floor, margin))
-    bodies = with_obstacles(collision, around)
-    limits = transfer_limits(robot, value('speed'))
-    planner = TransferPlanner(ArmModel(robot), limits, ClearanceModel.of(bodies), margin)
-    unchecked = not_checked(Limits.of(robot, speed=1.0), collision, floor, around)
-    return Surroundings(robot, bodies, planner, unchecked)
+    others = () if joints else joints_beside_arms(robot)
+    if others:
+        driven = [joint for joint in robot.joints if joint not in others]
+        robot = load_robot(value('robot'), gravity=value('gravity'), joints=driven)
+    given = tuple(filter(None, value('velocity')))
+    robot, acceleration = with_joint_limits(robot, value('joint_limits'), given)
+    arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
+    scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
+    bodies = scene.bodies
+    limits = transfer_limits(arm.robot, value('speed'), acceleration)
+    planner = TransferPlanner(arm, limits, ClearanceModel.of(bodies), scene.clearance)
+    unchecked = scene.unchecked
+    if others:
+        unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
+    return Surroundings(arm.robot, bodies, planner, unchecked, acceleration)
 
 
 def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
@@ -166,9 +181,11 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     robot = surroundings.robot
     if value('file'):
         return _loaded(value('file'), surroundings)
-    arm = ArmModel(robot)
+    arm = surroundings.planner.arm
+    own = {effect.name for effect in arm.effects}
     for name in filter(None, value('effects')):
-        arm = arm.with_effect(make_effect(name, robot))
+        if name not in own:
+            arm = arm.with_effect(make_effect(name, robot))
     periods, run_in = value('n_periods'), value('run_in')
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),
@@ -177,6 +194,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
+        acceleration=surroundings.acceleration,
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),

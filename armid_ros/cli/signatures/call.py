@@ -1,0 +1,34 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Calls to a running excitation publisher."""
+
+from __future__ import annotations
+
+from armid_ros.cli.signatures.late import done_by
+import click
+
+
+@click.command(epilog='Example: armid call rehearse')
+@click.argument('action', type=click.Choice(['start', 'rehearse', 'stop', 'speed']))
+@click.argument('share', type=click.FloatRange(0.1, 1.0), required=False)
+@click.option(
+    '--node',
+    default='/excitation_publisher',
+    show_default=True,
+    help='Name of the node, with its namespace.',
+)
+@click.option(
+    '--timeout',
+    type=click.FloatRange(0.0, min_open=True),
+    default=5.0,
+    show_default=True,
+    help='How long to wait for an answer [s].',
+)
+@done_by('call')
+def call() -> None:
+    """
+    Start, rehearse or stop the run of an excitation_publisher, or set its speed.
+
+    SHARE, 0.1 to 1, belongs to speed: the share of the planned speed for the next start.
+
+    """

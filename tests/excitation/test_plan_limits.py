@@ -1,0 +1,95 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A plan never takes a missing, mistyped or foreign limit for a licence."""
+
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import CollisionScene, Limits, with_joint_limits
+from armid_ros.excitation.limits import SLOW_VELOCITY, TIME_TO_TOP_SPEED
+from armid_ros.robots import inertia_doubts, joints_beside_arms, robot_from_urdf
+import numpy as np
+import pytest
+
+from .conftest import urdf
+
+
+def arm_urdf(name='small', limit=2.0):
+    """Write an arm of three joints that stands."""
+    return urdf(
+        ('waist', 'revolute', 'base', 'a', '0 0 0.5', '0 0 1', -limit, limit, 200),
+        ('shoulder', 'revolute', 'a', 'b', '0 0 0.4', '0 1 0', -1, 1, 100),
+        ('elbow', 'revolute', 'b', 'c', '0 0 0.4', '0 1 0', -1, 1, 50),
+        name=name,
+    )
+
+
+@pytest.mark.parametrize('given', ['velocity="0"', '', 'velocity="inf"'])
+def test_a_joint_without_a_velocity_limit_is_slow_and_that_is_said(given):
+    text = arm_urdf().replace('velocity="2"', given, 1)
+    robot = robot_from_urdf(text)
+    limits = Limits.of(robot, speed=1.0)
+    np.testing.assert_allclose(limits.velocity, [SLOW_VELOCITY, 2.0, 2.0])
+    np.testing.assert_allclose(limits.acceleration, limits.velocity / TIME_TO_TOP_SPEED)
+    assert any('velocity of waist' in line for line in CollisionScene.of(robot, 0.01).unchecked)
+    mended, _ = with_joint_limits(robot, velocity=['waist:=1.5'])
+    assert Limits.of(mended, speed=1.0).velocity[0] == 1.5
+    assert not any('velocity' in line for line in CollisionScene.of(mended, 0.01).unchecked)
+
+
+@pytest.mark.parametrize(
+    'text', ['waist', 'wrist:=1', 'waist:=0', 'waist:=-1', 'waist:=nan', 'waist:=']
+)
+def test_a_velocity_that_is_none_is_refused(text):
+    with pytest.raises(TrajectoryError, match='waist'):
+        with_joint_limits(robot_from_urdf(arm_urdf()), velocity=[text])
+
+
+def test_limits_in_degrees_are_asked_about():
+    with pytest.raises(TrajectoryError, match=r'waist.*160.*degrees'):
+        CollisionScene.of(robot_from_urdf(arm_urdf(limit=160.0)), 0.01)
+
+
+def test_moveit_limits_are_read(tmp_path):
+    path = tmp_path / 'joint_limits.yaml'
+    path.write_text(
+        'joint_limits:\n'
+        '  waist: {has_velocity_limits: true, max_velocity: 1.0, has_acceleration_limits: true, '
+        'max_acceleration: 3.0}\n'
+        '  shoulder: {has_velocity_limits: true, max_velocity: 9.0, has_acceleration_limits: '
+        'false, max_acceleration: 0}\n'
+    )
+    robot, acceleration = with_joint_limits(robot_from_urdf(arm_urdf()), path)
+    limits = Limits.of(robot, speed=1.0, acceleration=acceleration)
+    np.testing.assert_allclose(limits.velocity, [1.0, 2.0, 2.0])
+    np.testing.assert_allclose(limits.acceleration, [3.0, 8.0, 8.0])
+    path.write_text('joint_limits: {waist: {has_acceleration_limits: true}}')
+    with pytest.raises(TrajectoryError, match='waist: max_acceleration'):
+        with_joint_limits(robot, path)
+
+
+def test_wheels_head_and_torso_belong_to_no_arm():
+    parts = [('torso', 'revolute', 'base', 'trunk', '0 0 0.5', '0 0 1', -1, 1, 200)]
+    parts += [
+        (f'wheel{k}', 'continuous', 'base', f'tyre{k}', f'{k} 0 0', '0 1 0', 0, 0, 9)
+        for k in range(2)
+    ]
+    parts.append(('head', 'revolute', 'trunk', 'skull', '0 0 0.5', '0 0 1', -1, 1, 9))
+    arms = []
+    for side in ('left', 'right'):
+        parent = 'trunk'
+        for k in range(3):
+            name = f'{side}{k}'
+            parts.append((name, 'revolute', parent, f'{name}_link', '0 0 0.3', '0 1 0', -1, 1, 9))
+            parent = f'{name}_link'
+            arms.append(name)
+    robot = robot_from_urdf(urdf(*parts))
+    assert set(robot.joints) - set(joints_beside_arms(robot)) == set(arms)
+    one = [part for part in parts if not part[0].startswith('left')]
+    robot = robot_from_urdf(urdf(*one))
+    assert set(joints_beside_arms(robot)) == {'wheel0', 'wheel1', 'head'}
+    assert joints_beside_arms(robot_from_urdf(urdf(*parts[1:3]))) == ()
+
+
+def test_an_impossible_inertia_is_named_with_its_link():
+    text = arm_urdf().replace('iyy="0.03"', 'iyy="0.025"').replace('iyy="0.025"', 'iyy="0.3"', 1)
+    (line,) = inertia_doubts(robot_from_urdf(text))
+    assert "'a'" in line

@@ -1,0 +1,116 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A plan keeps limits, floor and clearance at 1 kHz, by code of its own."""
+
+from importlib.metadata import files
+from pathlib import Path
+
+from armid_ros.arm import ArmModel
+from armid_ros.excitation import (
+    ClearanceModel,
+    CollisionScene,
+    design,
+    DesignSettings,
+    plan_run,
+    transfer_limits,
+    TransferPlanner,
+)
+from armid_ros.robots import load_robot
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+QUICK = ()
+SLOW = (
+    'ur5_robot',
+    'ur3_robot', 'ur10_robot', 'ur3e_robot', 'ur5e_robot', 'ur10e_robot', 'panda', 'fr3',
+    'kinova', 'gen3_robotiq_2f_85', 'iiwa14', 'z1',
+)  # fmt: skip
+#: Height at which the floor itself is, without the clearance that plans keep [m].
+FLOOR = 0.0
+
+
+def shipped(name):
+    paths = [p for p in files('example-robot-data') or () if p.name == f'{name}.urdf']
+    if not paths:
+        pytest.skip(f'{name}.urdf is not shipped')
+    return Path(paths[0].locate())
+
+
+def planned(path):
+    robot = load_robot(path)
+    arm, scene = ArmModel(robot), CollisionScene.of(robot, 0.01)
+    settings = DesignSettings(
+        period=4.0, harmonics=3, samples=60, n_periods=1, run_in=1.0, speed='fast', starts=1,
+        iterations=2, time_budget=60.0, processes=1,
+    )  # fmt: skip
+    found = design(arm, settings, np.random.default_rng(0), collision=scene.bodies)
+    clearance = ClearanceModel.of(scene.bodies)
+    planner = TransferPlanner(arm, transfer_limits(robot), clearance, scene.clearance)
+    start, _ = planner.free_start()
+    return robot, plan_run(found.excitation, planner, start, 100.0)
+
+
+def geometry(path, model, driven):
+    """Return the meshes with all pairs that do not touch by construction, and the floor."""
+    roots = [str(parent) for parent in path.parents]
+    bodies = pin.buildGeomFromUrdf(
+        model, str(path), pin.GeometryType.COLLISION, package_dirs=roots
+    )
+    bodies.addAllCollisionPairs()
+    still = bodies.createData()
+    pin.computeCollisions(model, model.createData(), bodies, still, pin.neutral(model), False)
+    touching = [k for k, result in enumerate(still.collisionResults) if result.isCollision()]
+    for pair in [bodies.collisionPairs[k].copy() for k in touching]:
+        bodies.removeCollisionPair(pair)
+    for pair in [p.copy() for p in bodies.collisionPairs]:
+        one, other = (
+            int(bodies.geometryObjects[k].parentJoint) for k in (pair.first, pair.second)
+        )
+        if one == other or int(model.parents[max(one, other)]) == min(one, other):
+            bodies.removeCollisionPair(pair)
+    half = coal.Halfspace(np.array([0.0, 0.0, 1.0]), FLOOR)
+    floor = bodies.addGeometryObject(pin.GeometryObject('floor', 0, 0, pin.SE3.Identity(), half))
+    first = model.getJointId(driven[0])
+    for k, body in enumerate(bodies.geometryObjects):
+        if int(body.parentJoint) > first:
+            bodies.addCollisionPair(pin.CollisionPair(k, floor))
+    return bodies
+
+
+def violations(path, robot, run):
+    """Return what the run does that the URDF forbids."""
+    model = pin.buildModelFromUrdf(str(path))
+    free = [model.names[j] for j in range(1, model.njoints) if model.names[j] not in robot.joints]
+    model = pin.buildReducedModel(
+        model, [model.getJointId(name) for name in free], pin.neutral(model)
+    )
+    assert list(model.names)[1:] == list(robot.joints)
+    if model.nq != model.nv:
+        pytest.skip('continuous joints have another state in Pinocchio')
+    motion = run.at(np.arange(0.0, run.duration, 1e-3))
+    found = []
+    if np.any(motion.q < model.lowerPositionLimit) or np.any(motion.q > model.upperPositionLimit):
+        found.append('position')
+    if np.any(np.abs(np.diff(motion.q, axis=0)) > 1e-3 * model.velocityLimit):
+        found.append('velocity')
+    if np.any(np.abs(np.diff(motion.q, 2, axis=0)) > 1.01e-6 * model.velocityLimit / 0.25):
+        found.append('acceleration')
+    data, bodies = model.createData(), geometry(path, model, robot.joints)
+    near = bodies.createData()
+    for q, dq, ddq in zip(motion.q, motion.dq, motion.ddq, strict=True):
+        if np.any(np.abs(pin.rnea(model, data, q, dq, ddq)) > model.effortLimit):
+            found.append('torque')
+        if pin.computeCollisions(model, data, bodies, near, q, True):
+            found.append('collision')
+    return found
+
+
+@pytest.mark.parametrize(
+    'name', [*QUICK, *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
+)
+def test_a_plan_keeps_everything_at_a_kilohertz(name):
+    path = shipped(name)
+    robot, run = planned(path)
+    assert violations(path, robot, run) == []
