@@ -238,7 +238,8 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
     positions = recording.q
     if recording.partner is not None:
         positions = np.hstack([positions, recording.partner.q])
-    measured = np.where(np.max(np.abs(recording.tau), axis=0) < NOTHING, 0.0, recording.tau)
+    nothing, measured = np.max(np.abs(recording.tau), axis=0) < NOTHING, recording.tau
+    measured = np.where(nothing, 0.0, measured) if nothing.any() else measured
     period = 1.0 / used.rate_hz
     for part in unbroken(recording, used.rate_hz):
         if len(part) >= _LEAST_SAMPLES and np.ptp(recording.t[part]) > _shortest(used):
