@@ -181,7 +181,7 @@ class MotionGate:
         """
         beyond = np.nan_to_num(np.abs(effort)) - factor * self.effort
         j = int(np.argmax(beyond))
-        if factor == 0.0 or self.effort[j] == 0.0 or beyond[j] <= 0.0:
+        if factor == 0.0 or self.effort[j] == 0.0 or beyond[j] <= 0.0:  # noqa: RUF069 - as it is written
             return ''
         return (
             f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "

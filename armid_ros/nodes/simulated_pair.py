@@ -116,7 +116,7 @@ class SimulatedPairNode(ArmidNode):
         if not self.pair.fallen:
             factor = self.value('real_time_factor')
             skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
-            if factor == 1.0:  # stamps stay those of the computer
+            if factor == 1.0:  # stamps stay those of the computer  # noqa: RUF069 - as it is written
                 self._origin_ns += round(skipped * 1e9)
 
     def reset(self) -> str:

@@ -85,7 +85,7 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
         geom.material = ''
         if geom.meshname in missing:
             body, file = geom.parent, missing[geom.meshname].file
-            if not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0:
+            if not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0:  # noqa: RUF069 - as it is written
                 raise RobotError(
                     f"{path}: the inertia of body '{body.name}' is that of the mesh {file}, which "
                     f'is not in {folder}'
@@ -250,7 +250,7 @@ class _Writer:
             if kind != self.mujoco.mjtEq.mjEQ_JOINT or follows != joint or leader < 0:
                 continue
             constant, factor, *others = model.eq_data[number, :5]
-            if np.any(np.array(others) != 0.0):
+            if np.any(np.array(others) != 0.0):  # noqa: RUF069 - as it is written
                 self.notes.append(f"joint '{self.joints[joint]}': its equality is not linear")
                 continue
             zero, zero_of_leader = (model.qpos0[model.jnt_qposadr[j]] for j in (joint, leader))

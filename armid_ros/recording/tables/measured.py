@@ -104,8 +104,8 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
         return np.arange(len(plan.table)) / plan.rate_hz, 0
     scale = TIME_UNITS[plan.time_unit]
     values = np.where(np.abs(plan.time.values * scale) < _LATEST, plan.time.values, np.nan)
-    stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))
-    if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:
+    stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))  # noqa: RUF069 - as it is written
+    if len(stamped) and np.count_nonzero(values[: stamped[0]] == 0.0) > 1:  # noqa: RUF069 - as it is written
         values[: stamped[0]] = np.nan  # simulation time before /clock
     there = values[np.isfinite(values)]
     if not len(there):
