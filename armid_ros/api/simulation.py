@@ -100,9 +100,7 @@ class ExcitationResult(Shown):
             self.core,
             self.arm,
             robot=robot.name,
-            collision=self.scene.collision,
-            obstacles=self.scene.obstacles,
-            floor=self.scene.floor,
+            scene=self.scene,
         )
         write_file(Path(path), page)
         return Path(path)

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
+    CollisionScene,
     CRITERIA,
     Design,
     DesignSettings,
     Fitness,
     fitness,
-    Floor,
     Limits,
     Obstacle,
     obstacles_alone,
@@ -24,7 +24,6 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT, UNFIT
-from armid_ros.excitation.geometry.heights import vertical
 from armid_ros.motion import FloatArray
 from armid_ros.report.families import effects_in_words, full_label
 from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
@@ -39,7 +38,6 @@ from armid_ros.report.sections.plan import (
     PlannedMotion,
 )
 from armid_ros.report.silhouettes import draw_silhouettes
-from armid_ros.robots import CollisionModel
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
@@ -68,12 +66,10 @@ def excitation_report(
     arm: ArmModel,
     *,
     robot: str,
-    collision: CollisionModel,
-    obstacles: Sequence[Obstacle] = (),
+    scene: CollisionScene,
     after: Sequence[str] = (),
     provenance: Provenance | None = None,
     planned: CheckedRun | None = None,
-    floor: Floor | None = None,
 ) -> str:
     """
     Return report.html of a design.
@@ -86,10 +82,8 @@ def excitation_report(
         Prior model, for the torque.
     robot : str
         Shipped name or path of the description.
-    collision : CollisionModel
-        Bodies of the arm.
-    obstacles : sequence of Obstacle
-        What stands around it.
+    scene : CollisionScene
+        Bodies of the arm, its floor, and what stands around it.
     after : sequence of str
         Recordings that the design adds to.
     provenance : Provenance, optional
@@ -97,8 +91,6 @@ def excitation_report(
     planned : CheckedRun, optional
         The design with the way there and back; by default the excitation alone, which is checked
         here.
-    floor : Floor, optional
-        Floor for that check; by default none.
 
     Returns
     -------
@@ -110,10 +102,9 @@ def excitation_report(
     run = None if planned is None else planned.run
     whole_run = run or excitation
     motion = whole_run.at(np.linspace(0.0, whole_run.duration, _SAMPLES))
+    collision, obstacles = scene.collision, scene.obstacles
     if planned is None:
-        source = 'environment' if obstacles else 'given'
-        floor = floor or Floor(None, vertical(arm.robot.gravity), source)
-        checked = fitness(motion, limits, collision, floor, obstacles)
+        checked = fitness(motion, limits, collision, scene.floor, obstacles)
     else:
         checked = planned.fitness
     motion = replace(motion, tau=arm.joint_torque(motion))

@@ -8,6 +8,7 @@ from pathlib import Path
 import re
 
 from armid_ros.excitation import (
+    CollisionScene,
     DesignProblem,
     DesignSettings,
     evaluate,
@@ -41,14 +42,19 @@ def planned(case):
     )
 
 
+def scene_of(robot, *obstacles):
+    """Return a robot without a floor, among obstacles."""
+    floor = Floor(None, np.array([0.0, 0.0, 1.0]), 'given')
+    return CollisionScene(collision_model(robot), floor, obstacles, 0.01)
+
+
 @pytest.fixture(scope='module')
 def html(case, planned):
     return excitation_report(
         planned,
         case.truth,
         robot='humanoid_arm',
-        collision=collision_model(case.truth.robot),
-        obstacles=[TABLE],
+        scene=scene_of(case.truth.robot, TABLE),
     )
 
 
@@ -100,9 +106,7 @@ def test_what_the_run_does_not_show_comes_first(case, planned):
     matrix = planned.information.matrix.copy()
     matrix[0], matrix[:, 0] = 0.0, 0.0
     blind = replace(planned, information=replace(planned.information, matrix=matrix))
-    page = excitation_report(
-        blind, case.truth, robot='r', collision=collision_model(case.truth.robot)
-    )
+    page = excitation_report(blind, case.truth, robot='r', scene=scene_of(case.truth.robot))
     assert 'Not seen at all: ' in page and '>blind<' in page
 
 

@@ -155,8 +155,7 @@ def _write_page(
             result,
             plan.arm,
             robot=plan.robot,
-            collision=plan.workspace.collision,
-            obstacles=plan.workspace.obstacles,
+            scene=plan.workspace,
             after=[str(bag) for bag in plan.after],
             provenance=Provenance(
                 files=hash_files([plan.robot, *plan.after, *plan.files]),

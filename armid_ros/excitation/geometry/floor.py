@@ -151,7 +151,7 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
     for link, lowest, _ in link_heights(collision, floor.up, q):
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
     touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
-    if len(touching) == len(highest):
+    if all(lowest.max() < floor.height for lowest in highest.values()):
         raise TrajectoryError(
             f'{robot.name}: no pose takes any link above the floor, {floor}; --floor Z is its '
             'height above the origin of the base [m]'
