@@ -76,22 +76,26 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
 @contextmanager
 def _embedded(workers: int | None) -> Iterator[Client]:
     count = workers or len(os.sched_getaffinity(0))
+    before = os.environ.get('PYTHONSAFEPATH', '')
     os.environ['PYTHONSAFEPATH'] = '1'  # no worker runs a module of the current folder
-    with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
-        with (
-            dask.config.set(_QUIET),
-            LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                memory_limit=WORKER_MEMORY,
-                dashboard_address='127.0.0.1:0',
-                local_directory=folder,
-                silence_logs=logging.CRITICAL,
-            ) as cluster,
-            Client(cluster) as client,
-            _kept_up(cluster, count),
-        ):
-            yield client
+    try:
+        with tempfile.TemporaryDirectory(prefix='armid-fleet-') as folder:
+            with (
+                dask.config.set(_QUIET),
+                LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    memory_limit=WORKER_MEMORY,
+                    dashboard_address='127.0.0.1:0',
+                    local_directory=folder,
+                    silence_logs=logging.CRITICAL,
+                ) as cluster,
+                Client(cluster) as client,
+                _kept_up(cluster, count),
+            ):
+                yield client
+    finally:
+        os.environ['PYTHONSAFEPATH'] = before
 
 
 @contextmanager

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
-from armid_ros.excitation import Excitation, FourierTrajectory, Halt, Rehearsal
+from armid_ros.excitation import Excitation, FourierTrajectory, Rehearsal
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
@@ -58,14 +58,3 @@ def test_long_rehearsals_keep_a_bounded_number_of_samples(arm, run):
     report = rehearsed(arm, run, off=0.02, count=20_000).report()
     assert 1000 < report.samples < 4000
     np.testing.assert_allclose(report.tracking, 0.02, atol=1e-12)
-
-
-def test_an_arm_that_moves_after_its_time_is_not_at_rest():
-    halt, said = Halt(1.0, 1, -np.inf, np.zeros(2)).looked(0.9, np.zeros(2))
-    assert said is None
-    halt, said = halt.looked(1.1, np.zeros(2))
-    assert said is None
-    halt, said = halt.looked(1.3, np.array([0.0, 0.05]))
-    assert said is False
-    halt, said = halt.looked(1.5, np.array([0.0, 0.05]))
-    assert said is True

@@ -175,13 +175,13 @@ class Controller:
 
     """
 
-    def __init__(self, bench, robot, q, quality=STREAM, *, action=False):
+    def __init__(self, bench, robot, q, quality=STREAM, *, action=False, now=99.4):
         self.faults = Faults()
         self.accepted, self.refused, self.goals, self.ends = [], [], [], []
         self.active, self.from_desired, self.scaling = True, False, 1.0
         self.interfaces = {'position', 'velocity', 'effort'}
         self.path_tolerance = self.goal_tolerance = self.goal_time_tolerance = 0.0
-        self.now, self.q = 99.4, np.array(q, dtype=float)
+        self.now, self.q = now, np.array(q, dtype=float)
         self._bench, self._robot, self._model = bench, robot, ArmModel(robot)
         self._course, self._count, self._goal = None, 0, None
         self._begun, self._held, self._behind = self.now, True, 0.0

@@ -68,7 +68,7 @@ def test_every_call_is_answered_by_the_node(publisher):
 def test_without_a_node_the_error_names_the_service(action):
     answer = call(*action, '--timeout', '0.2')
     assert answer.exit_code == 2
-    assert '/left/publisher/' in answer.output
+    assert '/left/publisher' in answer.output
 
 
 @pytest.mark.parametrize('wrong', [['speed'], ['start', '0.5'], ['speed', '2']])

@@ -49,7 +49,7 @@ class Client:
 
 @pytest.fixture
 def client(bench):
-    client = Client(bench, Controller(bench, ROBOT, HOME, action=True))
+    client = Client(bench, Controller(bench, ROBOT, HOME, action=True, now=100.0))
     yield client
     client.close()
 

@@ -28,6 +28,8 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
+#: Factor of all torques from which they are in another unit: a load that is put down makes less.
+_GAINS = 4.0
 #: Half of the readings of a joint at so many times the limit of its drive are in another unit: the
 #: smallest factor of one is a hundred, of which this is half in the logarithm, and no drive gives
 #: as much.
@@ -122,7 +124,7 @@ def factors_apart(
     factors = _since(arm, motions, before)
     clear = np.flatnonzero(factors > 0.0).tolist()
     in_unit = [unit in units_near(factors[k], _NEAR_SINCE) for k in clear]
-    if all(in_unit) or all(1.0 / NEAR < factors[k] < NEAR for k in clear):
+    if all(in_unit) or any(1.0 / _GAINS < factors[k] < _GAINS for k in clear):
         return ''
     named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear)
     common = float(np.exp(np.mean(np.log(factors[clear]))))
