@@ -152,8 +152,10 @@ def test_a_publisher_that_is_ended_stops_the_arm(bench, processes, tmp_path, num
         'excitation_publisher',
         f'file:={tmp_path / "run.yaml"}',
         'simulation:=true',
+        'start:=false',
         'approach:=60.0',
     )
+    bench.spin_until(lambda: bench.call('excitation_publisher/start').success, 'the start')
     bench.spin_until(lambda: heard, 'the run')
     errors = processes.end(excitation, number, number)
     assert excitation.returncode == 0 and 'Traceback' not in errors, errors
