@@ -124,7 +124,7 @@ def factors_apart(
     factors = _since(arm, motions, before)
     clear = np.flatnonzero(factors > 0.0).tolist()
     in_unit = [unit in units_near(factors[k], _NEAR_SINCE) for k in clear]
-    if all(in_unit) or any(1.0 / _GAINS < factors[k] < _GAINS for k in clear):
+    if all(in_unit) or all(1.0 / _GAINS < factors[k] < _GAINS for k in clear):
         return ''
     named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear)
     common = float(np.exp(np.mean(np.log(factors[clear]))))
