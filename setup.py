@@ -9,6 +9,7 @@ from setuptools import find_packages, setup
 
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
+PLUG_INS = (Path(NAME, 'fleet'), *sorted(Path(NAME, 'papers').glob('*/')))
 NODES = sorted(path.name for path in (HERE / 'scripts').iterdir() if path.name != 'armid')
 
 
@@ -23,6 +24,18 @@ def package_data():
     """List what lies in the package's tree and is not Python."""
     files = sorted(path for path in Path(NAME).rglob('*') if path.is_file())
     return [str(path.relative_to(NAME)) for path in files if path.suffix not in ('.py', '.pyc')]
+
+
+def commands():
+    """List the command of every plug-in that is there: of its name, in its command.py."""
+    found = [path for path in PLUG_INS if (path / 'command.py').is_file()]
+    return [f'{path.name} = {".".join(path.parts)}.command:{path.name}' for path in found]
+
+
+def nodes():
+    """List the nodes of the plug-ins that are there, by the names of their modules."""
+    found = [path for folder in PLUG_INS for path in sorted(folder.glob('nodes/[!_]*.py'))]
+    return [f'{path.stem} = {".".join(path.with_suffix("").parts)}' for path in found]
 
 
 def shared(folder):
@@ -73,6 +86,8 @@ setup(
         'console_scripts': [
             f'armid = {NAME}.cli:main',
             *(f'{node} = {NAME}.cli.node:main' for node in NODES),
-        ]
+        ],
+        f'{NAME}.commands': commands(),
+        f'{NAME}.nodes': nodes(),
     },
 )

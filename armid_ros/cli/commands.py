@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from armid_ros.cli.node import lacking
 from armid_ros.errors import ArmidError, visible
+from armid_ros.plug_ins import load_plug_in, plug_ins
 from armid_ros.version import __version__
 import click
 from click.shell_completion import CompletionItem
@@ -36,7 +37,7 @@ class Listed(NamedTuple):
     summary: str
 
 
-#: The commands in the order of the work.
+#: The commands of the core in the order of the work; plug-ins add theirs.
 COMMANDS = {
     'demo': Listed(
         'demo',
@@ -61,7 +62,6 @@ COMMANDS = {
         'Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures.',
     ),
     'compare': Listed('compare', 'Say what changed between two identifications of one robot.'),
-    'fleet': Listed('fleet', 'Identify, watch and diagnose many arms with many bags.'),
     'recover': Listed(
         'record',
         'Make a recording whole whose writer was killed; the file itself is left as it is.',
@@ -89,23 +89,23 @@ class Commands(click.Group):
     """Imports commands late, and reports bad input as one line on stderr and exit code 2."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """List the commands in the order of the work."""
-        return list(COMMANDS)
+        """List the commands in the order of the work, those of plug-ins last."""
+        return [*COMMANDS, *sorted(plug_ins('commands').keys() - COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import a command."""
-        if cmd_name not in COMMANDS:
-            return None
-        return _imported(cmd_name)
+        if cmd_name in COMMANDS or cmd_name in plug_ins('commands'):
+            return _imported(cmd_name)
+        return None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with what they do, without importing them."""
+        """List the commands with what they do; those of the core are not imported."""
         with formatter.section('Commands'):
-            formatter.write_dl([(name, entry.summary) for name, entry in COMMANDS.items()])
+            formatter.write_dl([(name, _summary(name)) for name in self.list_commands(ctx)])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command without importing all of them, or an option."""
-        names = [CompletionItem(name) for name in COMMANDS if name.startswith(incomplete)]
+        names = [CompletionItem(name) for name in self.list_commands(ctx) if name.startswith(incomplete)]
         return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -142,10 +142,24 @@ def _tell_notes(context: click.Context) -> None:
 @cache
 def _imported(name: str) -> click.Command:
     """Import a command; no option of it takes a number that is not finite."""
-    module = import_module(f'armid_ros.cli.signatures.{COMMANDS[name].module}')
-    command: click.Command = getattr(module, name)
+    command: click.Command
+    if name in COMMANDS:
+        module = import_module(f'armid_ros.cli.signatures.{COMMANDS[name].module}')
+        command = getattr(module, name)
+    else:
+        command = load_plug_in(plug_ins('commands')[name])
     _refuse_infinite(command)
     return command
+
+
+def _summary(name: str) -> str:
+    """Return the first sentence of the help of a command; of one that is broken, its error."""
+    if name in COMMANDS:
+        return COMMANDS[name].summary
+    try:
+        return _imported(name).get_short_help_str(1000)
+    except (ArmidError, ModuleNotFoundError) as error:
+        return str(error)
 
 
 def _refuse_infinite(command: click.Command) -> None:

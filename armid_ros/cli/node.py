@@ -5,8 +5,11 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 import sys
+
+from armid_ros.plug_ins import load_plug_in, plug_ins
 
 #: Modules of ROS 2 that the nodes import.
 _ROS = (
@@ -26,18 +29,22 @@ _ROS = (
 )
 
 
-def main() -> None:
-    """Run the node that the executable is called after."""
-    name = Path(sys.argv[0]).name
+def main(name: str | None = None) -> int | None:
+    """Run a node of the core or of a plug-in, by default that which the executable is named."""
+    name = name or Path(sys.argv[0]).name
     try:
-        node = import_module(f'armid_ros.nodes.{name}')
+        if find_spec(f'armid_ros.nodes.{name}') is None and name in plug_ins('nodes'):
+            node = load_plug_in(plug_ins('nodes')[name])
+        else:
+            node = import_module(f'armid_ros.nodes.{name}')
     except ModuleNotFoundError as error:
         said = lacking(error)
         if said is None:
             raise
         print(f'{name}: {said}', file=sys.stderr)
         raise SystemExit(2) from None
-    node.main()
+    code: int | None = node.main()
+    return code
 
 
 def lacking(error: ModuleNotFoundError) -> str | None:

@@ -96,7 +96,7 @@ def fleet() -> None:
 @click.option('--resume', is_flag=True, help='Leave out what earlier runs have done.')
 @options.reading
 @options.as_json
-@done_by('fleet')
+@done_by('armid_ros.fleet.work')
 def identify() -> None:
     """Identify every arm of a fleet from its bags."""
 
@@ -105,7 +105,7 @@ def identify() -> None:
 @_out
 @_alpha
 @options.as_json
-@done_by('fleet')
+@done_by('armid_ros.fleet.work')
 def watch() -> None:
     """Find changes and wear over time, and draw the overview."""
 
@@ -118,7 +118,7 @@ def watch() -> None:
 @click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
 @_alpha
 @options.as_json
-@done_by('fleet')
+@done_by('armid_ros.fleet.work')
 def diagnose() -> None:
     """Name what has happened to arms, each with its own past as baseline."""
 
@@ -134,6 +134,6 @@ def diagnose() -> None:
     help='As on the page of the arm, or a URL; those beside its change and the latest, if none.',
 )
 @options.as_json
-@done_by('fleet')
+@done_by('armid_ros.fleet.work')
 def report() -> None:
     """Make the reports of bags of an arm, and link them on its page."""

@@ -24,7 +24,7 @@ from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, Watche
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits, with_interval
 from armid_ros.report.page import Page, Section
-from armid_ros.report.sections.fleet import (
+from armid_ros.fleet.sections import (
     ArmRow,
     Arms,
     Bags,

@@ -72,7 +72,8 @@ class Arms(Section):
     """
 
     title: ClassVar[str] = 'Arms'
-    template: ClassVar[str] = 'fleet_arms.html'
+    package: ClassVar[str] = 'armid_ros.fleet'
+    template: ClassVar[str] = 'arms.html'
 
     heads: Sequence[str]
     rows: Sequence[ArmRow]
@@ -105,7 +106,8 @@ class ParameterCurves(Section):
     """All parameters of an arm over time, those that have changed first."""
 
     title: ClassVar[str] = 'Parameters over time'
-    template: ClassVar[str] = 'fleet_series.html'
+    package: ClassVar[str] = 'armid_ros.fleet'
+    template: ClassVar[str] = 'series.html'
 
     curves: Sequence[Curve]
 
@@ -128,7 +130,8 @@ class TableRow:
 
 @dataclass(frozen=True)
 class _Table(Section):
-    template: ClassVar[str] = 'fleet_table.html'
+    package: ClassVar[str] = 'armid_ros.fleet'
+    template: ClassVar[str] = 'table.html'
 
     heads: Sequence[str]
     rows: Sequence[TableRow]

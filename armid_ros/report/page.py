@@ -34,11 +34,14 @@ class Section(ABC):
         Heading; empty for none.
     template : str
         Name of the file in templates/.
+    package : str
+        Where templates/ is: a plug-in brings its own.
 
     """
 
     title: ClassVar[str]
     template: ClassVar[str]
+    package: ClassVar[str] = 'armid_ros.report'
 
     @property
     def anchor(self) -> str:
@@ -47,7 +50,7 @@ class Section(ABC):
 
     def html(self) -> Markup:
         """Return the section as HTML, everything in it escaped."""
-        return render(self.template, {'section': self})
+        return render(self.template, {'section': self}, self.package)
 
 
 @dataclass(frozen=True)
@@ -91,15 +94,15 @@ def _visible(text: str) -> str:
     return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], text)
 
 
-def render(template: str, values: Mapping[str, Any]) -> Markup:
-    """Return a template of templates/ with values filled in and escaped."""
-    return Markup(_environment().get_template(template).render(values))
+def render(template: str, values: Mapping[str, Any], package: str = 'armid_ros.report') -> Markup:
+    """Return a template of the templates/ of a package with values filled in and escaped."""
+    return Markup(_environment(package).get_template(template).render(values))
 
 
 @cache
-def _environment() -> Environment:
+def _environment(package: str) -> Environment:
     environment = Environment(
-        loader=PackageLoader('armid_ros.report'),
+        loader=PackageLoader(package),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 import armid_ros as ar
-from armid_ros.cli.commands import COMMANDS
+from armid_ros.cli import main
 from armid_ros.effects import CATALOGUE
 import pytest
 
@@ -54,7 +54,7 @@ def test_links_to_files_and_places_that_are_not_there_are_noticed(tmp_path):
 def test_the_reference_has_every_name_command_node_and_effect(site):
     for page, names in (
         ('python', ar.__all__),
-        ('commands', COMMANDS),
+        ('commands', main.list_commands(None)),
         ('nodes', NODES),
         ('effects', CATALOGUE),
     ):

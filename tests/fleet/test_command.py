@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.fleet import generate, ROBOT
 
-from .conftest import armid
+from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow
 

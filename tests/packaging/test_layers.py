@@ -12,8 +12,8 @@ import tomllib
 import pytest
 
 LAYERS = (
+    ('fleet', 'papers'),
     ('cli',),
-    ('fleet',),
     ('nodes',),
     ('live',),
     ('elastic', 'pair'),
@@ -30,6 +30,7 @@ LAYERS = (
     ('estimate',),
     ('motion',),
     ('files',),
+    ('plug_ins',),
     ('errors', 'version'),
 )
 

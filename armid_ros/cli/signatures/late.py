@@ -19,15 +19,15 @@ def done_by(module: str) -> Callable[[Callable[[], None]], Callable[..., Any]]:
     Parameters
     ----------
     module : str
-        Below `armid_ros.cli`; imported when the command is run.
+        Below `armid_ros.cli`, or of a plug-in, by its full name; imported when the command is run.
 
     """
 
     def decorate(command: Callable[[], None]) -> Callable[..., Any]:
+        home = module if module.startswith('armid_ros.') else f'armid_ros.cli.{module}'
+
         def work() -> Callable[..., Any]:
-            found: Callable[..., Any] = getattr(
-                import_module(f'armid_ros.cli.{module}'), command.__name__
-            )
+            found: Callable[..., Any] = getattr(import_module(home), command.__name__)
             return found
 
         @wraps(command)
