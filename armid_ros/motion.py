@@ -145,3 +145,30 @@ class Motion:
     def with_torque(self, tau: npt.ArrayLike | None) -> Motion:
         """Return the same motion with another torque, shape (N, n) [N m]."""
         return replace(self, tau=None if tau is None else read_only(tau))
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticRun:
+    """
+    What happened, or what was measured, during one experiment.
+
+    Attributes
+    ----------
+    motor, link : Motion
+        Motion of either side, that of the motors as seen at the joints. The torque of the motors
+        is the drives' [N m], constant from each sample to the next; the links have none.
+    reference : ndarray, shape (N, n)
+        Reference of the velocity loop [rad/s].
+    integral : ndarray, shape (n,), or None
+        What the integral of the loop held at the beginning [rad]; None for nothing. A motor that
+        sticks keeps it from one experiment to the next.
+    felt : ndarray, shape (n, N, 3), or None
+        What accelerometers on the links read [m/s^2], where it is not what they should read.
+
+    """
+
+    motor: Motion
+    link: Motion
+    reference: FloatArray
+    integral: FloatArray | None = None
+    felt: FloatArray | None = None

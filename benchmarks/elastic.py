@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import time
 
-from armid_ros.elastic.identification import (
+from armid_ros.motion import ElasticRun
+from armid_ros.papers.elastic.identification import (
     decibel_error,
     decouple,
     ideal_response,
@@ -23,14 +24,9 @@ from armid_ros.elastic.identification import (
     measured_response,
     tune,
 )
-from armid_ros.elastic.identification.names import unpack
-from armid_ros.elastic.plant.run import (
-    ElasticRun,
-    ElasticSensors,
-    Experiment,
-    run_all,
-)
-from armid_ros.elastic.plant.signals import (
+from armid_ros.papers.elastic.identification.names import unpack
+from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment, run_all
+from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
     step_experiments,
@@ -38,9 +34,9 @@ from armid_ros.elastic.plant.signals import (
     STEPS,
     WEAK,
 )
-from armid_ros.elastic.plant.two_link import modes, two_link_loop, two_link_plant
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
+from armid_ros.simulation.elastic.two_link import modes, two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 

@@ -19,10 +19,8 @@ import sys
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
-from armid_ros.elastic.plant.record import record
-from armid_ros.elastic.plant.run import ElasticSensors, run_all
-from armid_ros.elastic.plant.setup import make_elastic_arm, shipped_arm
-from armid_ros.elastic.plant.signals import (
+from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
+from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
     step_experiments,
@@ -30,7 +28,6 @@ from armid_ros.elastic.plant.signals import (
     STEPS,
     WEAK,
 )
-from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import (
@@ -42,6 +39,9 @@ from armid_ros.simulation import (
     SimulatedArm,
     step,
 )
+from armid_ros.simulation.elastic.record import record
+from armid_ros.simulation.elastic.setup import make_elastic_arm, shipped_arm
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 import numpy as np
 
 from benchmarks.simulation import swinging, with_friction

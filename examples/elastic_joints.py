@@ -5,10 +5,10 @@
 from pathlib import Path
 
 import armid_ros as ar
-from armid_ros.elastic.identification.joints import fit_springs
-from armid_ros.elastic.plant.record import record
-from armid_ros.elastic.plant.setup import make_elastic_arm
+from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.simulation import Reference, Sensors
+from armid_ros.simulation.elastic.record import record
+from armid_ros.simulation.elastic.setup import make_elastic_arm
 import numpy as np
 
 URDF = Path(__file__).with_name('arm.urdf')

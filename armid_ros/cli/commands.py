@@ -55,7 +55,6 @@ COMMANDS = {
     ),
     'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
     'diagnose': Listed('diagnose', 'Find which effect a model lacks, and add it.'),
-    'elastic': Listed('elastic', 'Identify elastic joints.'),
     'exo': Listed('exo', 'Find what ties an exoskeleton to its wearer.'),
     'lunar': Listed(
         'lunar',
@@ -105,7 +104,9 @@ class Commands(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete a command without importing all of them, or an option."""
-        names = [CompletionItem(name) for name in self.list_commands(ctx) if name.startswith(incomplete)]
+        names = [
+            CompletionItem(name) for name in self.list_commands(ctx) if name.startswith(incomplete)
+        ]
         return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def invoke(self, ctx: click.Context) -> Any:

@@ -14,24 +14,24 @@ from armid_ros.cli import options
 from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.effects import Effect, parse_effect
-from armid_ros.elastic.identification import write_runs
-from armid_ros.elastic.plant.record import record
-from armid_ros.elastic.plant.setup import (
-    elastic_joints,
-    make_elastic_arm,
-    no_rotor,
-    shipped_arm,
-)
 from armid_ros.errors import ModelError
 from armid_ros.excitation import design, DesignSettings, load_excitation
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_waypoints, write_recording
 from armid_ros.recording import recover as recover_bag
+from armid_ros.recording.elastic_topics import write_runs
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
 from armid_ros.simulation import simulate as run
 from armid_ros.simulation.bodies import NoBodyError, require_masses
+from armid_ros.simulation.elastic.record import record
+from armid_ros.simulation.elastic.setup import (
+    elastic_joints,
+    make_elastic_arm,
+    no_rotor,
+    shipped_arm,
+)
 import numpy as np
 
 

@@ -19,11 +19,6 @@ from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import BagFile, file_name, folder_of
 from armid_ros.fleet.changes import HistoryChange
 from armid_ros.fleet.scatter import ParameterHistory
-from armid_ros.fleet.store import Store
-from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
-from armid_ros.report.families import full_label
-from armid_ros.report.notation import counted, digits, with_interval
-from armid_ros.report.page import Page, Section
 from armid_ros.fleet.sections import (
     ArmRow,
     Arms,
@@ -38,6 +33,11 @@ from armid_ros.fleet.sections import (
     TableRow,
     Wear,
 )
+from armid_ros.fleet.store import Store
+from armid_ros.fleet.watch import change_rows, day_text, RESIDUAL, Watch, WatchedArm, wear_rows
+from armid_ros.report.families import full_label
+from armid_ros.report.notation import counted, digits, with_interval
+from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import Markup
 

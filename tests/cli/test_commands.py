@@ -14,14 +14,13 @@ from armid_ros.cli.excite.springs import COURSES
 from armid_ros.cli.signatures import choices
 from armid_ros.effects import CATALOGUE, make_effect, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
-from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
 from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.identification.estimators.names import ESTIMATORS
 from armid_ros.pair.exercises import EXERCISES
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.recording.tables.settings import TIME_UNITS
-from armid_ros.robots import load_robot, two_link
+from armid_ros.robots import load_robot
 import click
 import numpy as np
 import pytest
@@ -88,7 +87,6 @@ sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
         (choices.TARGETS, TARGETS),
         (choices.COURSES, tuple(COURSES)),
         (choices.EXERCISES, tuple(EXERCISES)),
-        (choices.TWO_LINKS, two_link.ROBOT),
     ],
 )
 def test_help_offers_what_the_packages_have(shown, offered):
@@ -156,18 +154,6 @@ def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
     assert 'torque that a rival' in (tmp_path / 'plan' / 'report.html').read_text()
     sizeless = ('--effect', 'quadratic_friction', *rival, '--out', tmp_path / 'no')
     assert 'give what it lacks a size' in armid('excite', *arguments, *sizeless, code=2).stderr
-
-
-@pytest.mark.parametrize(('kind', 'experiments'), [('multisine', 1), ('steps', 2)])
-def test_what_shows_springs_is_followed_by_the_elastic_arm(tmp_path, kind, experiments):
-    robot, rng = load_robot('two_link_elastic'), ('--seed', 1)
-    plan, run = tmp_path / 'plan', tmp_path / 'run'
-    armid('excite', '--robot', robot.name, '--kind', kind, '--duration', 7, *rng, '--out', plan)
-    armid('simulate', '--robot', robot.name, '--trajectory', plan / 'trajectory', '--out', run)
-    runs = read_runs(run, robot, Accelerometers.on(robot, [0.4, 0.4]))
-    assert len(runs) == experiments
-    if kind == 'multisine':
-        assert np.all(runs[0].motor.tau.std(axis=0) > 0.05 * robot.torque_limit)
 
 
 def test_options_of_a_design_do_not_go_with_steps(tmp_path):

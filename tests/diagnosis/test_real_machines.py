@@ -11,7 +11,7 @@ from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Named
 from armid_ros.effects import CATALOGUE, make_effect
-from armid_ros.elastic.identification.transmission import fit_transmission
+from armid_ros.papers.elastic.identification.transmission import fit_transmission
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np

@@ -7,7 +7,6 @@ import json
 import pytest
 
 from benchmarks.fleet import generate, ROBOT
-
 from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow

@@ -16,7 +16,7 @@ LAYERS = (
     ('cli',),
     ('nodes',),
     ('live',),
-    ('elastic', 'pair'),
+    ('pair',),
     ('api',),
     ('report', 'view'),
     ('residual',),

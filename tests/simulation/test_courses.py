@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Courses for elastic joints keep the limits, stand between experiments, and excite the band."""
 
-from armid_ros.elastic.plant.courses import multisine_course, step_course
 from armid_ros.errors import TrajectoryError
 from armid_ros.robots import load_robot
+from armid_ros.simulation.elastic.courses import multisine_course, step_course
 import numpy as np
 import pytest
 

@@ -10,10 +10,10 @@ from armid_ros.cli import options
 from armid_ros.cli.excite.files import BAG, require_free, SCHEMA
 from armid_ros.cli.excite.options import MotionOptions
 from armid_ros.cli.terminal import say
-from armid_ros.elastic.plant.courses import multisine_course, step_course
 from armid_ros.excitation import CollisionScene, Limits, not_checked
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
+from armid_ros.simulation.elastic.courses import multisine_course, step_course
 import click
 import numpy as np
 

@@ -41,5 +41,3 @@ FOURIER = 'fourier'
 COURSES = ('multisine', 'steps')
 #: What a leg and its exoskeleton do; `armid_ros.pair.exercises.EXERCISES`.
 EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
-#: The two links on springs; `armid_ros.robots.two_link.ROBOT`.
-TWO_LINKS = 'two_link_elastic'

@@ -11,18 +11,18 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
 from armid_ros.effects import parse_effect
-from armid_ros.elastic.plant.setup import (
-    elastic_joints,
-    make_elastic_arm,
-    no_rotor,
-    shipped_arm,
-)
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
+from armid_ros.simulation.elastic.setup import (
+    elastic_joints,
+    make_elastic_arm,
+    no_rotor,
+    shipped_arm,
+)
 import numpy as np
 
 Values = Callable[[str], Any]

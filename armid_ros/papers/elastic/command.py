@@ -7,9 +7,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli.signatures import options
-from armid_ros.cli.signatures.choices import (
-    TWO_LINKS,
-)
 from armid_ros.cli.signatures.late import done_by
 import click
 
@@ -27,7 +24,7 @@ import click
 @click.option(
     '--experiments', default=48, show_default=True, help='Of 4 s each, that --demo simulates.'
 )
-@options.robot_described(default=TWO_LINKS, show_default=True, help='The arm.')
+@options.robot_described(default='two_link_elastic', show_default=True, help='The arm.')
 @click.option(
     '--start',
     type=click.Choice(['found', 'before', 'after']),
@@ -45,7 +42,7 @@ import click
 @options.reading
 @options.seed
 @options.as_json
-@done_by('elastic.command')
+@done_by('armid_ros.papers.elastic.work')
 def elastic() -> None:
     """
     Identify elastic joints.

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from armid_ros.cli import options
 from armid_ros.cli.terminal import progress, say
-from armid_ros.elastic.identification.files import read_sides
-from armid_ros.elastic.identification.joints import fit_springs, SpringEstimate
-from armid_ros.elastic.identification.output import springs_document, SPRINGS_SCHEMA
-from armid_ros.elastic.report.springs_page import springs_report
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
+from armid_ros.papers.elastic.identification.files import read_sides
+from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
+from armid_ros.papers.elastic.identification.output import springs_document, SPRINGS_SCHEMA
+from armid_ros.papers.elastic.report.springs_page import springs_report
 from armid_ros.recording.elastic_topics import LINK
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import Robot

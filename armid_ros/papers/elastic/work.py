@@ -9,20 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
-from armid_ros.cli.elastic.springs import identify_springs
 from armid_ros.cli.groups import gathered
 from armid_ros.cli.terminal import print_parameters, progress, say, Tick
-from armid_ros.elastic.identification import (
+from armid_ros.errors import RecordingError, RobotError
+from armid_ros.files import json_text, Staged, write_file
+from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification import (
     Accelerometers,
     identify_two_inertia,
     read_runs,
     TwoInertiaIdentification,
-    write_runs,
 )
-from armid_ros.elastic.identification.output import elastic_document, SCHEMA
-from armid_ros.elastic.identification.story import TuningStory
-from armid_ros.elastic.plant.run import ElasticSensors, run_all
-from armid_ros.elastic.plant.signals import (
+from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA
+from armid_ros.papers.elastic.identification.story import TuningStory
+from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
+from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
     step_experiments,
@@ -30,11 +31,9 @@ from armid_ros.elastic.plant.signals import (
     STEPS,
     WEAK,
 )
-from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
-from armid_ros.elastic.report.page import elastic_report
-from armid_ros.errors import RecordingError, RobotError
-from armid_ros.files import json_text, Staged, write_file
-from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.report.page import elastic_report
+from armid_ros.papers.elastic.springs import identify_springs
+from armid_ros.recording.elastic_topics import write_runs
 from armid_ros.recording.writer import require_new
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
@@ -45,6 +44,7 @@ from armid_ros.robots.two_link import (
     TwoLinkParameters,
     TwoLinkSet,
 )
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
 import click
 import numpy as np
@@ -272,7 +272,7 @@ def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParame
 def _draw(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, out: Path
 ) -> list[str]:
-    from armid_ros.elastic.report.figures import bode_figure, comparison_figure, step_figure
+    from armid_ros.papers.elastic.report.figures import bode_figure, comparison_figure, step_figure
     from armid_ros.report.figures.style import save_figure
 
     figures = {'bode.png': bode_figure(result)}

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from armid_ros.elastic.plant.signals import multisine
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 from armid_ros.simulation.plant import middle_position
 from armid_ros.simulation.reference import Reference
 import numpy as np
+import numpy.typing as npt
 
 #: Band of the multisines [Hz], and samples per second in which they are written.
 _BAND, _RATE = (2.0, 100.0), 500.0
@@ -27,6 +27,43 @@ _TRIES = 1000
 
 #: Tells from a path, shape (N, n), whether it may be taken.
 Clear = Callable[[FloatArray], bool]
+
+
+def multisine(
+    count: int,
+    dt: float,
+    band: tuple[float, float],
+    rms: npt.ArrayLike,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """
+    Return one period of sines of equal size and random phase at every frequency of a band.
+
+    Parameters
+    ----------
+    count : int
+        Samples of the period.
+    dt : float
+        Time between samples [s].
+    band : tuple of float
+        Lowest and highest frequency [Hz].
+    rms : array_like, shape (n,)
+        Root mean square of each signal.
+    rng : numpy.random.Generator
+        Source of the phases.
+
+    Returns
+    -------
+    ndarray, shape (count, n)
+
+    """
+    size = np.asarray(rms, dtype=float)
+    frequency = np.fft.rfftfreq(count, dt)
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    spectrum = np.zeros((len(frequency), len(size)), dtype=complex)
+    spectrum[inside] = np.exp(2j * np.pi * rng.random((int(inside.sum()), len(size))))
+    signal = np.fft.irfft(spectrum, count, axis=0)
+    return np.asarray(size * signal / np.sqrt(np.mean(signal**2, axis=0)))
 
 
 def multisine_course(

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from armid_ros.elastic.plant.run import ElasticRun
 from armid_ros.errors import ModelError
-from armid_ros.motion import Motion
+from armid_ros.motion import ElasticRun, Motion
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.run import whole_steps
 from armid_ros.simulation.simulated_arm import LinkSample, SimulatedArm

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.elastic.plant.two_link import two_link_arm, two_link_loop
 from armid_ros.robots import Robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkSet
 from armid_ros.simulation.accelerometers import LinkAccelerometers
+from armid_ros.simulation.elastic.two_link import two_link_arm, two_link_loop
 from armid_ros.simulation.motor_control import MotorControl, VelocityLoop
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.sensors import Sensors

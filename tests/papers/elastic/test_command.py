@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import json
 
-from armid_ros.cli.signatures.elastic import elastic
 from armid_ros.cli.signatures.record import simulate
-from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation
+from armid_ros.papers.elastic.command import elastic
+from armid_ros.papers.elastic.identification import Accelerometers, read_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from click.testing import CliRunner
@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from docsite.schemas import faults
+from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow
 
@@ -120,3 +121,15 @@ def test_bad_input_is_said(arguments, error, message, tmp_path) -> None:
     result = CliRunner().invoke(elastic, [*arguments, '--out', str(tmp_path / 'out')])
     assert isinstance(result.exception, error)
     assert message in str(result.exception)
+
+
+@pytest.mark.parametrize(('kind', 'experiments'), [('multisine', 1), ('steps', 2)])
+def test_what_shows_springs_is_followed_by_the_elastic_arm(tmp_path, kind, experiments):
+    robot, rng = load_robot('two_link_elastic'), ('--seed', 1)
+    plan, run = tmp_path / 'plan', tmp_path / 'run'
+    armid('excite', '--robot', robot.name, '--kind', kind, '--duration', 7, *rng, '--out', plan)
+    armid('simulate', '--robot', robot.name, '--trajectory', plan / 'trajectory', '--out', run)
+    runs = read_runs(run, robot, Accelerometers.on(robot, [0.4, 0.4]))
+    assert len(runs) == experiments
+    if kind == 'multisine':
+        assert np.all(runs[0].motor.tau.std(axis=0) > 0.05 * robot.torque_limit)

@@ -9,8 +9,8 @@ all of them. Source: Oaki and Adachi 2008.
 
 """
 
-from armid_ros.elastic.identification.files import Accelerometers, read_runs, write_runs
-from armid_ros.elastic.identification.interaction import (
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.interaction import (
     coupled_response,
     decibel_error,
     decouple,
@@ -19,23 +19,22 @@ from armid_ros.elastic.identification.interaction import (
     interaction_torques,
     joint_signals,
 )
-from armid_ros.elastic.identification.physical import DecoupledFit, fit_joint
-from armid_ros.elastic.identification.rigid import fit_rigid, RigidFit
-from armid_ros.elastic.identification.spectra import measured_response
-from armid_ros.elastic.identification.subspace import identify_subspace, Signals, StateSpace
-from armid_ros.elastic.identification.three_steps import (
+from armid_ros.papers.elastic.identification.physical import DecoupledFit, fit_joint
+from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
+from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.subspace import identify_subspace, Signals, StateSpace
+from armid_ros.papers.elastic.identification.three_steps import (
     identify_two_inertia,
     MeasuredJoint,
     TwoInertiaIdentification,
 )
-from armid_ros.elastic.identification.tuning import tune, Tuning
+from armid_ros.papers.elastic.identification.tuning import tune, Tuning
 
 __all__ = [
     'identify_two_inertia',
     'TwoInertiaIdentification',
     'MeasuredJoint',
     'read_runs',
-    'write_runs',
     'Accelerometers',
     'fit_rigid',
     'RigidFit',

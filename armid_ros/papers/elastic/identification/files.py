@@ -18,22 +18,16 @@ from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
 
-from armid_ros.elastic.plant.run import ElasticRun
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import ElasticRun, FloatArray, Motion
 from armid_ros.recording import (
-    LATCHED,
     read_recording,
     Recording,
-    string_cdr,
     topics,
-    write_joint_states,
 )
 from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
-from armid_ros.recording.imu import read_accelerations, write_accelerations
-from armid_ros.recording.message_types import STRING
+from armid_ros.recording.imu import read_accelerations
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.writer import whole_bag
 from armid_ros.robots import Robot
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 import numpy as np
@@ -41,7 +35,6 @@ import numpy.typing as npt
 
 #: Where the motors may be instead.
 _OTHER_MOTOR = '/motor/joint_states'
-_PAUSE_NS = 10**9
 #: Share of the samples that all topics have to have.
 _SHARED = 0.9
 #: How long the loops are asked to stand between two experiments [s], and the shortest one [s].
@@ -92,37 +85,6 @@ class Accelerometers:
         a1 = first[:, 1] / self.radius[0]
         carried = self.length * (a1 * np.cos(q[:, 1]) + dq[:, 0] ** 2 * np.sin(q[:, 1]))
         return np.column_stack([a1, (second[:, 1] - carried) / self.radius[1] - a1])
-
-
-def write_runs(
-    path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: LinkAccelerometers
-) -> None:
-    """
-    Write experiments with any arm to a bag, one after the other with a pause of 1 s.
-
-    Raises
-    ------
-    RecordingError
-        The bag exists already.
-
-    """
-    joints = robot.joints
-    with whole_bag(path) as writer:
-        writer.add_topic('/robot_description', STRING, qos=[LATCHED])
-        writer.write('/robot_description', string_cdr(robot.urdf), _PAUSE_NS)
-        start = _PAUSE_NS
-        for run in runs:
-            motor, link = run.motor, run.link
-            stamps = start + np.rint((motor.t - motor.t[0]) * 1e9).astype(np.int64)
-            dt = float(np.median(np.diff(motor.t)))
-            asked = motor.q[0] + dt * np.cumsum(run.reference, axis=0)
-            write_joint_states(writer, MOTOR, joints, stamps, motor.q, motor.dq, motor.tau)
-            write_joint_states(writer, LINK, joints, stamps, link.q, link.dq)
-            write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
-            felt = sensors.readings(link) if run.felt is None else run.felt
-            for name, values in zip(robot.links, felt, strict=True):
-                write_accelerations(writer, imu_topic(name), name, stamps, values)
-            start = int(stamps[-1]) + _PAUSE_NS
 
 
 def read_runs(

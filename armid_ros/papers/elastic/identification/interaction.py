@@ -14,14 +14,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.elastic.identification.subspace import (
+from armid_ros.motion import ElasticRun, FloatArray, Motion
+from armid_ros.papers.elastic.identification.subspace import (
     Hold,
     identify_subspace,
     Signals,
     StateSpace,
 )
-from armid_ros.elastic.plant.run import ElasticRun
-from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt

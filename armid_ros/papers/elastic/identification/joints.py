@@ -15,16 +15,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.elastic.identification.interaction import direction
-from armid_ros.elastic.identification.transmission import (
+from armid_ros.errors import IdentificationError
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.papers.elastic.identification.interaction import direction
+from armid_ros.papers.elastic.identification.transmission import (
     CUTOFF,
     fit_transmission,
     TransmissionFit,
     TwoEncoders,
 )
-from armid_ros.errors import IdentificationError
-from armid_ros.model import inverse_dynamics
-from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np

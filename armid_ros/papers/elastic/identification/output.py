@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from armid_ros.arm import parameter_table
-from armid_ros.elastic.identification.interaction import decibel_error, ideal_response
-from armid_ros.elastic.identification.joints import SpringEstimate
-from armid_ros.elastic.identification.names import parameter_names, unpack
-from armid_ros.elastic.identification.physical import BAND
-from armid_ros.elastic.identification.three_steps import TwoInertiaIdentification
+from armid_ros.papers.elastic.identification.interaction import decibel_error, ideal_response
+from armid_ros.papers.elastic.identification.joints import SpringEstimate
+from armid_ros.papers.elastic.identification.names import parameter_names, unpack
+from armid_ros.papers.elastic.identification.physical import BAND
+from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 import numpy as np
 
 SCHEMA = 'armid/elastic/1'

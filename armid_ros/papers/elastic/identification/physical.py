@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.elastic.identification.interaction import DecoupledJoint
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.interaction import DecoupledJoint
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares

@@ -17,9 +17,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from armid_ros.elastic.identification.names import SIZE, unpack
-from armid_ros.elastic.plant.run import ElasticRun
-from armid_ros.motion import FloatArray
+from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.papers.elastic.identification.names import SIZE, unpack
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np

@@ -14,11 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armid_ros.elastic.identification.interaction import direction
-from armid_ros.elastic.plant.run import ElasticRun
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.motion import FloatArray
+from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.papers.elastic.identification.interaction import direction
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.elastic.identification.subspace import Signals
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.subspace import Signals
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import get_window

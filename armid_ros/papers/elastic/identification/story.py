@@ -7,10 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from armid_ros.elastic.identification.names import parameter_names, unpack
-from armid_ros.elastic.identification.response import velocities
-from armid_ros.elastic.identification.tuning import Tuning
 from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.names import parameter_names, unpack
+from armid_ros.papers.elastic.identification.response import velocities
+from armid_ros.papers.elastic.identification.tuning import Tuning
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 

@@ -7,18 +7,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.elastic.identification.interaction import (
+from armid_ros.errors import IdentificationError
+from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.papers.elastic.identification.interaction import (
     decouple,
     DecoupledJoint,
     joint_signals,
 )
-from armid_ros.elastic.identification.physical import DecoupledFit, fit_joint
-from armid_ros.elastic.identification.rigid import fit_rigid, RigidFit
-from armid_ros.elastic.identification.spectra import measured_response
-from armid_ros.elastic.identification.tuning import tune, Tuning
-from armid_ros.elastic.plant.run import ElasticRun
-from armid_ros.errors import IdentificationError
-from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.physical import DecoupledFit, fit_joint
+from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
+from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.tuning import tune, Tuning
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np

@@ -19,17 +19,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.elastic.identification.names import pack, parameter_names, SIZE, unpack
-from armid_ros.elastic.identification.response import (
+from armid_ros.errors import IdentificationError
+from armid_ros.estimate import Estimate
+from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.papers.elastic.identification.names import pack, parameter_names, SIZE, unpack
+from armid_ros.papers.elastic.identification.response import (
     ringing,
     sensitivities,
     Steps,
     velocities,
 )
-from armid_ros.elastic.plant.run import ElasticRun
-from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
-from armid_ros.motion import FloatArray
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np

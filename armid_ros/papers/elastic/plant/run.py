@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import ElasticRun, FloatArray, Motion
 from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import command, run
 from armid_ros.simulation.controller import Targets
@@ -37,33 +37,6 @@ class Experiment:
     q: FloatArray
     velocity: FloatArray
     torque: FloatArray | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class ElasticRun:
-    """
-    What happened, or what was measured, during one experiment.
-
-    Attributes
-    ----------
-    motor, link : Motion
-        Motion of either side, that of the motors as seen at the joints. The torque of the motors
-        is the drives' [N m], constant from each sample to the next; the links have none.
-    reference : ndarray, shape (N, n)
-        Reference of the velocity loop [rad/s].
-    integral : ndarray, shape (n,), or None
-        What the integral of the loop held at the beginning [rad]; None for nothing. A motor that
-        sticks keeps it from one experiment to the next.
-    felt : ndarray, shape (n, N, 3), or None
-        What accelerometers on the links read [m/s^2], where it is not what they should read.
-
-    """
-
-    motor: Motion
-    link: Motion
-    reference: FloatArray
-    integral: FloatArray | None = None
-    felt: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.elastic.plant.run import Experiment
-from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.plant.run import Experiment
+from armid_ros.simulation.elastic.courses import multisine
 import numpy as np
 import numpy.typing as npt
 
@@ -23,43 +23,6 @@ _DT, _BAND = 1e-3, (2.0, 100.0)
 _SPEED, _SLOW = 0.8, (0.3, 1.0)
 #: How far the links begin from zero at most [rad].
 _REACH = np.pi / 3.0
-
-
-def multisine(
-    count: int,
-    dt: float,
-    band: tuple[float, float],
-    rms: npt.ArrayLike,
-    rng: np.random.Generator,
-) -> FloatArray:
-    """
-    Return one period of sines of equal size and random phase at every frequency of a band.
-
-    Parameters
-    ----------
-    count : int
-        Samples of the period.
-    dt : float
-        Time between samples [s].
-    band : tuple of float
-        Lowest and highest frequency [Hz].
-    rms : array_like, shape (n,)
-        Root mean square of each signal.
-    rng : numpy.random.Generator
-        Source of the phases.
-
-    Returns
-    -------
-    ndarray, shape (count, n)
-
-    """
-    size = np.asarray(rms, dtype=float)
-    frequency = np.fft.rfftfreq(count, dt)
-    inside = (frequency >= band[0]) & (frequency <= band[1])
-    spectrum = np.zeros((len(frequency), len(size)), dtype=complex)
-    spectrum[inside] = np.exp(2j * np.pi * rng.random((int(inside.sum()), len(size))))
-    signal = np.fft.irfft(spectrum, count, axis=0)
-    return np.asarray(size * signal / np.sqrt(np.mean(signal**2, axis=0)))
 
 
 def resonance_experiments(

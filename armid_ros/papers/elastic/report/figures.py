@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from armid_ros.elastic.identification import (
+from armid_ros.papers.elastic.identification import (
     ideal_response,
     MeasuredJoint,
     TwoInertiaIdentification,
 )
-from armid_ros.elastic.identification.names import unpack
-from armid_ros.elastic.identification.tuning import Tuning
+from armid_ros.papers.elastic.identification.names import unpack
+from armid_ros.papers.elastic.identification.tuning import Tuning
 from armid_ros.report.figures.parameters import HALF_WIDTH
 from armid_ros.report.figures.style import (
     COLOURS,

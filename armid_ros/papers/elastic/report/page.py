@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.identification import (
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.papers.elastic.identification import (
     decibel_error,
     ideal_response,
     TwoInertiaIdentification,
 )
-from armid_ros.elastic.report.parameters import ElasticParameters, RigidParameters
-from armid_ros.elastic.report.steps import COMPARED, Responses, StepResponses
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.papers.elastic.report.parameters import ElasticParameters, RigidParameters
+from armid_ros.papers.elastic.report.steps import COMPARED, Responses, StepResponses
 from armid_ros.report.notation import counted, digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance

@@ -7,11 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.elastic.identification import RigidFit, TwoInertiaIdentification
-from armid_ros.elastic.identification.names import parameter_names, unpack
-from armid_ros.elastic.identification.output import total_damping
-from armid_ros.elastic.identification.rigid import CUTOFF
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.papers.elastic.identification import RigidFit, TwoInertiaIdentification
+from armid_ros.papers.elastic.identification.names import parameter_names, unpack
+from armid_ros.papers.elastic.identification.output import total_damping
+from armid_ros.papers.elastic.identification.rigid import CUTOFF
 from armid_ros.report.notation import digits, pretty
 from armid_ros.report.page import Section
 from armid_ros.robots.two_link import TwoLinkParameters
@@ -37,7 +37,8 @@ class ElasticParameters(Section):
     """
 
     title: ClassVar[str] = 'Parameters'
-    template: ClassVar[str] = 'elastic_parameters.html'
+    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
+    template: ClassVar[str] = 'parameters.html'
 
     result: TwoInertiaIdentification
     known: TwoLinkParameters | None
@@ -115,7 +116,8 @@ class RigidParameters(Section):
     """
 
     title: ClassVar[str] = 'Rigid arm'
-    template: ClassVar[str] = 'elastic_rigid.html'
+    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
+    template: ClassVar[str] = 'rigid.html'
 
     fit: RigidFit
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.elastic.identification.joints import SpringEstimate
+from armid_ros.papers.elastic.identification.joints import SpringEstimate
 from armid_ros.report.page import Section
 import numpy as np
 
@@ -26,6 +26,7 @@ class Springs(Section):
     """
 
     title: ClassVar[str] = 'Springs'
+    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
     template: ClassVar[str] = 'springs.html'
 
     found: Sequence[SpringEstimate]

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.elastic.identification.joints import SpringEstimate
-from armid_ros.elastic.report.springs import Springs
+from armid_ros.papers.elastic.identification.joints import SpringEstimate
+from armid_ros.papers.elastic.report.springs import Springs
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance

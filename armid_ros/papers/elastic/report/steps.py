@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.elastic.identification import (
+from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification import (
     coupled_response,
     decibel_error,
     ideal_response,
     TwoInertiaIdentification,
 )
-from armid_ros.elastic.identification.tuning import Tuning
-from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.tuning import Tuning
 from armid_ros.report.charts import Chart, Mark, Role, Series
 from armid_ros.report.notation import digits
 from armid_ros.report.page import Section
@@ -66,7 +66,8 @@ class Responses(Section):
     """
 
     title: ClassVar[str] = 'Frequency responses'
-    template: ClassVar[str] = 'elastic_responses.html'
+    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
+    template: ClassVar[str] = 'responses.html'
 
     result: TwoInertiaIdentification
 
@@ -180,7 +181,8 @@ class StepResponses(Section):
     """
 
     title: ClassVar[str] = 'Step responses'
-    template: ClassVar[str] = 'elastic_steps.html'
+    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
+    template: ClassVar[str] = 'steps.html'
 
     tuning: Tuning
 

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.plant.run import ElasticRun
-from armid_ros.elastic.plant.signals import WEAK
-from armid_ros.elastic.plant.two_link import two_link_loop
+from armid_ros.motion import ElasticRun
+from armid_ros.papers.elastic.plant.signals import WEAK
 from armid_ros.robots.two_link import two_link_set, TwoLinkParameters
+from armid_ros.simulation.elastic.two_link import two_link_loop
 import numpy as np
 import pytest
 

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.identification import (
+from armid_ros.model import inverse_dynamics
+from armid_ros.motion import Motion
+from armid_ros.papers.elastic.identification import (
     decibel_error,
     decouple,
     fit_joint,
@@ -13,8 +15,6 @@ from armid_ros.elastic.identification import (
     joint_signals,
     measured_response,
 )
-from armid_ros.model import inverse_dynamics
-from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import control
 import numpy as np

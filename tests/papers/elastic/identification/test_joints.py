@@ -7,22 +7,22 @@ from __future__ import annotations
 import json
 
 from armid_ros.arm import ArmModel
-from armid_ros.cli.signatures.elastic import elastic
 from armid_ros.effects import make_effect, parse_effect
-from armid_ros.elastic.identification import write_runs
-from armid_ros.elastic.identification.files import read_sides
-from armid_ros.elastic.identification.joints import fit_springs
-from armid_ros.elastic.identification.output import springs_document
-from armid_ros.elastic.plant.record import record
-from armid_ros.elastic.plant.setup import make_elastic_arm
-from armid_ros.elastic.report.springs_page import springs_report
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
 from armid_ros.motion import Motion
+from armid_ros.papers.elastic.command import elastic
+from armid_ros.papers.elastic.identification.files import read_sides
+from armid_ros.papers.elastic.identification.joints import fit_springs
+from armid_ros.papers.elastic.identification.output import springs_document
+from armid_ros.papers.elastic.report.springs_page import springs_report
 from armid_ros.recording import write_recording
+from armid_ros.recording.elastic_topics import write_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import planar_pair
 from armid_ros.simulation import Reference, Sensors, simulate
+from armid_ros.simulation.elastic.record import record
+from armid_ros.simulation.elastic.setup import make_elastic_arm
 from click.testing import CliRunner
 import numpy as np
 import pytest

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.identification.live import OnlineTwoInertia, TwoLinkSample
+from armid_ros.papers.elastic.identification.live import OnlineTwoInertia, TwoLinkSample
 import numpy as np
 import pytest
 

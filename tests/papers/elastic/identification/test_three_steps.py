@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import json
 
-from armid_ros.elastic.identification import identify_two_inertia
-from armid_ros.elastic.identification.output import elastic_document
-from armid_ros.elastic.plant.run import ElasticSensors
-from armid_ros.elastic.plant.two_link import two_link_loop
-from armid_ros.elastic.report.figures import bode_figure, comparison_figure, step_figure
 from armid_ros.errors import IdentificationError
+from armid_ros.papers.elastic.identification import identify_two_inertia
+from armid_ros.papers.elastic.identification.output import elastic_document
+from armid_ros.papers.elastic.plant.run import ElasticSensors
+from armid_ros.papers.elastic.report.figures import bode_figure, comparison_figure, step_figure
 from armid_ros.report.figures.style import save_figure
 from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.elastic.two_link import two_link_loop
 import numpy as np
 import pytest
 

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.identification.transmission import fit_transmission, TwoEncoders
 from armid_ros.errors import IdentificationError
+from armid_ros.papers.elastic.identification.transmission import fit_transmission, TwoEncoders
 import numpy as np
 import pytest
 

@@ -6,18 +6,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.elastic.identification import tune, Tuning
-from armid_ros.elastic.identification.names import pack, unpack
-from armid_ros.elastic.identification.response import (
+from armid_ros.errors import IdentificationError
+from armid_ros.papers.elastic.identification import tune, Tuning
+from armid_ros.papers.elastic.identification.names import pack, unpack
+from armid_ros.papers.elastic.identification.response import (
     ringing,
     sensitivities,
     Steps,
     velocities,
 )
-from armid_ros.elastic.plant.run import ElasticSensors, run_elastic
-from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
-from armid_ros.errors import IdentificationError
+from armid_ros.papers.elastic.plant.run import ElasticSensors, run_elastic
 from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 

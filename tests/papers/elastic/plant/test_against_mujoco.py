@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from armid_ros.elastic.plant.run import run_elastic
-from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
+from armid_ros.papers.elastic.plant.run import run_elastic
 from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 

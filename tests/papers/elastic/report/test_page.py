@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of elastic joints shows what was measured beside what was found."""
 
-from armid_ros.elastic.identification import identify_two_inertia
-from armid_ros.elastic.plant.run import ElasticSensors, run_all
-from armid_ros.elastic.plant.signals import (
+from armid_ros.papers.elastic.identification import identify_two_inertia
+from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
+from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
     resonance_experiments,
     step_experiments,
@@ -12,9 +12,9 @@ from armid_ros.elastic.plant.signals import (
     STEPS,
     WEAK,
 )
-from armid_ros.elastic.plant.two_link import two_link_loop, two_link_plant
-from armid_ros.elastic.report.page import elastic_report
+from armid_ros.papers.elastic.report.page import elastic_report
 from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 import numpy as np
 import pytest
 
