@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 
-from armid_ros.identification.ties.poses import choose_poses, stiffness_bound
 from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
@@ -23,8 +22,9 @@ from armid_ros.identification.ties.problem import (
 from armid_ros.identification.ties.search import find_interaction, InteractionFinding
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import (
+from armid_ros.papers.exo.identification.poses import choose_poses, stiffness_bound
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
@@ -32,7 +32,7 @@ from armid_ros.pair.leg_pair import (
     TiedPair,
     walking,
 )
-from armid_ros.pair.torque_driven import splined
+from armid_ros.papers.exo.plant.torque_driven import splined
 import numpy as np
 
 from benchmarks.exo_deviations import deviations

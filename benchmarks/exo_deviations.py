@@ -13,8 +13,8 @@ import argparse
 
 from armid_ros.identification.ties.problem import Inertias
 from armid_ros.motion import FloatArray
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, PairMotion, stepping
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, with_torques

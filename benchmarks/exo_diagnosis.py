@@ -13,6 +13,7 @@ import argparse
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
+from armid_ros.diagnosis.ties.diagnosis import diagnose_beside
 from armid_ros.effects.tied import Partner
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.identification.ties.recorded import (
@@ -21,8 +22,8 @@ from armid_ros.identification.ties.recorded import (
     together_interaction_problem,
 )
 from armid_ros.identification.ties.stiffness import identify_interaction
-from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
-from armid_ros.pair.ties.diagnosis import diagnose_beside
+from armid_ros.model.spring_ties import SEGMENTS
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import load_robot
 import numpy as np

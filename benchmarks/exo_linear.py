@@ -18,9 +18,10 @@ import argparse
 from armid_ros.identification.rows.signals import SignalSettings
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
+from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.motion import FloatArray
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, PairMotion, SEGMENTS, stepping, TiedPair
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping, TiedPair
 import numpy as np
 
 from benchmarks.exo_noise import measured, recorded, with_torques

@@ -10,11 +10,12 @@ Which motion shows four springs: the bound for 200 poses, and what 10 s at 1 kHz
 from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.ties.poses import stiffness_bound
 from armid_ros.identification.ties.problem import interaction_problem, MachineNoise
+from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.motion import FloatArray
-from armid_ros.pair.exercises import exercise, EXERCISES
-from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
+from armid_ros.papers.exo.identification.poses import stiffness_bound
+from armid_ros.papers.exo.plant.exercises import exercise, EXERCISES
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
 import numpy as np
 
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques

@@ -10,7 +10,7 @@ from armid_ros.identification.ties.problem import Inertias, interaction_problem,
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
-from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.recording import Recording
 import numpy as np
 

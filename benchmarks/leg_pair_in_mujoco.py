@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.leg_pair import PairMotion, TiedPair
-from armid_ros.pair.torque_driven import DrivingTorque
+from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
+from armid_ros.papers.exo.plant.torque_driven import DrivingTorque
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from armid_ros.motion import FloatArray
-from armid_ros.pair.gait_cycle import GaitCycle
-from armid_ros.pair.leg_pair import TiedPair
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
+from armid_ros.papers.exo.plant.leg_pair import TiedPair
 import mujoco
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline

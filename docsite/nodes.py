@@ -8,7 +8,6 @@ from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode, COMMON
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.identification_run import IdentificationRunNode
-from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.joint_state_merger import JointStateMergerNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
@@ -16,7 +15,8 @@ from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
-from armid_ros.nodes.simulated_pair import SimulatedPairNode
+from armid_ros.papers.exo.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.papers.exo.nodes.simulated_pair import SimulatedPairNode
 
 from docsite.markdown import cell, prose, table
 

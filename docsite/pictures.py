@@ -16,10 +16,10 @@ import sys
 from tempfile import TemporaryDirectory
 
 import armid_ros as ar
-from armid_ros.pair.driven_cycle import check_cycle
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.gait_cycle import gait_cycle
-from armid_ros.pair.walkers import walking_pair
+from armid_ros.papers.exo.plant.driven_cycle import check_cycle
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle
+from armid_ros.papers.exo.plant.walkers import walking_pair
 from matplotlib.figure import Figure
 import numpy as np
 from scipy import signal, stats

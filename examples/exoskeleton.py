@@ -5,8 +5,8 @@
 import armid_ros as ar
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, pair_torques, stepping
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, pair_torques, stepping
 import numpy as np
 
 pair, rng = leg_pair(), np.random.default_rng(1)

@@ -12,7 +12,7 @@ import sys
 import pytest
 
 #: Rooms of processes, ROS graphs, papers, whole pages and many repeats: not in `make test-fast`.
-SLOW = set('benchmarks docsite examples fleet fuzz hidden live pair papers ros'.split())
+SLOW = set('benchmarks docsite examples fleet fuzz hidden live papers ros'.split())
 
 
 def pytest_addoption(parser):

@@ -55,7 +55,6 @@ COMMANDS = {
     ),
     'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
     'diagnose': Listed('diagnose', 'Find which effect a model lacks, and add it.'),
-    'exo': Listed('exo', 'Find what ties an exoskeleton to its wearer.'),
     'lunar': Listed(
         'lunar',
         'Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures.',

@@ -73,7 +73,7 @@ _HARDLY_SHOWN = (
 #: Error where a partner was set and its ties would be left out.
 _ALONE = (
     'the settings have a partner, and nothing explains ties to it: call diagnose_beside of '
-    'armid_ros.pair.ties.diagnosis with it'
+    'armid_ros.diagnosis.ties.diagnosis with it'
 )
 
 
@@ -114,8 +114,8 @@ def diagnose(
         Called with the share that is done and what is being done.
     tied : callable, optional
         Explains the gap by ties to the partner of the settings, before anything else is tried;
-        needed if there is a partner. `diagnose_beside` of `armid_ros.pair.ties.diagnosis` gives
-        both.
+        needed if there is a partner. `diagnose_beside` of `armid_ros.diagnosis.ties.diagnosis`
+        gives both.
 
     Returns
     -------

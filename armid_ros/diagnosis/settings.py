@@ -142,7 +142,7 @@ class DiagnosisSettings:
     partner : Partner or None
         Another machine that was recorded beside the arm, to which it may be tied. What holds the
         arm is then looked for between the two, and not at unknown places. `diagnose_beside` of
-        `armid_ros.pair.ties.diagnosis` sets it.
+        `armid_ros.diagnosis.ties.diagnosis` sets it.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     material : float

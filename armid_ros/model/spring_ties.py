@@ -14,9 +14,10 @@ Source: the human-exoskeleton leg pair, equations (16), (18), (23), (25), physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from armid_ros.errors import ModelError
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
@@ -26,6 +27,11 @@ import numpy as np
 _STEP = 1e-5
 #: A way so short that it has no direction [m].
 _SHORTEST = 1e-12
+
+#: Segments of the leg pair that are tied: in the order of the source, F1 to F4.
+SEGMENTS = ('swing_shank', 'swing_thigh', 'stance_thigh', 'stance_shank')
+#: The joint that moves each of them.
+_MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
 
 
 @dataclass(frozen=True)
@@ -212,3 +218,21 @@ def tie_columns_derivatives(
 def _known(robot: Robot, joint: str) -> str:
     robot.index(joint)
     return joint
+
+
+def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
+    """
+    Tie the shipped exoskeleton to its wearer where the source has springs.
+
+    Raises
+    ------
+    ModelError
+        If there is no such segment.
+
+    """
+    unknown = [segment for segment in segments if segment not in SEGMENTS]
+    if unknown:
+        raise ModelError(f"no segment '{unknown[0]}'; there are {', '.join(SEGMENTS)}")
+    joints = [_MOVED_BY[SEGMENTS.index(segment)] for segment in segments]
+    ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
+    return tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))

@@ -17,7 +17,6 @@ from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
 from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.identification.estimators.names import ESTIMATORS
-from armid_ros.pair.exercises import EXERCISES
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.recording.tables.settings import TIME_UNITS
 from armid_ros.robots import load_robot
@@ -86,7 +85,6 @@ sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
         (choices.CRITERIA, CRITERIA),
         (choices.TARGETS, TARGETS),
         (choices.COURSES, tuple(COURSES)),
-        (choices.EXERCISES, tuple(EXERCISES)),
     ],
 )
 def test_help_offers_what_the_packages_have(shown, offered):

@@ -3,9 +3,9 @@
 """Every command that reads a bag says what is wrong with it, and takes --no-crc."""
 
 from armid_ros.cli import main
-from armid_ros.cli.exo import SimulationOptions
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.work import SimulationOptions
 from armid_ros.recording import Recording, write_recording
 from armid_ros.recording.mcap.records import map_file
 from armid_ros.robots import load_robot

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.ties.diagnosis import diagnose_beside
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
-from armid_ros.pair.leg_pair import leg_pair
-from armid_ros.pair.ties.diagnosis import diagnose_beside
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.recording import recorded_together, Recording
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_a_partner_to_which_nothing_explains_ties_is_refused(arm, partner, toget
 def test_without_a_partner_it_is_the_diagnosis_of_the_arm_alone(monkeypatch, arm) -> None:
     asked = {}
     monkeypatch.setattr(
-        'armid_ros.pair.ties.diagnosis.diagnose', lambda *_, **more: asked.update(more)
+        'armid_ros.diagnosis.ties.diagnosis.diagnose', lambda *_, **more: asked.update(more)
     )
     diagnose_beside(arm, [], None, rng=np.random.default_rng(0))
     assert asked['tied'] is None

@@ -11,8 +11,14 @@ from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
 from armid_ros.identification.rows.signals import Conditioning, segments
 from armid_ros.motion import Motion
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, pair_torques, PairMotion, TiedPair, walking
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import (
+    leg_pair,
+    pair_torques,
+    PairMotion,
+    TiedPair,
+    walking,
+)
 from armid_ros.recording import recorded_together, Recording
 import numpy as np
 import pytest

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import astuple
 
 from armid_ros.model import point_motion
-from armid_ros.pair.shares import trunk_shares
+from armid_ros.papers.exo.plant.shares import trunk_shares
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

@@ -16,7 +16,6 @@ LAYERS = (
     ('cli',),
     ('nodes',),
     ('live',),
-    ('pair',),
     ('api',),
     ('report', 'view'),
     ('residual',),

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 #: Folders of plug-ins, and the command that each brings.
-PLUG_INS = {'fleet': 'fleet', 'papers/elastic': 'elastic'}
+PLUG_INS = {'fleet': 'fleet', 'papers/elastic': 'elastic', 'papers/exo': 'exo'}
 #: Imports every module of the core but for what needs a terminal, then lists the commands.
 PROGRAM = """
 from importlib import import_module

@@ -15,7 +15,7 @@ MANY = {
     'api/identification.py:identify',
     'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
     'nodes/lockstep.py:run_lockstep',
-    'pair/ties/diagnosis.py:diagnose_beside',
+    'diagnosis/ties/diagnosis.py:diagnose_beside',
 }
 
 

@@ -9,12 +9,12 @@ from armid_ros.effects import make_effect
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.bag_player import BagPlayerNode
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
-from armid_ros.nodes.simulated_pair import SimulatedPairNode
+from armid_ros.papers.exo.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.papers.exo.nodes.simulated_pair import SimulatedPairNode
 from armid_ros.recording import Recording, write_recording
 from armid_ros.robots import load_robot
 import numpy as np

@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
+from armid_ros.papers.exo.nodes.interaction_identifier import InteractionIdentifierNode
 from builtin_interfaces.msg import Duration, Time
 import pytest
 from rosgraph_msgs.msg import Clock

@@ -16,6 +16,7 @@ from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
+from armid_ros.diagnosis.ties.diagnosis import diagnose_beside
 from armid_ros.diagnosis.verdict.document import SCHEMA
 from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.effects.tied import Partner
@@ -25,7 +26,6 @@ from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.identified_from import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
-from armid_ros.pair.ties.diagnosis import diagnose_beside
 from armid_ros.recording import Recording, require_once
 from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import percent, probability, value_of

@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 from armid_ros.cli.options import tell_damage
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
-from armid_ros.model.spring_ties import centroid_ties, Tie
-from armid_ros.pair.leg_pair import leg_ties
+from armid_ros.model.spring_ties import centroid_ties, leg_ties, Tie
 from armid_ros.recording import read_recording, ReadSettings, recorded_together, Recording
 from armid_ros.robots import load_robot, Robot
 

@@ -39,5 +39,3 @@ TARGETS = {
 #: `armid_ros.cli.excite.springs.COURSES`.
 FOURIER = 'fourier'
 COURSES = ('multisine', 'steps')
-#: What a leg and its exoskeleton do; `armid_ros.pair.exercises.EXERCISES`.
-EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')

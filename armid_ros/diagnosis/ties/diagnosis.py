@@ -10,8 +10,8 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings
 from armid_ros.diagnosis.diagnose import Progress
+from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.effects.tied import Partner
-from armid_ros.pair.ties.ties import diagnose_ties
 from armid_ros.recording import Recording
 import numpy as np
 

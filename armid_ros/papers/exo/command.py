@@ -7,11 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli.signatures import options
-from armid_ros.cli.signatures.choices import (
-    EXERCISES,
-)
 from armid_ros.cli.signatures.late import done_by
 import click
+
+#: What a leg and its exoskeleton do; `armid_ros.papers.exo.plant.exercises.EXERCISES`.
+EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 
 
 @click.command(
@@ -47,7 +47,7 @@ import click
 @options.seed
 @options.reading
 @options.as_json
-@done_by('exo')
+@done_by('armid_ros.papers.exo.work')
 def exo() -> None:
     """
     Find what ties an exoskeleton to its wearer.

@@ -18,28 +18,28 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.driven_cycle import check_cycle
-from armid_ros.pair.exercises import exercise
-from armid_ros.pair.gait import Gait, read_gait
-from armid_ros.pair.gait_cycle import gait_cycle, weight
-from armid_ros.pair.leg_pair import (
+from armid_ros.papers.exo.plant.driven_cycle import check_cycle
+from armid_ros.papers.exo.plant.exercises import exercise
+from armid_ros.papers.exo.plant.gait import Gait, read_gait
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, weight
+from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,
     TiedPair,
     walking,
 )
-from armid_ros.pair.report.page import (
+from armid_ros.papers.exo.plant.shares import ground_by_shares
+from armid_ros.papers.exo.plant.torque_driven import check_gait
+from armid_ros.papers.exo.plant.walkers import walking_pair
+from armid_ros.papers.exo.report.page import (
     exo_report,
     GaitChecks,
     ShownMotion,
     SimulatedWalk,
     WholeCycle,
 )
-from armid_ros.pair.report.walk import Driven, SOURCE
-from armid_ros.pair.shares import ground_by_shares
-from armid_ros.pair.torque_driven import check_gait
-from armid_ros.pair.walkers import walking_pair
+from armid_ros.papers.exo.report.walk import Driven, SOURCE
 from armid_ros.recording import read_recording, Recording, write_joint_states
 from armid_ros.recording.writer import require_new, whole_bag
 from armid_ros.robots.assumptions import read_assumptions

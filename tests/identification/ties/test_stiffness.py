@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.ties.poses import choose_poses, stiffness_bound
 from armid_ros.identification.ties.problem import (
     interaction_problem,
     InteractionProblem,
@@ -17,8 +16,9 @@ from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.search import find_interaction
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, PairMotion, stepping, TiedPair
+from armid_ros.papers.exo.identification.poses import choose_poses, stiffness_bound
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping, TiedPair
 from armid_ros.recording import Recording
 import numpy as np
 import pytest

@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.gait_cycle import gait_cycle, GaitCycle
-from armid_ros.pair.walkers import walking_pair
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, GaitCycle
+from armid_ros.papers.exo.plant.walkers import walking_pair
 import pytest
+
+from tests.ros.conftest import bench
+
+__all__ = ['bench']
 
 
 @pytest.fixture(scope='session')

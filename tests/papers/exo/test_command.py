@@ -7,6 +7,8 @@ from __future__ import annotations
 import json
 
 from armid_ros.cli import main
+from armid_ros.papers.exo import command
+from armid_ros.papers.exo.plant.exercises import EXERCISES
 from click.testing import CliRunner
 import pytest
 
@@ -86,3 +88,7 @@ def test_one_topic_is_not_enough(tmp_path) -> None:
     done = CliRunner().invoke(main, ['exo', '--out', str(tmp_path), '--topics', '/exo'])
     assert done.exit_code == 2
     assert 'give two' in done.output
+
+
+def test_help_offers_the_motions_that_there_are():
+    assert tuple(EXERCISES) == command.EXERCISES

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.pair.contact import Ground
+from armid_ros.papers.exo.plant.contact import Ground
 import numpy as np
 import pytest
 

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.pair.exercises import exercise, EXERCISES
-from armid_ros.pair.leg_pair import leg_pair
+from armid_ros.papers.exo.plant.exercises import exercise, EXERCISES
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
 import numpy as np
 import pytest
 

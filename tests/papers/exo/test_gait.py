@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.pair.gait import read_gait, stance_motion, steady_phase
+from armid_ros.papers.exo.plant.gait import read_gait, stance_motion, steady_phase
 import numpy as np
 import pytest
 

@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.pair.driven_cycle import check_cycle, driving_torque
-from armid_ros.pair.gait_cycle import weight
-from armid_ros.pair.shares import feet_by_shares, ground_by_shares
-from armid_ros.pair.walkers import contacts, floating, leg_length
+from armid_ros.papers.exo.plant.driven_cycle import check_cycle, driving_torque
+from armid_ros.papers.exo.plant.gait_cycle import weight
+from armid_ros.papers.exo.plant.shares import feet_by_shares, ground_by_shares
+from armid_ros.papers.exo.plant.walkers import contacts, floating, leg_length
 import numpy as np
 import pinocchio as pin
 import pytest

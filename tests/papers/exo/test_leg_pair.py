@@ -10,8 +10,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects.interaction import HumanInteraction
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import (
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
     PairMotion,

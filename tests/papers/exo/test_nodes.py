@@ -7,13 +7,13 @@ from __future__ import annotations
 import re
 
 from armid_msgs.msg import ParameterEstimate
-from armid_ros.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.simulated_pair import SimulatedPairNode
+from armid_ros.papers.exo.nodes.interaction_identifier import InteractionIdentifierNode
+from armid_ros.papers.exo.nodes.simulated_pair import SimulatedPairNode
 import pytest
 from sensor_msgs.msg import JointState
 
-from .conftest import busy
+from tests.ros.conftest import busy
 
 START_NS = 1_000 * 10**9
 

@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.ties.online import InteractionSettings, OnlineInteraction
-from armid_ros.pair.leg_pair import leg_pair
-from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
 import numpy as np
 import pytest
 

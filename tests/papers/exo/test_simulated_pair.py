@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from armid_ros.errors import RobotError
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, pair_torques, stepping
-from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair, pair_torques, stepping
+from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
 import numpy as np
 import pytest
 

@@ -5,9 +5,15 @@
 from __future__ import annotations
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, pair_torques, PairMotion, TiedPair, walking
-from armid_ros.pair.torque_driven import check_gait, drive_by_torque, splined
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import (
+    leg_pair,
+    pair_torques,
+    PairMotion,
+    TiedPair,
+    walking,
+)
+from armid_ros.papers.exo.plant.torque_driven import check_gait, drive_by_torque, splined
 import numpy as np
 import pytest
 

@@ -4,8 +4,14 @@
 
 from __future__ import annotations
 
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.walkable import foot_points, HEEL_DOWN, LegLength, TOE_DOWN, walkable
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.walkable import (
+    foot_points,
+    HEEL_DOWN,
+    LegLength,
+    TOE_DOWN,
+    walkable,
+)
 import numpy as np
 import pytest
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.motion import Motion
-from armid_ros.pair.walkers import columns, floating, leg_length, walker
+from armid_ros.papers.exo.plant.walkers import columns, floating, leg_length, walker
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

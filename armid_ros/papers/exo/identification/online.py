@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
-from armid_ros.identification.ties.slack import find_slack, Slack
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model.spring_ties import Tie, TiedMachines
 from armid_ros.motion import FloatArray
+from armid_ros.papers.exo.identification.slack import find_slack, Slack
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np

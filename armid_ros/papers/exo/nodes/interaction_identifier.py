@@ -14,14 +14,14 @@ from armid_ros.identification.rows.causal import LARGEST
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.joint_order import JointOrder
 from armid_ros.identification.samples.straight_line import StreamSample
-from armid_ros.identification.ties.online import InteractionSettings, OnlineInteraction
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run
-from armid_ros.pair.leg_pair import leg_pair
+from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType

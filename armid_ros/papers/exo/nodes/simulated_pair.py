@@ -9,14 +9,15 @@ import math
 from pathlib import Path
 from typing import Any
 
+from armid_ros.model.spring_ties import SEGMENTS
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
-from armid_ros.pair.gait import read_gait
-from armid_ros.pair.leg_pair import leg_pair, SEGMENTS
-from armid_ros.pair.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.leg_pair import leg_pair
+from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher

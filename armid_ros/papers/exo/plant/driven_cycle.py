@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.gait_cycle import GaitCycle, walking_torques
-from armid_ros.pair.leg_pair import TiedPair
-from armid_ros.pair.torque_driven import DrivingTorque, GaitCheck, splined
-from armid_ros.pair.walkers import contacts, floating, leg_length
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, walking_torques
+from armid_ros.papers.exo.plant.leg_pair import TiedPair
+from armid_ros.papers.exo.plant.torque_driven import DrivingTorque, GaitCheck, splined
+from armid_ros.papers.exo.plant.walkers import contacts, floating, leg_length
 from armid_ros.robots import Robot
 import numpy as np
 import pinocchio as pin

@@ -16,9 +16,16 @@ from typing import NamedTuple
 
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, point_motion
-from armid_ros.model.spring_ties import centroid_ties, Tie, tie_geometry, TiedMachines, TieGeometry
+from armid_ros.model.spring_ties import (
+    leg_ties,
+    SEGMENTS,
+    Tie,
+    tie_geometry,
+    TiedMachines,
+    TieGeometry,
+)
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.pair.gait import (
+from armid_ros.papers.exo.plant.gait import (
     Gait,
     Phase,
     stance_motion,
@@ -29,11 +36,6 @@ from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 import numpy.typing as npt
-
-#: Segments of the leg pair that are tied: in the order of the source, F1 to F4.
-SEGMENTS = ('swing_shank', 'swing_thigh', 'stance_thigh', 'stance_shank')
-#: The joint that moves each of them.
-_MOVED_BY = ('swing_knee', 'swing_hip', 'stance_knee', 'stance_ankle')
 
 
 @dataclass(frozen=True)
@@ -221,24 +223,6 @@ def leg_pair(
     if stiffness is None:
         stiffness = read_assumptions()['interaction_stiffness'].value
     return TiedPair(exo, human, ties, np.asarray(stiffness, dtype=float))
-
-
-def leg_ties(exo: Robot, human: Robot, segments: Sequence[str] = SEGMENTS) -> tuple[Tie, ...]:
-    """
-    Tie the shipped exoskeleton to its wearer where the source has springs.
-
-    Raises
-    ------
-    ModelError
-        If there is no such segment.
-
-    """
-    unknown = [segment for segment in segments if segment not in SEGMENTS]
-    if unknown:
-        raise ModelError(f"no segment '{unknown[0]}'; there are {', '.join(SEGMENTS)}")
-    joints = [_MOVED_BY[SEGMENTS.index(segment)] for segment in segments]
-    ties = centroid_ties(exo, human, [(f'exo_{j}', f'human_{j}') for j in joints])
-    return tuple(replace(tie, name=s) for tie, s in zip(ties, segments, strict=True))
 
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = None) -> PairMotion:

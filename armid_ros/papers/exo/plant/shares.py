@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.gait_cycle import GaitCycle
-from armid_ros.pair.walkers import columns, floating, SIDES
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
+from armid_ros.papers.exo.plant.walkers import columns, floating, SIDES
 from armid_ros.robots import Robot
 import numpy as np
 

@@ -8,9 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.gait import Gait, read_gait
-from armid_ros.pair.leg_pair import leg_pair, pair_torques, PairMotion, stepping, TiedPair
-from armid_ros.pair.torque_driven import drive_by_torque
+from armid_ros.papers.exo.plant.gait import Gait, read_gait
+from armid_ros.papers.exo.plant.leg_pair import (
+    leg_pair,
+    pair_torques,
+    PairMotion,
+    stepping,
+    TiedPair,
+)
+from armid_ros.papers.exo.plant.torque_driven import drive_by_torque
 from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import TrajectoryError
 from armid_ros.model.spring_ties import tie_geometry
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline

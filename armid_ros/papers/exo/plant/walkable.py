@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.motion import FloatArray
-from armid_ros.pair.gait import Gait
+from armid_ros.papers.exo.plant.gait import Gait
 import numpy as np
 from scipy.optimize import least_squares
 

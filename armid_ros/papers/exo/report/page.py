@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
-from armid_ros.pair.gait_cycle import GaitCycle
-from armid_ros.pair.leg_pair import pair_torques, PairMotion, TiedPair
-from armid_ros.pair.report.poses import draw_poses
-from armid_ros.pair.report.sections import Assumptions, Forces, GaitSection, Poses, Stiffness
-from armid_ros.pair.report.walk import CycleByTorque, Driven, FootForces, Walk
-from armid_ros.pair.torque_driven import GaitCheck
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.torque_driven import GaitCheck
+from armid_ros.papers.exo.report.poses import draw_poses
+from armid_ros.papers.exo.report.sections import Assumptions, Forces, GaitSection, Poses, Stiffness
+from armid_ros.papers.exo.report.walk import CycleByTorque, Driven, FootForces, Walk
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection

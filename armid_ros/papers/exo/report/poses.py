@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from armid_ros.model import point_motion
 from armid_ros.motion import FloatArray
-from armid_ros.pair.leg_pair import PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.report.strip import SIDE, Strip, svg_points
 from armid_ros.robots import Robot
 import numpy as np

@@ -10,8 +10,8 @@ from typing import ClassVar
 
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
-from armid_ros.pair.report.poses import Drawing
-from armid_ros.pair.torque_driven import GaitCheck
+from armid_ros.papers.exo.plant.torque_driven import GaitCheck
+from armid_ros.papers.exo.report.poses import Drawing
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.page import Section
 from armid_ros.robots.assumptions import Assumption
@@ -35,7 +35,8 @@ class Stiffness(Section):
     """
 
     title: ClassVar[str] = 'Stiffness'
-    template: ClassVar[str] = 'exo_stiffness.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'stiffness.html'
 
     found: Sequence[Interaction]
     truth: Mapping[str, float]
@@ -96,7 +97,8 @@ class GaitSection(Section):
     """
 
     title: ClassVar[str] = 'Gait by torque'
-    template: ClassVar[str] = 'exo_gait.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'gait.html'
 
     checks: Sequence[tuple[GaitCheck, GaitCheck]]
     softer: float
@@ -160,7 +162,8 @@ class Forces(Section):
     """
 
     title: ClassVar[str] = 'Interaction'
-    template: ClassVar[str] = 'exo_forces.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'forces.html'
 
     abscissa: FloatArray
     abscissa_name: str
@@ -229,7 +232,8 @@ class Poses(Section):
     """
 
     title: ClassVar[str] = 'Poses'
-    template: ClassVar[str] = 'exo_poses.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'poses.html'
 
     drawing: Drawing
 
@@ -247,7 +251,8 @@ class Assumptions(Section):
     """
 
     title: ClassVar[str] = 'Assumptions'
-    template: ClassVar[str] = 'exo_assumptions.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'assumptions.html'
 
     assumptions: Mapping[str, Assumption]
 

@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.pair.driven_cycle import DrivenCycle
-from armid_ros.pair.gait_cycle import GaitCycle, weight
-from armid_ros.pair.shares import feet_by_shares
-from armid_ros.pair.walkers import columns, contacts, floating, leg_length, SIDES
+from armid_ros.papers.exo.plant.driven_cycle import DrivenCycle
+from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, weight
+from armid_ros.papers.exo.plant.shares import feet_by_shares
+from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.report.charts import Chart, Mark, script_json, Series
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
@@ -75,7 +75,8 @@ class Walk(Section):
     """
 
     title: ClassVar[str] = 'Walking'
-    template: ClassVar[str] = 'exo_walk.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'walk.html'
 
     cycle: GaitCycle
     driven: Sequence[Driven]
@@ -166,7 +167,8 @@ class FootForces(Section):
     """
 
     title: ClassVar[str] = 'Feet'
-    template: ClassVar[str] = 'exo_feet.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'feet.html'
 
     cycle: GaitCycle
 
@@ -239,7 +241,8 @@ class CycleByTorque(Section):
     """
 
     title: ClassVar[str] = 'Whole cycle by torque'
-    template: ClassVar[str] = 'exo_cycle.html'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'cycle.html'
 
     cycle: GaitCycle
     driven: Sequence[Driven]
