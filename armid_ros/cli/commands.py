@@ -55,10 +55,6 @@ COMMANDS = {
     ),
     'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
     'diagnose': Listed('diagnose', 'Find which effect a model lacks, and add it.'),
-    'lunar': Listed(
-        'lunar',
-        'Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures.',
-    ),
     'compare': Listed('compare', 'Say what changed between two identifications of one robot.'),
     'recover': Listed(
         'record',

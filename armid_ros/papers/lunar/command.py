@@ -13,6 +13,6 @@ import click
 @options.folder
 @options.seed
 @options.as_json
-@done_by('lunar')
+@done_by('armid_ros.papers.lunar.work')
 def lunar() -> None:
     """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from armid_ros.identification.lunar.reproduction import Repeated, Reproduction
 from armid_ros.motion import FloatArray
+from armid_ros.papers.lunar.reproduction import Repeated, Reproduction
 
 SCHEMA = 'armid/lunar/1'
 

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.identification.lunar.paper import LOAD, STATED_ERROR
-from armid_ros.identification.lunar.reproduction import Repeated, Reproduction
+from armid_ros.papers.lunar.paper import LOAD, STATED_ERROR
+from armid_ros.papers.lunar.reproduction import Repeated, Reproduction
+from armid_ros.papers.lunar.sections import GravityParameters, PaperTables, TorqueCurves
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
-from armid_ros.report.sections.lunar import GravityParameters, PaperTables, TorqueCurves
 import numpy as np
 
 #: Wanted of Tables 3 and 4 [% of the peak], and of Table 6 [of the noise].

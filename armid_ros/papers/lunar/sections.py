@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.identification.lunar.reproduction import Composite, Repeated
 from armid_ros.motion import FloatArray
+from armid_ros.papers.lunar.reproduction import Composite, Repeated
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Section
@@ -31,7 +31,8 @@ class PaperTables(Section):
     """
 
     title: ClassVar[str] = 'Tables'
-    template: ClassVar[str] = 'lunar_tables.html'
+    package: ClassVar[str] = 'armid_ros.papers.lunar'
+    template: ClassVar[str] = 'tables.html'
 
     repeated: tuple[Repeated, ...]
 
@@ -83,7 +84,8 @@ class TorqueCurves(Section):
     """
 
     title: ClassVar[str] = 'Torque curves'
-    template: ClassVar[str] = 'lunar_curves.html'
+    package: ClassVar[str] = 'armid_ros.papers.lunar'
+    template: ClassVar[str] = 'curves.html'
 
     repeated: tuple[Repeated, ...]
 
@@ -126,7 +128,8 @@ class GravityParameters(Section):
     """
 
     title: ClassVar[str] = 'Gravity parameters'
-    template: ClassVar[str] = 'lunar_composites.html'
+    package: ClassVar[str] = 'armid_ros.papers.lunar'
+    template: ClassVar[str] = 'composites.html'
 
     composites: tuple[Composite, ...]
     load: str

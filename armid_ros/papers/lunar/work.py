@@ -12,9 +12,9 @@ from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import write_document
-from armid_ros.identification.lunar.output import lunar_document, SCHEMA
-from armid_ros.identification.lunar.reproduction import reproduce
-from armid_ros.report.lunar_report import lunar_report, sentences
+from armid_ros.papers.lunar.output import lunar_document, SCHEMA
+from armid_ros.papers.lunar.report import lunar_report, sentences
+from armid_ros.papers.lunar.reproduction import reproduce
 import click
 
 OUTPUTS = ('lunar.json', 'report.html')

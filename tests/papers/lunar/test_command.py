@@ -7,8 +7,7 @@ import json
 import pytest
 
 from docsite.schemas import faults
-
-from .conftest import armid
+from tests.cli.conftest import armid
 
 pytestmark = pytest.mark.slow
 
