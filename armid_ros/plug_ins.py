@@ -10,13 +10,17 @@ which has a function ``main``, in the group ``armid_ros.nodes``. Effects have a 
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points, EntryPoint
+from functools import cache
 from importlib.util import find_spec
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.errors import ArmidError
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
+
+@cache
 def plug_ins(kind: str) -> dict[str, EntryPoint]:
     """
     Find plug-ins by name, without those whose folder was deleted.
@@ -27,6 +31,8 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
         Commands or nodes: what the name of the group ends with.
 
     """
+    from importlib.metadata import entry_points  # commands of the core start without it
+
     found = entry_points(group=f'armid_ros.{kind}')
     return {entry.name: entry for entry in found if _is_there(entry.module)}
 

@@ -7,6 +7,7 @@ import sys
 import types
 
 from armid_ros.cli import commands, main, node
+from armid_ros.plug_ins import plug_ins
 import click
 from click.testing import CliRunner
 import pytest
@@ -37,10 +38,12 @@ def installed(monkeypatch):
     modules['of_others'].__path__ = []
     modules['of_others.greet'].greet = greet
     modules['of_others.waver'].waver = types.SimpleNamespace(main=lambda: 3)
-    monkeypatch.setattr('armid_ros.plug_ins.entry_points', entries)
-    commands._imported.cache_clear()
+    monkeypatch.setattr('importlib.metadata.entry_points', entries)
+    for cached in (commands._imported, plug_ins):
+        cached.cache_clear()
     yield
-    commands._imported.cache_clear()
+    for cached in (commands._imported, plug_ins):
+        cached.cache_clear()
 
 
 def run(*arguments):
