@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line
-from armid_ros.excitation.limits import check_limits, Limits
+from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY
 from armid_ros.excitation.run import Run
 from armid_ros.excitation.supervision import HANDOVER, held, slowed
 from armid_ros.excitation.transfer import TransferPlanner
@@ -23,8 +23,6 @@ _LONGER, _TRIES = 1.25, 8
 #: step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest, and the rest is
 #: for the speed that the arm has.
 _STEP = 3.0
-#: Velocity of a joint without a limit [rad/s or m/s].
-_UNSTATED = 1.0
 #: Interval with which the proof of clearance begins [s].
 _INTERVAL = 0.1
 #: Effort of a joint that is expected at least, as a share of its limit: dry friction of a wrist.
@@ -94,8 +92,9 @@ class MotionGate:
         room = np.where(np.isfinite(robot.torque_limit), _LEAST_EFFORT * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
         gate = cls(run, rate, limits, planner.clearance, planner.margin, effort)
-        if planner.limits is not None:
-            gate._require(motion, torque, 'the run')
+        violations = check_limits(limits, motion, torque) if planner.limits is not None else ()
+        if violations:
+            raise TrajectoryError(f'the run is not sent: {violations[0]}')
         times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / _INTERVAL)) + 1)
         if planner.clearance is not None:
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times, planner.margin)
@@ -117,10 +116,11 @@ class MotionGate:
             Where the arm is [rad or m]; NaN: unknown. A controller that begins there needs time
             to get to the path.
 
-        Raises
-        ------
-        TrajectoryError
-            If no stop keeps the limits; the run has to exceed them itself for that.
+        Returns
+        -------
+        Motion
+            Within the positions and velocities of the run. An acceleration limit is exceeded only
+            if the longest stop exceeds it, too: a stop is always sent.
 
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
@@ -129,7 +129,6 @@ class MotionGate:
             if not check_limits(self.limits, motion):
                 break
             duration *= _LONGER
-        self._require(motion, None, 'the stop')
         step = np.nan_to_num(np.abs(measured - self.run.at([phase]).q[0]))
         lead = min(self._time_of(step), float(motion.t[-2]))
         return motion.select(slice(int(np.searchsorted(motion.t, lead)), None))
@@ -181,7 +180,7 @@ class MotionGate:
         """
         beyond = np.nan_to_num(np.abs(effort)) - factor * self.effort
         j = int(np.argmax(beyond))
-        if factor == 0.0 or self.effort[j] == 0.0 or beyond[j] <= 0.0:  # noqa: RUF069 - as it is written
+        if not (factor > 0.0 and self.effort[j] > 0.0 and beyond[j] > 0.0):
             return ''
         return (
             f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "
@@ -191,12 +190,7 @@ class MotionGate:
 
     def _time_of(self, step: FloatArray) -> float:
         """Return the time that a small step of each joint takes within the limits [s]."""
-        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, _UNSTATED)
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
         return _STEP * float(
             max((step / velocity).max(), np.sqrt(step / self.limits.acceleration).max())
         )
-
-    def _require(self, motion: Motion, torque: FloatArray | None, what: str) -> None:
-        violations = check_limits(self.limits, motion, torque)
-        if violations:
-            raise TrajectoryError(f'{what} is not sent: {violations[0]}')

@@ -9,6 +9,8 @@ import os
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
+    ClearanceModel,
+    CollisionScene,
     Excitation,
     Limits,
     random_feasible,
@@ -28,6 +30,7 @@ from sensor_msgs.msg import JointState
 from tests.ros.controller import Controller, SECOND
 
 ROBOT = load_robot('humanoid_arm')
+SCENE = CollisionScene.of(ROBOT, 0.02)
 HOME = (ROBOT.lower + ROBOT.upper) / 2.0
 STEP = 0.02
 EPOCH = 10_000
@@ -53,8 +56,11 @@ class Bed:
         self.dt = step
         self.displaced = False  # whether the arm seems to stand a little off its path
         self.offset, self.changes, self.paths, self.violations = 0.0, [], [], []
+        self.set_points = []
         self.arm = Controller(bench, ROBOT, HOME)
-        planner = TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+        bodies = ClearanceModel.of(SCENE.bodies)
+        limits = transfer_limits(ROBOT, 1.0)
+        planner = TransferPlanner(ArmModel(ROBOT), limits, bodies, SCENE.clearance)
         options = {'start': False, 'approach': 1.0, 'tracking_tolerance': TOLERANCE}
         self.node = node = bench.add(
             ExcitationPublisherNode, excitation, planner, **(options | parameters)
@@ -116,6 +122,7 @@ class Bed:
             if away > allowed:
                 self.violations.append(f'{arm.now:.2f} s: {away:.3f} from every planned path')
         self._before = q
+        self.set_points.append(q)
 
     def run(self, seconds):
         for _ in range(round(seconds / self.dt)):
@@ -141,13 +148,17 @@ class Bed:
             speed = np.abs(self.arm.state(self.arm.now).dq).max()
             if speed > 1e-3:
                 self.violations.append(f'not at rest after the end: {speed}')
+        nearest = SCENE.bodies.path_clearance(np.array(self.set_points)).min()
+        if nearest <= 0.0:
+            self.violations.append(f'bodies or the floor were met: {nearest:.4f} m')
 
 
 @pytest.fixture(scope='module')
 def excitation():
     rng = np.random.default_rng(3)
     limits = Limits.of(ROBOT, speed='fast')
-    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
+    collision = {'collision': SCENE.bodies, 'margin': SCENE.clearance}
+    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng, **collision), 1, 0.5)
 
 
 def other(message, joint, value, *, add=False):

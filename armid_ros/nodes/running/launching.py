@@ -11,6 +11,16 @@ from typing import Any, NamedTuple
 
 import yaml
 
+#: Parameters of the simulated arm, where neither an argument nor a parameter file sets them.
+SIMULATED_DRIVES: Mapping[str, Any] = {
+    'rate': 500.0,
+    'torque_noise': [0.05],
+    'effects': [
+        'viscous_friction:viscous_coefficient=0.5',
+        'coulomb_friction:coulomb_torque=0.2',
+    ],
+}
+
 
 class Argument(NamedTuple):
     """
