@@ -35,7 +35,7 @@ def test_a_stop_is_sent_on_the_path_whatever_the_acceleration_limit(gate, share,
         gate, limits=replace(gate.limits, acceleration=share * gate.limits.acceleration)
     )
     phase = float(np.clip(where, 0.0, 1.0)) * gate.run.duration
-    motion = strict.stop(where * gate.run.duration, 0.3, np.full(2, np.nan))
+    motion = strict.stop(where * gate.run.duration, 0.3, *np.full((2, 2), np.nan))
     path = gate.run.at(np.arange(0.0, gate.run.duration + 1e-3, 1e-3)).q
     away = np.abs(motion.q[:, np.newaxis] - path).max(axis=2).min(axis=1)
     assert away.max() < 0.01

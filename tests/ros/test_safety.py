@@ -234,6 +234,76 @@ def test_wrong_positions_do_not_move_the_arm(bench, excitation, value, count):
         assert bed.node.elapsed is not None
 
 
+def renamed(message):
+    message.name = [f'other_{name}' for name in message.name]
+
+
+def shorter(message):
+    message.position = message.position[:2]
+
+
+def without_positions(message):
+    message.position = []
+
+
+def nameless(message):
+    message.name = []
+
+
+def twice(message):
+    message.name = [message.name[0], *list(message.name)[:-1]]
+
+
+def late(message):
+    message.header.stamp.sec += 3600
+
+
+def early(message):
+    message.header.stamp.sec -= 3600
+
+
+def overflowing(message):
+    message.header.stamp.sec = 2**31 - 1
+
+
+def infinite_velocity(message):
+    message.velocity = [np.inf] * len(message.name)
+
+
+def infinite_effort(message):
+    message.effort = [-np.inf] * len(message.name)
+
+
+MALFORMED = (
+    renamed, shorter, without_positions, nameless, twice, late, early, overflowing,
+    infinite_velocity, infinite_effort,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize('count', [1, 10**6])
+@pytest.mark.parametrize('spoil', MALFORMED, ids=lambda spoil: spoil.__name__)
+def test_malformed_states_do_not_move_the_arm(bench, excitation, spoil, count):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.7)
+    left = [count]
+
+    def change(messages):
+        for message in messages if left[0] > 0 else ():
+            spoil(message)
+        left[0] -= 1
+        return messages
+
+    bed.changes.append(change)
+    bed.run(2.0)
+    bed.changes.clear()
+    bed.run(0.1)
+    bed.close()
+    assert not bed.violations
+    assert not bed.node.complaints.defects
+
+
 @pytest.mark.parametrize('offset', [3600.0, -3600.0, -0.6, -0.3, 0.45])
 def test_a_step_of_the_clock_disables_nothing(bench, excitation, offset):
     bed = Bed(bench, excitation)
