@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import arm_of, generator, Rng, RobotLike
 from armid_ros.api.table import Shown, Summary
 from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     CollisionScene,
     Design,
@@ -20,11 +22,13 @@ from armid_ros.excitation import (
     load_excitation,
     save_excitation,
     whole_period,
+    with_joint_limits,
 )
 from armid_ros.excitation.geometry.floor import NO_FLOOR
 from armid_ros.files import write_file
 from armid_ros.motion import Motion
 from armid_ros.recording import read_waypoints, ReadReport, Recording, write_joint_trajectory
+from armid_ros.robots import joints_beside_arms
 from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation import simulate as run
 import numpy as np
@@ -119,7 +123,7 @@ class ExcitationResult(Shown):
     def summary(self) -> Summary:
         """Return how much of its limits every joint uses."""
         shares = self.core.limits_used(self.arm)
-        joints = self.arm.robot.joints
+        joints, unchecked = self.arm.robot.joints, self.scene.unchecked
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
             for k, joint in enumerate(joints)
@@ -130,6 +134,7 @@ class ExcitationResult(Shown):
             'parameters',
             heads=('joint', *(f'{name} used' for name in shares)),
             rows=rows,
+            lines=['not checked: ' + '; '.join(unchecked)] if unchecked else [],
         )
 
 
@@ -142,6 +147,7 @@ def design_excitation(
     time_budget: float = 60.0,
     floor: str | float | None = None,
     environment: str | Path | None = None,
+    joint_limits: str | Path | Mapping[str, float] | None = None,
     **settings: Any,
 ) -> ExcitationResult:
     """
@@ -166,6 +172,9 @@ def design_excitation(
         of an arm that stands, or what is shipped with the robot.
     environment : str or Path, optional
         YAML with what stands around the arm, or a planning scene of MoveIt.
+    joint_limits : str, Path or mapping of str to float, optional
+        ``joint_limits.yaml`` of MoveIt, or the velocity limit of joints by name [rad/s or m/s].
+        A joint without any velocity limit gets a slow one, which the summary names.
     **settings
         Further ones of ``armid_ros.excitation.DesignSettings``: ``speed='slow'``, ``starts=1``,
         ``iterations=20``, ``criterion='D'``.
@@ -190,13 +199,25 @@ def design_excitation(
 
     """
     model = arm_of(arm)
+    others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
+    if others:
+        kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
+        raise TrajectoryError(
+            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
+        )
+    velocity = joint_limits if isinstance(joint_limits, Mapping) else {}
+    file = None if isinstance(joint_limits, Mapping) else joint_limits
+    given = [f'{joint}:={limit}' for joint, limit in velocity.items()]
+    robot, acceleration = with_joint_limits(model.robot, file, given)
+    model = replace(model, robot=robot)
     run_in = min(_RUN_IN, 0.1 * duration)
     known = DesignSettings(
         period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
         n_periods=periods,
         run_in=run_in,
         time_budget=time_budget,
-        **settings,
+        **{'acceleration': acceleration, **settings},
     )
     height = None if floor is None else str(floor)
     scene = CollisionScene.of(model.robot, known.clearance, height, environment)

@@ -87,8 +87,16 @@ class MotionGate:
         none = np.full(robot.n_joints, np.inf)
         limits = Limits(robot.joints, robot.lower, robot.upper, none, none, none, robot.prismatic)
         if planner.limits is not None:
-            limits = Limits.of(robot, speed=1.0, torque_fraction=1.0, position_margin=0.0)
-        limits = replace(limits, acceleration=np.maximum(limits.acceleration, 1.001 * peak))
+            limits = Limits.of(
+                robot,
+                speed=1.0,
+                torque_fraction=1.0,
+                position_margin=0.0,
+                acceleration=planner.acceleration,
+            )
+        usual = np.maximum(limits.acceleration, 1.001 * peak)
+        given = np.isfinite(planner.given_acceleration)
+        limits = replace(limits, acceleration=np.where(given, limits.acceleration, usual))
         room = np.where(np.isfinite(robot.torque_limit), _LEAST_EFFORT * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
         gate = cls(run, rate, limits, planner.clearance, planner.margin, effort)

@@ -5,6 +5,7 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     Excitation,
     Limits,
@@ -42,3 +43,12 @@ def test_a_stop_is_sent_on_the_path_whatever_the_acceleration_limit(gate, share,
     np.testing.assert_allclose(motion.dq[-1], 0.0, atol=1e-9)
     assert np.all(np.abs(motion.dq) <= np.abs(gate.run.motion().dq).max(axis=0) + 1e-9)
     assert np.abs(motion.q[0] - gate.run.at([phase]).q[0]).max() < 0.1
+
+
+def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
+    peak = np.abs(gate.run.motion().ddq).max(axis=0)
+    given = np.array([np.nan, 0.9 * peak[1]])
+    arm = ArmModel(two_link)
+    planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0, given)
+    with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
+        MotionGate.of(gate.run, planner, 100.0)
