@@ -3,7 +3,9 @@
 """Functions that can be read at a sight, and names that stand for one thing."""
 
 import ast
-from collections import defaultdict
+from collections import Counter, defaultdict
+import json
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +19,11 @@ MANY = {
     'nodes/lockstep.py:run_lockstep',
     'pair/ties/diagnosis.py:diagnose_beside',
 }
+
+#: Lines that a room of the package may have. A room that shrinks takes its number along: a budget
+#: is at most `SLACK` above what is there, and none is ever raised.
+BUDGETS = json.loads(Path(__file__).with_name('budgets.json').read_text('utf-8'))
+SLACK = 1.02
 
 
 @pytest.fixture(scope='module')
@@ -58,6 +65,23 @@ def test_no_file_is_longer_than_can_be_read_at_once(root):
     assert len(files) > 100
     lines = {str(path): path.read_text('utf-8').count('\n') for path in files}
     assert {name: count for name, count in lines.items() if count > MOST_OF_FILE} == {}
+
+
+def lines_by_room(root):
+    """Count the lines of every room of the package, of the tests and of the benchmarks."""
+    lines = Counter()
+    for folder in ('armid_ros', 'tests', 'benchmarks'):
+        for path in (root / folder).rglob('*.py'):
+            place = path.relative_to(root)
+            rooms = place.parts[: 2 if folder == 'armid_ros' and len(place.parts) > 2 else 1]
+            lines['/'.join(rooms)] += path.read_text('utf-8').count('\n')
+    return lines
+
+
+def test_every_room_keeps_its_budget(root):
+    lines = lines_by_room(root)
+    assert {room: n for room, n in lines.items() if n > BUDGETS.get(room, 0)} == {}
+    assert {room: n for room, n in BUDGETS.items() if n > SLACK * lines[room] + 20} == {}
 
 
 def test_no_room_has_more_files_than_can_be_seen_at_once(root):
