@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 import os
 import signal
 import subprocess
@@ -32,11 +33,6 @@ def short_excitation():
     return Excitation(random_feasible(ArmModel(robot), limits, 4.0, 2, rng), 1, 1.0)
 
 
-def _hung_up_by_default():
-    """Let SIGHUP end a process also where the tests run under nohup and hand that on."""
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
-
-
 class Processes:
     """Nodes as processes on the domain of a bench."""
 
@@ -57,13 +53,15 @@ class Processes:
         return self.run_command([sys.executable, '-m', f'armid_ros.nodes.{node}', *arguments])
 
     def run_command(self, command):
+        # SIGHUP ends a process also where the tests run under nohup, which hands that on; Python
+        # code between fork and exec may wait for ever for another thread's lock.
         process = subprocess.Popen(
-            command,
+            ['env', '--default-signal=HUP', *command],
             env=self._environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=_hung_up_by_default,
+            start_new_session=True,
         )
         self.running.append(process)
         return process
@@ -85,9 +83,9 @@ def processes(bench):
     processes = Processes(bench)
     yield processes
     for process in processes.running:
-        if process.poll() is None:
-            process.kill()
-            process.communicate()
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # and what it started
+        process.communicate()
 
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL])
