@@ -88,6 +88,13 @@ def processes(bench):
         process.communicate()
 
 
+def recorded(diagnostics):
+    """Return how many messages the recorder has written, by its last diagnostics."""
+    statuses = [s for d in diagnostics for s in d.status if s.name == 'recorder: state']
+    values = {v.key: v.value for s in statuses for v in s.values}
+    return int(values.get('messages', 0))
+
+
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL])
 def test_a_node_ends_in_order_with_the_process_that_started_it(bench, processes, tmp_path, number):
     """As the nodes of a launch that gets SIGTERM, which it does not pass on."""
@@ -97,7 +104,9 @@ def test_a_node_ends_in_order_with_the_process_that_started_it(bench, processes,
     code = f'import subprocess; subprocess.run({node!r})'
     launch = processes.run_command([sys.executable, '-c', code])
     publisher = bench.matched_publisher(String, 'text', LATCHED)
+    diagnostics = bench.diagnostics()
     publisher.publish(String(data='one'))
+    bench.spin_until(lambda: recorded(diagnostics) == 1, 'the recording')
     launch.send_signal(number)
     bench.spin_until((bag / 'metadata.yaml').is_file, 'the end of the bag')
     assert [topic.count for topic in topics(bag)] == [1]
@@ -117,13 +126,8 @@ def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_
     )
     arm = processes.start('simulated_arm', 'rate:=200.0')
 
-    def recorded():
-        statuses = [s for d in diagnostics for s in d.status if s.name == 'recorder: state']
-        values = {v.key: v.value for s in statuses for v in s.values}
-        return int(values.get('messages', 0))
-
     bench.spin_until(lambda: estimates and estimates[-1].samples > 200, 'the estimates')
-    bench.spin_until(lambda: recorded() > 600, 'the recording')
+    bench.spin_until(lambda: recorded(diagnostics) > 600, 'the recording')
     for process in (arm, identifier, excitation):
         errors = processes.end(process, signal.SIGINT, signal.SIGINT)
         assert process.returncode == 0 and 'Traceback' not in errors, errors
