@@ -278,7 +278,7 @@ def identify(
         To be predicted and not to be fitted.
     effects : str
         Catalogue names with commas, for a robot without a model.
-    method : {'ols', 'wls', 'irls', 'iv', 'cloe', 'ekf'}
+    method : {'ols', 'wls', 'irls', 'iv'}
         Least squares with all joints alike, weighted by their noise, or robust as well;
         instrumental variables, closed-loop output error, extended Kalman filter.
     cutoff : float, optional

@@ -20,7 +20,13 @@ from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.identification.assess.forward import unlimited
 from armid_ros.identification.fitting.excited import bounds
 from armid_ros.identification.fitting.least_squares import noise_products
-from armid_ros.identification.fitting.nonlinear import FittedValues, linearised, moved, torques
+from armid_ros.identification.fitting.nonlinear import (
+    FittedValues,
+    linearised,
+    moved,
+    torques,
+    ungrouped,
+)
 from armid_ros.identification.fitting.triangle import within
 from armid_ros.identification.rows.regression import filtered_columns, Regression
 from armid_ros.identification.rows.signals import Conditioning, segments
@@ -32,7 +38,7 @@ from scipy import signal
 import scipy.linalg
 
 #: The reference keeps this share of the band of the regressor, which is ten times the motion's.
-REFERENCE_SHARE = 0.2
+_REFERENCE_SHARE = 0.2
 #: Simulations; a linear arm settles after two.
 _MOST_ROUNDS = 4
 #: A change of less than this share of a standard deviation is the last.
@@ -63,7 +69,6 @@ def fit_by_instruments(
     fit: FittedValues,
     recordings: Sequence[Recording],
     used: Conditioning,
-    free: FloatArray,
 ) -> tuple[FittedValues, tuple[str, ...]]:
     """
     Fit by instruments of a simulation, beginning from least squares.
@@ -76,8 +81,6 @@ def fit_by_instruments(
         Training data.
     used : Conditioning
         Filters.
-    free : ndarray, shape (10 n, k)
-        Directions of the rigid parameters that change no torque.
 
     Returns
     -------
@@ -87,7 +90,7 @@ def fit_by_instruments(
         What a person should know of it.
 
     """
-    notes: tuple[str, ...] = ()
+    notes, free = tuple[str, ...](), ungrouped(fit.arm, fit.base)
     base, now, simulated = fit.base, fit, True
     limits = bounds(fit.arm, base)
     for _ in range(_MOST_ROUNDS):
@@ -162,7 +165,7 @@ def by_instruments(
     return Instrumented(values / scale, covariance / np.outer(scale, scale))
 
 
-def smooth_reference(motion: Motion, cutoff_hz: float) -> Motion:
+def _smooth_reference(motion: Motion, cutoff_hz: float) -> Motion:
     """Return a motion from time zero on, its positions smoothed below a frequency."""
     period = float(motion.t[1] - motion.t[0])
     sections = signal.butter(4, min(0.9, 2.0 * cutoff_hz * period), output='sos')
@@ -173,7 +176,7 @@ def smooth_reference(motion: Motion, cutoff_hz: float) -> Motion:
     )
 
 
-def at_times(simulated: Motion, motion: Motion) -> Motion:
+def _at_times(simulated: Motion, motion: Motion) -> Motion:
     """Return a simulated motion at the times of a recorded one, which begins at its zero."""
     t = motion.t - motion.t[0]
     q, dq, ddq = (
@@ -189,12 +192,12 @@ def _simulated_columns(
     """Return the columns of the arm along its own motion, simulated on the smoothed one."""
     arm, found = fit.arm, []
     for motion in _motions(recordings, used):
-        reference = smooth_reference(motion, REFERENCE_SHARE * used.cutoff_hz)
+        reference = _smooth_reference(motion, _REFERENCE_SHARE * used.cutoff_hz)
         plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
         run = simulate(
             plant, reference, rng=np.random.default_rng(0), controller=ComputedTorque(plant.arm)
         )
-        along = at_times(run.truth, motion)
+        along = _at_times(run.truth, motion)
         off = np.std(along.q - reference.q, axis=0) / np.maximum(np.std(reference.q, axis=0), 1e-9)
         if np.max(off) > _ASTRAY:
             joint = motion.joints[int(np.argmax(off))]
@@ -210,7 +213,7 @@ def _smooth_columns(
         filtered_columns(
             fit.arm,
             fit.base.independent,
-            replace(smooth_reference(motion, REFERENCE_SHARE * used.cutoff_hz), t=motion.t),
+            replace(_smooth_reference(motion, _REFERENCE_SHARE * used.cutoff_hz), t=motion.t),
             used,
         )
         for motion in _motions(recordings, used)
