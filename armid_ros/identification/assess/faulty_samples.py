@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import GAP_PERIODS
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -42,8 +41,17 @@ class FaultySamples:
 def faulty_samples(robot: Robot, recording: Recording) -> FaultySamples | None:
     """Find the samples of a recording of a robot that cannot be; None where there are none."""
     assert recording.tau is not None
-    torque = _spikes(recording.tau)
-    position = _jumps(recording)
+    # where torques are further from what is usual than that spans, many times
+    lower, upper = np.percentile(recording.tau, _USUAL, axis=0)
+    excess = np.maximum(lower - recording.tau, recording.tau - upper)
+    torque = np.asarray((excess > LIMITS.jump * (upper - lower)) & (upper > lower))
+    # where positions have stepped faster than the joint ever moves, many times
+    position = np.zeros(recording.q.shape, dtype=bool)
+    if len(recording) > 1:
+        time = np.maximum(np.diff(recording.t), recording.period)
+        speed = np.abs(np.diff(recording.q, axis=0)) / time[:, np.newaxis]
+        usual = np.percentile(speed, _USUAL[1], axis=0)
+        position[1:] = (speed > LIMITS.jump * usual) & (usual > 0.0)
     at = np.argwhere(torque | position)
     if not len(at):
         return None
@@ -61,21 +69,3 @@ def faulty_samples(robot: Robot, recording: Recording) -> FaultySamples | None:
         unit = robot.position_units[joint]
         first = f'the position of {name} jumps by {step:.3g} {unit} at {t:.3f} s'
     return FaultySamples(first, len(np.unique(at[:, 0])), sound)
-
-
-def _spikes(tau: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return where torques are further from what is usual than that spans, many times."""
-    lower, upper = np.percentile(tau, _USUAL, axis=0)
-    excess = np.maximum(lower - tau, tau - upper)
-    return np.asarray((excess > LIMITS.jump * (upper - lower)) & (upper > lower))
-
-
-def _jumps(recording: Recording) -> npt.NDArray[np.bool_]:
-    """Return where positions have stepped faster than the joint ever moves, many times."""
-    jumps = np.zeros(recording.q.shape, dtype=bool)
-    if len(recording) > 1:
-        time = np.maximum(np.diff(recording.t), recording.period)
-        speed = np.abs(np.diff(recording.q, axis=0)) / time[:, np.newaxis]
-        usual = np.percentile(speed, _USUAL[1], axis=0)
-        jumps[1:] = (speed > LIMITS.jump * usual) & (usual > 0.0)
-    return jumps

@@ -343,7 +343,8 @@ class OnlineIdentifier:
     def _learn(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
     ) -> OnlineSample:
-        one = _one_sample(self.arm, motion)
+        state = (motion.q[None], motion.dq[None], motion.ddq[None])
+        one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
         stacked = np.column_stack([motion.tau, self._rows(one)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows = filtered[:, 0], filtered[:, 1:]
@@ -393,11 +394,6 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
         max_gap=settings.longest_damage,
         false_alarm_time=changes.false_alarm_time,
     )
-
-
-def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:
-    state = (motion.q[None], motion.dq[None], motion.ddq[None])
-    return Motion(arm.robot.joints, np.array([motion.t]), *state)
 
 
 def _require_instantaneous(arm: ArmModel) -> None:
