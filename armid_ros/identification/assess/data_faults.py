@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.assess.dead_channels import dead_channels
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     InDegrees,

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.dead_channels import dead_channels
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives

@@ -8,17 +8,20 @@ import re
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification.assess import mistakes
-from armid_ros.identification.assess.faulty_samples import faulty_samples
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     hypotheses,
     InUnit,
+    known_gravity,
     LateTorque,
     OtherGravity,
     OtherUnit,
 )
-from armid_ros.identification.assess.known_gravity import known_gravity
-from armid_ros.identification.assess.mistakes import find_mistake, suspected_mistake
+from armid_ros.identification.assess.mistakes import (
+    faulty_samples,
+    find_mistake,
+    suspected_mistake,
+)
 from armid_ros.identification.rows.checks import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
@@ -396,7 +399,7 @@ def test_a_slide_jumps_by_metres_and_pushes_in_newtons():
 
 
 def test_reversals_of_friction_are_no_faulty_samples(robot, sound):
-    assert faulty_samples(robot, sound) is None
+    assert faulty_samples(robot, sound, conditioning([sound], SignalSettings())) is None
 
 
 def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, sound):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What values vary by from recording to recording is their variance, whatever makes them vary."""
 
-from armid_ros.identification.fitting.scatter import scatter
+from armid_ros.identification.fitting.jackknife import scatter
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import Motion
 import numpy as np
