@@ -123,7 +123,12 @@ class OnlineIdentifier:
     ) -> None:
         settings = settings or OnlineSettings()
         robot = arm.robot
-        _require_instantaneous(arm)
+        for effect in arm.effects:
+            if not effect.instantaneous:
+                raise IdentificationError(
+                    f'{effect.name} depends on the motion before, which single samples do not '
+                    'tell; identify it from a recording'
+                )
         self.arm = arm
         self.settings = settings
         self.base: BaseParameters = arm.base_parameters(rng)
@@ -422,13 +427,3 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
         max_gap=settings.longest_damage,
         false_alarm_time=changes.false_alarm_time,
     )
-
-
-def _require_instantaneous(arm: ArmModel) -> None:
-    """Refuse an arm with effects that single samples do not show."""
-    for effect in arm.effects:
-        if not effect.instantaneous:
-            raise IdentificationError(
-                f'{effect.name} depends on the motion before, which single samples do not tell; '
-                'identify it from a recording'
-            )
