@@ -41,7 +41,7 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.estimators.names import Estimator
+from armid_ros.identification.estimators import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.checks import check_held_out
@@ -278,7 +278,7 @@ def identify(
         To be predicted and not to be fitted.
     effects : str
         Catalogue names with commas, for a robot without a model.
-    method : {'ols', 'wls', 'irls', 'iv', 'cloe', 'ekf'}
+    method : {'ols', 'wls', 'irls', 'iv'}
         Least squares with all joints alike, weighted by their noise, or robust as well;
         instrumental variables, closed-loop output error, extended Kalman filter.
     cutoff : float, optional

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-import time
 from typing import Any
 
 from armid_ros.arm import ArmModel, save_model
@@ -35,12 +34,6 @@ from armid_ros.identification import (
 )
 from armid_ros.identification import (
     identify as run,
-)
-from armid_ros.identification.estimators.names import Estimator, estimators_of
-from armid_ros.identification.estimators.side_by_side import (
-    compare_methods,
-    ComparisonSettings,
-    MethodScore,
 )
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import (
@@ -90,8 +83,6 @@ class FitOptions:
         What acts beside the rigid body.
     method : str
         The estimator.
-    methods : str or None
-        Estimators to compare.
     quasi_static : bool
         Whether only weight and effects are fitted.
     verifies, strict : bool
@@ -103,7 +94,6 @@ class FitOptions:
 
     effects: str
     method: Any
-    methods: str | None
     quasi_static: bool
     verifies: bool
     strict: bool
@@ -168,17 +158,14 @@ def identify(
     arm = options.with_effects(ArmModel(loaded, quasi_static=fit.quasi_static), fit.effects)
     known = bodies.settings(loaded)
     settings = IdentificationSettings(fit.method, filters.settings(), known)
-    compared = () if fit.methods is None else estimators_of(fit.methods)
     with progress('reading') as tick:
-        work = _work(arm, data, settings, compared, fit, seed, tick)
+        work = _work(arm, data, settings, fit, seed, tick)
     result = work.result
     document = identification_document(
         result, robot.robot_source, work.validation, work.verification, work.graded
     )
     if work.gains:
         document['drive_gains'] = work.gains.document()
-    if work.scores:
-        document['methods'] = [score.document() for score in work.scores]
     source = options.kept_source(robot.robot_source, loaded, staged.folder)
     misfit = known_misfit(result, work.recordings, work.held_out)
     save_model(staged.folder / 'model.yaml', result.arm, source, result.estimate, misfit)
@@ -196,7 +183,7 @@ def identify(
         recordings=work.recordings,
         validation=work.validation,
         validation_recordings=work.held_out,
-        assessment=Assessment(work.verification, work.graded, work.scores, without_place),
+        assessment=Assessment(work.verification, work.graded, without_place),
         provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
     )
     write_file(staged.folder / 'report.html', page)
@@ -221,7 +208,6 @@ class _Work:
     validation: dict[str, tuple[Fit, ...]]
     graded: Grade
     verification: Verification | None
-    scores: Sequence[MethodScore]
     gains: DriveGains | None
 
 
@@ -229,12 +215,11 @@ def _work(
     arm: ArmModel,
     data: IdentificationData,
     settings: IdentificationSettings,
-    compared: Sequence[Estimator],
     options_of_fit: FitOptions,
     seed: int,
     tick: Tick,
 ) -> _Work:
-    """Read, identify, predict what is held out, grade, verify, and compare methods."""
+    """Read, identify, predict what is held out, grade and verify."""
     rng = np.random.default_rng(seed)
     recordings = options.read(data.bags, arm.robot, data.topic)
     held_out = options.read(data.validate, arm.robot, data.topic)
@@ -256,11 +241,7 @@ def _work(
     verification = None
     if options_of_fit.verifies:
         verification = verify(result, arm, recordings, held_out, rng=rng, progress=tick)
-    comparison = ComparisonSettings(compared, settings.signals, seed)
-    scores = compare_methods(
-        arm, recordings, held_out, comparison, clock=time.process_time, progress=tick
-    )
-    return _Work(recordings, held_out, result, validation, graded, verification, scores, gains)
+    return _Work(recordings, held_out, result, validation, graded, verification, gains)
 
 
 def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
@@ -283,8 +264,6 @@ def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, 
     for recording in (*work.recordings, *work.held_out):
         say(f'{recording.source}: {recording.report.describe()}')
     _tell(result, work.verification, result.arm.robot.notes, exports)
-    if 'methods' in document:
-        _print_methods(document['methods'])
     fitted = document['training']['relative_error_percent']
     say(f'relative error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
@@ -320,28 +299,6 @@ def _print_certificate(certificate: PhysicalCertificate) -> None:
         for link in certificate.links
     ]
     print_rows(rows, as_json=False, right=('mass [kg]',))
-
-
-def _print_methods(scores: Sequence[dict[str, Any]]) -> None:
-    heads = {
-        'fitted [%]': 'training_error_percent',
-        'held out [%]': 'held_out_error_percent',
-        'position [mrad]': 'closed_loop_position_error_milli',
-        'bias [%]': 'bias_percent',
-        'scatter [%]': 'scatter_percent',
-        'time [s]': 'seconds',
-    }
-    rows = [
-        {
-            'method': score['method'],
-            **{h: '-' if score[k] is None else f'{score[k]:.3g}' for h, k in heads.items()},
-        }
-        for score in scores
-    ]
-    print_rows(rows, as_json=False, right=tuple(heads))
-    for score in scores:
-        if score['note']:
-            say(f'{score["method"]}: {score["note"]}')
 
 
 def _tell(

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.senders import two_senders

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
-from armid_ros.identification.estimators.names import IN_WORDS
-from armid_ros.identification.estimators.side_by_side import MethodScore
+from armid_ros.identification.estimators import IN_WORDS
 from armid_ros.recording import Recording
 from armid_ros.report.families import effects_in_words
 from armid_ros.report.judgement import judge
@@ -20,7 +19,6 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.assessment import (
     EncoderNoise,
-    Methods,
     PhysicalSection,
     WhitenessSection,
 )
@@ -49,8 +47,6 @@ class Assessment:
         Test for encoder noise, and simulations.
     grade : Grade or None
         What it is good for; found out where it is not given.
-    methods : sequence of MethodScore
-        Estimators that were compared on the same data.
     exports : mapping of str to sequence of str
         Files for other programs, and what each has no place for.
 
@@ -58,7 +54,6 @@ class Assessment:
 
     verification: Verification | None = None
     grade: Grade | None = None
-    methods: Sequence[MethodScore] = ()
     exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
@@ -139,7 +134,6 @@ def identification_report(
         _excitation(result),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
-        *([Methods(assessment.methods)] if assessment.methods else []),
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

@@ -11,7 +11,7 @@ from armid_ros.diagnosis.prepare import mended
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
 from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.identification.assess.dead_channels import dead_channels
+from armid_ros.identification.assess.dead_sensors import dead_channels
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest

@@ -5,9 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.cli.signatures import columns, options
-from armid_ros.cli.signatures.choices import (
-    ESTIMATORS,
-)
+from armid_ros.cli.signatures.choices import ESTIMATORS
 from armid_ros.cli.signatures.late import done_by
 import click
 
@@ -24,12 +22,7 @@ import click
     default='wls',
     show_default=True,
     help='Least squares: all joints alike, weighted by their noise, or robust as well. Against '
-    'encoder noise: instruments, closed-loop output error, or a Kalman filter.',
-)
-@click.option(
-    '--methods',
-    metavar='M,...',
-    help='Compare these methods, or all, side by side on the same data; takes a minute.',
+    'encoder noise: instrumental variables.',
 )
 @click.option(
     '--cutoff', type=float, help='Of the position filter [Hz]; from the data by default.'

@@ -248,7 +248,8 @@ def agree(
     """Tell whether the torque of an arm is what a linear model promised, as far as it matters."""
     off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
     whole = _size(weights, [part.tau for part in problem])
-    return bool(off <= max(AGREED * np.sqrt(_cost(problem, weights, promised)), _EXACT * whole))
+    left = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
+    return bool(off <= max(AGREED * _size(weights, left), _EXACT * whole))
 
 
 def _iterate(
@@ -389,11 +390,6 @@ def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
 def _rigid(arm: ArmModel) -> int:
     return len(arm.robot.rigid_parameters)
-
-
-def _cost(problem: Sequence[Regression], weights: FloatArray, predicted: Torques) -> float:
-    left = [part.tau - torque for part, torque in zip(problem, predicted, strict=True)]
-    return _size(weights, left) ** 2
 
 
 def _size(weights: FloatArray, torque: Sequence[FloatArray]) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose
 from armid_ros.identification import grade, identify
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.inspection import inspect
 from armid_ros.recording import Recording

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.fitting.nuisance_friction import by_joint, NuisanceFriction
+from armid_ros.identification.online.nuisance_rows import by_joint, NuisanceRows
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
@@ -29,7 +29,7 @@ def test_columns_are_those_of_the_effects_that_the_arm_lacks():
         make_effect('load_dependent_friction', arm.robot),
     )
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
-    nuisance = NuisanceFriction(arm)
+    nuisance = NuisanceRows(arm, 5.0)
     one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
     rows = by_joint(nuisance.torques(one)[0])
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
@@ -41,7 +41,7 @@ def test_what_is_identified_is_not_nuisance():
     everything = arm_with(
         'viscous_friction', 'coulomb_friction', 'stribeck_friction', 'load_dependent_friction'
     )
-    nuisance = NuisanceFriction(everything)
+    nuisance = NuisanceRows(everything, 5.0)
     assert nuisance.parameters == ()
     n = everything.robot.n_joints
     one = Motion(everything.robot.joints, np.zeros(1), *np.ones((3, 1, n)))

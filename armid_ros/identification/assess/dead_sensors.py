@@ -1,7 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Encoders that read the same though their joint moves.
+Torques and encoders that read the same though their joint moves.
+
+A passive joint and a drive at its limit have a torque that does not change, too: the model takes
+next to none of the one, and the other is the highest there is.
 
 A joint may be locked: its reading stays the same, its velocity is zero, and its torque is what
 weight and the motion of other joints make of it. A reading that does not change by one count is
@@ -15,13 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.prediction_error import left_of_blocks
-from armid_ros.identification.rows.checks import REST_RANGE
+from armid_ros.identification.assess.prediction_error import left_of_blocks, thinned
+from armid_ros.identification.rows.checks import REST_RANGE, SILENT
 from armid_ros.identification.rows.row_noise import sensor_noise
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
+from armid_ros.recording.series import NOTHING
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -38,6 +43,73 @@ _WAY = 0.1
 #: Share of a recording below which a reading that stays the same until its end is a joint that has
 #: come to rest.
 _PART = 0.2
+#: For so long [s], and while the joint goes so far of its way.
+_LONG, _FAR = 1.0, 0.2
+#: Share of weight or inertia by which what the model takes has to change meanwhile; of a passive
+#: joint the two cancel.
+_TAKEN = 0.5
+
+
+def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]) -> Iterator[str]:
+    """
+    Say whose torque stays the same, though the joint moves and takes another one.
+
+    Where it is that of every joint, nobody measured any, and that alone is said.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What is believed of the arm.
+    recording : Recording
+        As it was read, with torques.
+    motions : sequence of Motion
+        Its stretches, filtered.
+
+    Yields
+    ------
+    str
+        Recording, joint, time and remedy, without a full stop.
+
+    """
+    assert recording.tau is not None
+    if np.all(np.ptp(recording.tau, axis=0) < NOTHING):
+        yield f'in {recording.source or "a recording"} {SILENT}'
+        return
+    units = arm.robot.torque_units
+    t, least = recording.t, max(2, round(_LONG / recording.period))
+    for j, joint in enumerate(recording.joints):
+        reading, q = recording.tau[:, j], recording.q[:, j]
+        start, stop = _longest_same(reading, NOTHING)
+        moved = float(np.ptp(q[start:stop])) > _FAR * float(np.ptp(q))
+        top = float(np.abs(reading).max())
+        at_limit = 0.0 < top == abs(reading[start]) and stop - start < len(reading)
+        if stop - start < least or not moved or at_limit:
+            continue
+        if _changes(arm, motions, j, float(t[start]), float(t[stop - 1])):
+            always = stop - start == len(reading)
+            when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+            value = f'{reading[start] + 0.0:.4g} {units[j]}'
+            remedy = 'record with the joint held still' if always else 'leave that time out'
+            yield (
+                f'in {recording.source or "a recording"} the torque of {joint} stays at '
+                f'{value} {when} while the joint moves: its channel is dead; {remedy}'
+            )
+
+
+def _changes(
+    arm: ArmModel, motions: Sequence[Motion], joint: int, start: float, stop: float
+) -> bool:
+    """Return whether what the model takes of a joint changes between two times."""
+    for motion in motions:
+        inside = (motion.t >= start) & (motion.t <= stop)
+        if np.count_nonzero(inside) < 2:
+            continue
+        load = arm.load(motion)[inside, joint]
+        weight = arm.load(motion.at_rest())[inside, joint]
+        largest = max(float(np.std(weight)), float(np.std(load - weight)))
+        if float(np.std(load)) > _TAKEN * largest > 0.0:
+            return True
+    return False
 
 
 def dead_encoders(
@@ -65,7 +137,11 @@ def dead_encoders(
     units = ('rad',) * recording.n_joints if robot is None else robot.position_units
     for j, joint in enumerate(recording.joints):
         unit = units[j]
-        start, stop, hidden = _stands(recording, j)
+        q = recording.q[:, j]
+        start, stop = _longest_same(q)
+        # a step of the encoder, and as much as a joint at rest goes
+        steps = np.abs(np.diff(q))
+        hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(recording, j, start, stop)
         always = stop - start == len(recording)
         t = recording.t
@@ -116,20 +192,12 @@ def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) ->
         )
 
 
-def _stands(recording: Recording, joint: int) -> tuple[int, int, float]:
-    """
-    Return where a position longest reads the same, and how far it may go unseen meanwhile.
-
-    That is a step of the encoder, and as much as a joint at rest goes.
-
-    """
-    q = recording.q[:, joint]
-    steps = np.abs(np.diff(q))
-    edges = np.flatnonzero(steps) + 1
-    bounds = np.concatenate([[0], edges, [len(q)]])
+def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
+    """Return where the longest run without a larger step starts and stops."""
+    edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
+    bounds = np.concatenate([[0], edges, [len(reading)]])
     longest = int(np.argmax(np.diff(bounds)))
-    step = float(steps[steps > 0.0].min()) if len(edges) else 0.0
-    return int(bounds[longest]), int(bounds[longest + 1]), REST_RANGE + step
+    return int(bounds[longest]), int(bounds[longest + 1])
 
 
 def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
@@ -175,7 +243,7 @@ def _moves_unseen(
 
     """
     within, other = _divided(motions, time)
-    motion = _thinned(within)
+    motion = thinned(within, _ROWS)
     if motion is None or len(motion) < min(_LEAST, sum(len(one) for one in motions)):
         return False
     assert motion.tau is not None
@@ -213,14 +281,3 @@ def _divided(
 def _white(values: FloatArray) -> float:
     """Return the variance of white noise, of which second differences have six times as much."""
     return float(np.mean(np.diff(values, 2) ** 2)) / 6.0
-
-
-def _thinned(motions: Sequence[Motion]) -> Motion | None:
-    """Put stretches one after the other, and keep some of the samples."""
-    parts = [motion for motion in motions if motion.tau is not None and len(motion) > 2]
-    if not parts:
-        return None
-    names = ('t', 'q', 'dq', 'ddq', 'tau')
-    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
-    step = max(1, len(arrays[0]) // _ROWS)
-    return Motion(parts[0].joints, *(array[::step] for array in arrays))
