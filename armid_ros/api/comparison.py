@@ -10,13 +10,14 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import Shown, Summary
-from armid_ros.files import json_text, staged, write_file
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.comparison import compare as run
 from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
+    from armid_ros.report.provenance import Provenance
     import pandas
 
 
@@ -68,13 +69,14 @@ class ComparisonResult(Shown):
         write_file(Path(path), compare_report(self.core))
         return Path(path)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write comparison.json and report.html as ``armid compare`` does."""
-        with staged(Path(folder)) as result:
-            write_file(result.folder / 'comparison.json', json_text(self.document(), indent=1))
-            self.report(result.folder / 'report.html')
-            result.keep()
-        return result.out
+    def fill(self, folder: Path, provenance: Provenance | None = None) -> dict[str, Any]:
+        """Write comparison.json and report.html into a folder."""
+        from armid_ros.report.compare_report import compare_report
+
+        document = self.document()
+        write_file(folder / 'report.html', compare_report(self.core, provenance))
+        write_file(folder / 'comparison.json', json_text(document, indent=1))
+        return document
 
     def summary(self) -> Summary:
         """Return what changed, the surest first."""

@@ -7,11 +7,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 import textwrap
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.files import staged
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
+    from armid_ros.report.provenance import Provenance
 
 #: Lines of a result in a terminal.
 LINES = 10
@@ -58,11 +62,37 @@ class Summary:
 
 
 class Shown(ABC):
-    """A result that prints as its summary."""
+    """A result that prints as its summary and is written as the commands write it."""
 
     @abstractmethod
     def summary(self) -> Summary:
         """Return the result in short."""
+
+    @abstractmethod
+    def fill(self, folder: Path, provenance: Provenance | None = None) -> dict[str, Any]:
+        """
+        Write all files of the result into a folder that exists.
+
+        Parameters
+        ----------
+        folder : Path
+            Where to.
+        provenance : Provenance, optional
+            Files, versions and settings that the report names.
+
+        Returns
+        -------
+        dict
+            The document for programs, as written.
+
+        """
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the files that the command of the same name writes, all or none."""
+        with staged(Path(folder)) as result:
+            self.fill(result.folder)
+            result.keep()
+        return result.out
 
     def __repr__(self) -> str:
         """Return at most ten lines."""

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
-from armid_ros.cli.signatures.options import CRC, FORCE, MEMORY
+from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, Staged, staged, write_file
