@@ -109,6 +109,8 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
     def named(recording: Recording) -> Recording:
         source = recording.source or 'recording'
+        if Path(source).exists():  # the same one, if it is given twice
+            return recording
         taken[source] = count = taken.get(source, 0) + 1
         return replace(recording, source=source if count == 1 else f'{source} {count}')
 

@@ -19,11 +19,10 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
-    source_of,
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
@@ -63,7 +62,6 @@ import numpy as np
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
-    from armid_ros.report.provenance import Provenance
     import pandas
 
 _Made = TypeVar('_Made')
@@ -162,57 +160,29 @@ class DiagnosisResult(Shown):
             'next_run': None if extras.next_run is None else extras.next_run.document(),
         }
 
-    def page(self, robot: str = '', provenance: Provenance | None = None, patch: str = '') -> str:
-        """Return report.html with the verdict and the evidence."""
+    def page(self, origin: Origin = DEFAULT_ORIGIN, patch: str = '') -> str:
+        """Return report.html with the verdict and the evidence, and the text of model.yaml."""
         return diagnosis_report(
             self.core,
             DiagnosedRecordings(self.recordings, self.held_out, self.baseline),
-            robot=robot or self._robot,
+            robot=origin.of(self.description.robot).robot,
             settings=self.settings,
             extras=self.extras,
             patch=patch,
-            provenance=provenance,
+            provenance=origin.provenance,
         )
 
-    def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the page with the verdict and the evidence; return where it is."""
-        write_file(Path(path), self.page())
-        return Path(path)
-
-    def fill(
-        self,
-        folder: Path,
-        provenance: Provenance | None = None,
-        robot: str = '',
-        source: str = '',
-    ) -> dict[str, Any]:
-        """
-        Write diagnosis.json, model.yaml and report.html into a folder, numbers before pictures.
-
-        Parameters
-        ----------
-        folder : Path
-            Where to.
-        provenance : Provenance, optional
-            Files, versions and settings that the report names.
-        robot, source : str
-            What the report calls the robot, and how model.yaml refers to its description; by
-            default its shipped name or its path.
-
-        Returns
-        -------
-        dict
-            What diagnosis.json holds.
-
-        """
+    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write diagnosis.json, model.yaml and report.html into a folder, numbers first."""
         model, document = folder / 'model.yaml', self.document()
-        save_model(model, self.arm, source or self._robot, self.core.estimate, self.misfit)
+        source = origin.of(self.description.robot).source
+        save_model(model, self.arm, source, self.core.estimate, self.misfit)
         write_file(folder / 'diagnosis.json', json_text(document, indent=1))
         if self.residual is not None:
             write_file(folder / TABLE_FILE, lookup_table(self.residual))
         if self.extras.next_run is not None:
             save_excitation(self.extras.next_run.excitation, folder / EXPERIMENT_FILE)
-        page = self.page(robot, provenance, model.read_text(encoding='utf-8'))
+        page = self.page(origin, model.read_text(encoding='utf-8'))
         write_file(folder / 'report.html', page)
         return document
 
@@ -283,10 +253,6 @@ class DiagnosisResult(Shown):
         if gap is None:
             return []
         return [GapBars(robot, gap, self.core.baseline, bool(self.core.findings))]
-
-    @property
-    def _robot(self) -> str:
-        return source_of(self.description.robot)
 
 
 def diagnose(

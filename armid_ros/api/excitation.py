@@ -18,9 +18,8 @@ from armid_ros.api.arguments import (
     recordings_of,
     Rng,
     RobotLike,
-    source_of,
 )
-from armid_ros.api.table import Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
     ClearanceModel,
@@ -48,7 +47,6 @@ from armid_ros.recording import Recording, write_joint_trajectory
 import numpy as np
 
 if TYPE_CHECKING:
-    from armid_ros.report.provenance import Provenance
     import pandas
 
 #: Waypoints per second of a JointTrajectory; controllers interpolate between them.
@@ -143,7 +141,7 @@ class ExcitationResult(Shown):
         scene = self.scene
         return fitness(self.run, self.core.limits, scene.collision, scene.floor, scene.obstacles)
 
-    def document(self, robot: str = '') -> dict[str, Any]:
+    def document(self, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what excitation.json holds."""
         core = replace(self.core, excitation=self.run.excitation)
         information, settings = core.information, core.settings
@@ -151,7 +149,7 @@ class ExcitationResult(Shown):
         nearest, floor = self.fitness.nearest, self.scene.floor
         return {
             'schema': SCHEMA,
-            'robot': robot or source_of(self.arm.robot),
+            'robot': origin.of(self.arm.robot).robot,
             'verdict': self.fitness.word,
             'summary': str(self.fitness),
             'not_checked': list(self.fitness.unchecked),
@@ -183,46 +181,25 @@ class ExcitationResult(Shown):
             ],
         }
 
-    def page(self, robot: str = '', provenance: Provenance | None = None) -> str:
+    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
         """Return report.html on the quality of the run."""
         from armid_ros.report.excitation_report import CheckedRun, excitation_report
 
         return excitation_report(
             replace(self.core, excitation=self.run.excitation),
             self.arm,
-            robot=robot or source_of(self.arm.robot),
+            robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
             after=self.after,
-            provenance=provenance,
+            provenance=origin.provenance,
             planned=CheckedRun(self.run, self.fitness),
         )
 
-    def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the page on its quality; return where it is."""
-        write_file(Path(path), self.page())
-        return Path(path)
-
-    def fill(
-        self, folder: Path, provenance: Provenance | None = None, robot: str = ''
-    ) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """
         Write excitation.yaml, .csv and .json, a bag with the run, and report.html into a folder.
 
         What takes longest to find is written first.
-
-        Parameters
-        ----------
-        folder : Path
-            Where to.
-        provenance : Provenance, optional
-            Files, versions and settings that the report names.
-        robot : str
-            What the document calls the robot; by default its shipped name or its path.
-
-        Returns
-        -------
-        dict
-            What excitation.json holds.
 
         Raises
         ------
@@ -234,11 +211,11 @@ class ExcitationResult(Shown):
         _save_coefficients(self.run.excitation, folder)
         urdf = self.arm.robot.urdf
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
-        document = self.document(robot)
+        document = self.document(origin)
         write_file(folder / 'excitation.json', json_text(document, indent=1))
         path = folder / 'report.html'
         try:
-            write_file(path, self.page(robot, provenance))
+            write_file(path, self.page(origin))
         except Exception as error:  # whatever it is, the trajectory is written and good
             said = f'{settled(path)}: not written: {type(error).__name__}: {error}'
             print(said, file=sys.stderr)

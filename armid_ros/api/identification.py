@@ -20,11 +20,10 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
-    source_of,
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
 from armid_ros.arm.export_check import torque_check
@@ -65,7 +64,6 @@ from armid_ros.recording import Recording, require_once
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
-    from armid_ros.report.provenance import Provenance
     import pandas
 
 
@@ -183,10 +181,11 @@ class IdentificationResult(Shown):
             return {}
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
 
-    def document(self, robot: str = '') -> dict[str, Any]:
+    def document(self, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what identification.json holds, but for exports and digests of recordings."""
+        robot = origin.of(self.description.robot).robot
         document = identification_document(
-            self.core, robot or self._robot, self.validation, self.verification, self.graded
+            self.core, robot, self.validation, self.verification, self.graded
         )
         if self.gains:
             document['drive_gains'] = self.gains.document()
@@ -201,7 +200,7 @@ class IdentificationResult(Shown):
             write_file(Path(path), text)
         return text
 
-    def page(self, robot: str = '', provenance: Provenance | None = None) -> str:
+    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
         """Return report.html with all curves, numbers and doubts."""
         from armid_ros.report.identification_report import Assessment, identification_report
 
@@ -209,47 +208,18 @@ class IdentificationResult(Shown):
         return identification_report(
             self.core,
             description=self.description,
-            robot=robot or self._robot,
+            robot=origin.of(self.description.robot).robot,
             recordings=self.recordings,
             validation=self.validation,
             validation_recordings=self.held_out,
             assessment=Assessment(self.verification, self.graded, self.scores, without_place),
-            provenance=provenance,
+            provenance=origin.provenance,
         )
 
-    def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the page with all curves, numbers and doubts; return where it is."""
-        write_file(Path(path), self.page())
-        return Path(path)
-
-    def fill(
-        self,
-        folder: Path,
-        provenance: Provenance | None = None,
-        robot: str = '',
-        source: str = '',
-    ) -> dict[str, Any]:
-        """
-        Write model.yaml, identification.json, report.html and the exports into a folder.
-
-        Parameters
-        ----------
-        folder : Path
-            Where to.
-        provenance : Provenance, optional
-            Files, versions and settings that the report names.
-        robot, source : str
-            What the document calls the robot, and how model.yaml refers to its description; by
-            default its shipped name or its path.
-
-        Returns
-        -------
-        dict
-            What identification.json holds.
-
-        """
-        document = self.document(robot)
-        source = source or self._robot
+    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write model.yaml, identification.json, report.html and the exports into a folder."""
+        document = self.document(origin)
+        source = origin.of(self.description.robot).source
         save_model(folder / 'model.yaml', self.arm, source, self.estimate, self._misfit)
         for name, one in self.exports.items():
             write_file(folder / name, one.text)
@@ -258,7 +228,7 @@ class IdentificationResult(Shown):
                 name: {**torque_check(one, self.arm), 'left_out': list(one.left_out)}
                 for name, one in self.exports.items()
             }
-        write_file(folder / 'report.html', self.page(robot, provenance))
+        write_file(folder / 'report.html', self.page(origin))
         document = with_contents(document)
         write_document(folder / 'identification.json', document)
         return document
@@ -314,10 +284,6 @@ class IdentificationResult(Shown):
                 self.estimate, described, self.core.unidentified, self.arm.robot.links
             ),
         ]
-
-    @property
-    def _robot(self) -> str:
-        return source_of(self.description.robot)
 
     def _value(self, name: str, joint: str) -> str:
         for k, parameter in enumerate(self.estimate.parameters):

@@ -17,7 +17,7 @@ from armid_ros.api.arguments import (
     robot_of,
     RobotLike,
 )
-from armid_ros.api.table import Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
 from armid_ros.inspection import inspect as look
@@ -38,7 +38,6 @@ from armid_ros.recording.tables import (
 )
 
 if TYPE_CHECKING:
-    from armid_ros.report.provenance import Provenance
     import pandas
 
 
@@ -83,22 +82,17 @@ class InspectionResult(Shown):
         """Return what ``armid inspect --json`` prints."""
         return inspection_document(self.core)
 
-    def page(self, robot: str = '', provenance: Provenance | None = None) -> str:
+    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
         """Return inspection.html with all curves."""
         from armid_ros.report.inspection_report import inspection_report
 
-        return inspection_report(self.core, robot=robot, provenance=provenance)
+        return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
 
-    def report(self, path: str | Path = 'inspection.html') -> Path:
-        """Write the page with all curves; return where it is."""
-        write_file(Path(path), self.page())
-        return Path(path)
-
-    def fill(self, folder: Path, provenance: Provenance | None = None) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write inspection.json and inspection.html into a folder."""
         document = self.document()
         write_file(folder / 'inspection.json', json_text(document, indent=1))
-        write_file(folder / 'inspection.html', self.page(provenance=provenance))
+        write_file(folder / 'inspection.html', self.page(origin))
         return document
 
     def summary(self) -> Summary:

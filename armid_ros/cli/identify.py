@@ -104,6 +104,7 @@ def identify(
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     from armid_ros.api.identification import identify as run
+    from armid_ros.api.table import Origin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
@@ -130,12 +131,12 @@ def identify(
             **asked,
         )
         tick(1.0, 'writing')
-        document = result.fill(
-            staged.folder,
-            provenance([*bags, *validate], result.document()['settings'], seed),
+        origin = Origin(
             robot_source,
             options.kept_source(robot_source, robot, staged.folder),
+            provenance([*bags, *validate], result.document()['settings'], seed),
         )
+        document = result.fill(staged.folder, origin)
     staged.keep()
     if as_json:
         click.echo(json_text(document))

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
@@ -33,7 +32,6 @@ import click
 from click.core import ParameterSource
 import numpy as np
 
-_Command = TypeVar('_Command', bound=Callable[..., Any])
 Corners = tuple[Sequence[float], Sequence[float]]
 
 

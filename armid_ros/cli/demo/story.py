@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.api.diagnosis import diagnose
+from armid_ros.api.table import Origin
 from armid_ros.arm import ArmModel
 from armid_ros.cli.diagnose.command import show
 from armid_ros.cli.terminal import progress, say
@@ -169,7 +170,7 @@ def tell_story(
             progress=tick,
         )
         robot = known.robot.name
-        found.fill(out, robot=robot, source=robot)
+        found.fill(out, Origin(robot, robot))
     return ToldStory(hidden, found.core)
 
 

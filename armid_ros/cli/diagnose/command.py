@@ -132,6 +132,7 @@ def diagnose(
     if baseline and no_baseline:
         raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
     from armid_ros.api.diagnosis import diagnose as run
+    from armid_ros.api.table import Origin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
@@ -178,8 +179,8 @@ def diagnose(
             progress=tick,
         )
         source = options.kept_source(robot_source, robot, staged.folder)
-        origin = provenance([*bags, *validate, *baseline], seed=seed)
-        result.fill(staged.folder, origin, robot_source, source)
+        origin = Origin(robot_source, source, provenance([*bags, *validate, *baseline], seed=seed))
+        result.fill(staged.folder, origin)
         staged.keep()
         if residual is not None:
             tick(1.0, 'learning the residual')
@@ -188,7 +189,7 @@ def diagnose(
         tick(1.0, 'next run')
         result = result.with_next_run(seed)
         tick(1.0, 'writing')
-        document = result.fill(staged.folder, origin, robot_source, source)
+        document = result.fill(staged.folder, origin)
         staged.keep()
     if as_json:
         click.echo(json_text(document))

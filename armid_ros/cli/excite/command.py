@@ -24,6 +24,7 @@ import click
 
 if TYPE_CHECKING:
     from armid_ros.api.excitation import ExcitationResult
+    from armid_ros.api.table import Origin
     from armid_ros.arm import ArmModel
     from armid_ros.excitation import DesignProgress
     from armid_ros.files import Staged
@@ -219,6 +220,7 @@ def excite(
         SCHEMA,
         transfer_planner,
     )
+    from armid_ros.api.table import Origin
     from armid_ros.cli import options
     from armid_ros.cli.excite.springs import (
         refuse_other_options,
@@ -285,8 +287,9 @@ def excite(
                 **settings,
             )
             tick((number + 1.0) / len(folders), 'writing')
-            origin = Provenance(files=hash_files(read), versions=versions(), seed=seed)
-            document = _written(staged[speed], result, origin, robot_source)
+            files = Provenance(files=hash_files(read), versions=versions(), seed=seed)
+            origin = Origin(robot_source, provenance=files)
+            document = _written(staged[speed], result, origin)
         missing.remove(speed)
         if as_json:
             click.echo(json_text(document))
@@ -339,12 +342,10 @@ def _arms(
     return arm, other
 
 
-def _written(
-    staged: Staged, result: ExcitationResult, origin: Any, robot_source: str
-) -> dict[str, Any]:
+def _written(staged: Staged, result: ExcitationResult, origin: Origin) -> dict[str, Any]:
     """Write a design; where no way leads to it, its coefficients alone, unless one was there."""
     try:
-        document = result.fill(staged.folder, origin, robot_source)
+        document = result.fill(staged.folder, origin)
     except TrajectoryError as error:
         held = f'{staged.out}: stays as it was'
         if staged.alone:
