@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-import time
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
@@ -45,12 +44,7 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.estimators.names import Estimator, estimators_of
-from armid_ros.identification.estimators.side_by_side import (
-    compare_methods,
-    ComparisonSettings,
-    MethodScore,
-)
+from armid_ros.identification.estimators.names import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import (
     corrected,
@@ -86,8 +80,6 @@ class IdentificationResult(Shown):
         Predictions of the held-out recordings, by their names.
     verification : Verification or None
         Test for encoder noise, and simulations along the held-out recordings.
-    scores : sequence of MethodScore
-        Estimators compared on the same data.
     gains : DriveGains or None
         Gains of the drives, known from payloads.
 
@@ -108,7 +100,6 @@ class IdentificationResult(Shown):
     held_out: tuple[Recording, ...]
     validation: dict[str, tuple[Fit, ...]]
     verification: Verification | None = None
-    scores: Sequence[MethodScore] = ()
     gains: DriveGains | None = None
 
     @property
@@ -189,8 +180,6 @@ class IdentificationResult(Shown):
         )
         if self.gains:
             document['drive_gains'] = self.gains.document()
-        if self.scores:
-            document['methods'] = [score.document() for score in self.scores]
         return document
 
     def urdf(self, path: str | Path | None = None) -> str:
@@ -212,7 +201,7 @@ class IdentificationResult(Shown):
             recordings=self.recordings,
             validation=self.validation,
             validation_recordings=self.held_out,
-            assessment=Assessment(self.verification, self.graded, self.scores, without_place),
+            assessment=Assessment(self.verification, self.graded, exports=without_place),
             provenance=origin.provenance,
         )
 
@@ -304,7 +293,6 @@ def identify(
     decimation: int | None = None,
     physical: bool | PhysicalSettings = False,
     verifies: bool = False,
-    methods: str | None = None,
     payloads: Sequence[str] = (),
     rng: Rng = 0,
     progress: Progress | None = None,
@@ -333,8 +321,6 @@ def identify(
         Fit links that can be bodies; ``urdf`` then describes one.
     verifies : bool
         Test for encoder noise and simulate along the held-out recordings.
-    methods : str, optional
-        Estimators with commas, or 'all', to compare on the same data.
     payloads : sequence of str
         What the arm is known to carry in a recording, as 'BAG=KG@LINK[:X,Y,Z]', which fixes the
         gains of the drives.
@@ -392,11 +378,4 @@ def identify(
         tick(1.0, 'verifying')
         verification = verify(result, model, training, held_out, rng=source, progress=tick)
         found = replace(found, verification=verification)
-    if methods is not None:
-        seed = rng if isinstance(rng, int) else 0
-        compared = ComparisonSettings(estimators_of(methods), settings.signals, seed)
-        scores = compare_methods(
-            model, training, held_out, compared, clock=time.process_time, progress=tick
-        )
-        found = replace(found, scores=scores)
     return found

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -30,12 +29,7 @@ if TYPE_CHECKING:
     default='wls',
     show_default=True,
     help='Least squares: all joints alike, weighted by their noise, or robust as well. Against '
-    'encoder noise: instruments, closed-loop output error, or a Kalman filter.',
-)
-@click.option(
-    '--methods',
-    metavar='M,...',
-    help='Compare these methods, or all, side by side on the same data; takes a minute.',
+    'encoder noise: instrumental variables.',
 )
 @parameters.cutoff
 @parameters.decimation
@@ -168,8 +162,6 @@ def _print(out: Path, document: dict[str, Any], found: IdentificationResult) -> 
     for recording in (*found.recordings, *found.held_out):
         say(f'{recording.source}: {recording.report.describe()}')
     _print_notes(found)
-    if 'methods' in document:
-        _print_methods(document['methods'])
     _print_errors(document)
     files = ['model.yaml', 'identification.json', 'report.html', *found.exports]
     say(f'{out}: {", ".join(files)}')
@@ -219,25 +211,3 @@ def _print_certificate(certificate: PhysicalCertificate) -> None:
         for link in certificate.links
     ]
     print_rows(rows, as_json=False, right=('mass [kg]',))
-
-
-def _print_methods(scores: Sequence[dict[str, Any]]) -> None:
-    heads = {
-        'fitted [%]': 'training_error_percent',
-        'held out [%]': 'held_out_error_percent',
-        'position [mrad]': 'closed_loop_position_error_milli',
-        'bias [%]': 'bias_percent',
-        'scatter [%]': 'scatter_percent',
-        'time [s]': 'seconds',
-    }
-    rows = [
-        {
-            'method': score['method'],
-            **{h: '-' if score[k] is None else f'{score[k]:.3g}' for h, k in heads.items()},
-        }
-        for score in scores
-    ]
-    print_rows(rows, as_json=False, right=tuple(heads))
-    for score in scores:
-        if score['note']:
-            say(f'{score["method"]}: {score["note"]}')

@@ -63,22 +63,6 @@ def test_identify_prints_json_and_nothing_else(bags, tmp_path):
     assert json.loads(result.stdout)['robot'] == ROBOT
 
 
-@pytest.mark.slow
-def test_methods_are_compared_in_terminal_document_and_page(bags, tmp_path):
-    out = tmp_path / 'out'
-    arguments = ('--robot', ROBOT, '--validate', bags[1], '--methods', 'wls,iv', '--no-verify')
-    text = armid('identify', bags[0], *arguments, '--out', out).stdout
-    assert 'held out [%]' in text
-    document = json.loads((out / 'identification.json').read_text())
-    assert [row['method'] for row in document['methods']] == ['wls', 'iv']
-    assert document['methods'][1]['held_out_error_percent'] < 3.0
-    assert 'Methods side by side' in (out / 'report.html').read_text()
-    refused = armid(
-        'identify', bags[0], '--robot', ROBOT, '--methods', 'pem', '--out', out, code=2
-    )
-    assert "no method 'pem'" in refused.output
-
-
 def test_the_sample_bag_is_the_demo(tmp_path):
     """Recorded over topics; the friction of the shoulder is the demo's 0.1 N m s/rad."""
     bag = Path(__file__).parents[2] / 'bags' / 'humanoid_arm_moon'
