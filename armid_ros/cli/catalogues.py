@@ -6,22 +6,30 @@ from __future__ import annotations
 
 import textwrap
 
+from armid_ros.cli import parameters
 from armid_ros.cli.terminal import print_rows, say
-from armid_ros.effects import CATALOGUE
-from armid_ros.robots import shipped_robots
+import click
 
 #: Stands for a blank at which no line ends.
 _JOINED = '\u00a0'
 
 
+@click.command(epilog='Example: armid robots')
+@parameters.as_json
 def robots(as_json: bool) -> None:
     """List the robots that are shipped."""
+    from armid_ros.robots import shipped_robots
+
     rows = [{'name': name, 'what it is': text} for name, text in shipped_robots().items()]
     print_rows(rows, as_json)
 
 
+@click.command(epilog='Example: armid effects --json')
+@parameters.as_json
 def effects(as_json: bool) -> None:
     """List the effects that can be simulated and estimated."""
+    from armid_ros.effects import CATALOGUE
+
     rows = [
         {
             'name': name,

@@ -155,7 +155,7 @@ def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_p
     assert short(excitation)
     assert (excitation.save(tmp_path / 'plan') / 'trajectory').is_dir()
     again = ar.simulate('humanoid_arm', tmp_path / 'plan' / 'trajectory', rate=100.0)
-    assert again.duration == pytest.approx(excitation.duration, abs=0.05)
+    assert again.duration == pytest.approx(excitation.run.duration, abs=0.05)
 
 
 def test_models_and_recordings_print_in_a_few_lines(model, runs):

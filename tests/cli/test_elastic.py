@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import json
 
+from armid_ros.cli.record import simulate
 from armid_ros.cli.signatures.elastic import elastic
-from armid_ros.cli.signatures.record import simulate
 from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation

@@ -268,7 +268,7 @@ def test_a_run_that_fails_leaves_the_result_that_was_there(bags, tmp_path, monke
     out = tmp_path / 'out'
     armid('identify', bags[0], '--robot', ROBOT, '--physical', '--out', out)
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    monkeypatch.setattr('armid_ros.cli.identify.write_document', fails)
+    monkeypatch.setattr('armid_ros.api.identification.write_document', fails)
     code = 2 if isinstance(end, OutputError) else 1
     armid('identify', bags[1], '--robot', ROBOT, '--out', out, code=code)
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before

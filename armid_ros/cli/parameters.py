@@ -9,7 +9,7 @@ from pathlib import Path
 import shlex
 from typing import Any, TypeVar
 
-from armid_ros.cli.signatures.choices import USUAL_EFFECTS
+from armid_ros.cli.choices import USUAL_EFFECTS
 import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
@@ -82,6 +82,10 @@ validate = click.option(
     metavar='BAG',
     help='A bag to predict and not to fit; may be given several times.',
 )
+cutoff = click.option(
+    '--cutoff', type=float, help='Of the position filter [Hz]; from the data by default.'
+)
+decimation = click.option('--decimation', type=int, help='Keep one sample of this many.')
 topic = click.option('--topic', help='JointState topic, where a bag has several.')
 seed = click.option(
     '--seed',
