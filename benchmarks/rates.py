@@ -113,10 +113,10 @@ def page(looks: str, rates: str) -> str:
             '',
             '## Development sets',
             '',
-            '| command `python -m benchmarks.`... | question | right | 95 % interval |',
+            '| command | question | right | 95 % interval |',
             '|---|---|---|---|',
             *(
-                f'| `{row["command"]}` | {row["question"]} | {_right(row["right"])} |'
+                f'| {_command(row)} | {row["question"]} | {_right(row["right"])} |'
                 for row in other['kinds']
             ),
             '',
@@ -135,10 +135,10 @@ def page(looks: str, rates: str) -> str:
             '',
             '## Real machines',
             '',
-            '| command `python -m benchmarks.`... | recording | answer |',
+            '| command | recording | answer |',
             '|---|---|---|',
             *(
-                f'| `{row["command"]}` | {row["recording"]} | {row["answer"]} |'
+                f'| {_command(row)} | {row["recording"]} | {row["answer"]} |'
                 for row in other['real']
             ),
             '',
@@ -150,6 +150,10 @@ def _locked_row(command: str, question: str, runs: list[dict[str, Any]]) -> str:
     cases = sum(run['cases'] for run in runs)
     hits = sum(round(run['value'] * run['cases']) for run in runs if run['cases'])
     return f'| {command} | {question} | {_right([hits, cases])} |'
+
+
+def _command(row: dict[str, Any]) -> str:
+    return f'`python -m benchmarks.{row["command"]}`'
 
 
 def _of(pair: list[int] | None) -> str:
