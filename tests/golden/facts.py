@@ -30,7 +30,7 @@ ROWS = 24
 _WORD = r'(?:\d[\d.]* )?[\w.@|*:()^-]*[\w)]'
 _NAME = re.compile(rf'(?=.{{1,80}}$){_WORD}(?:(?: [+|*-] |, ?){_WORD})*')
 _IGNORED = re.compile(
-    r'(.*(seconds|_time|path|file|folder|bag|command|version|created|hash|sha256|source|urdf'
+    r'(.*(seconds|_time|path|file|folder|bag|command|version|created|hash|sha256|digest|source|urdf'
     r'|text|summary|reason|advice|hint|note|detail|description|title|unit|label|html)s?)'
     r'|candidates|detectable|not_visible|next_run|suspected|minor'  # how an answer was found
 )
