@@ -24,7 +24,7 @@ from functools import partial
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.estimators.instruments import (
+from armid_ros.identification.fitting.instruments import (
     by_instruments,
     linear_problem,
     smoothed,
