@@ -281,10 +281,6 @@ def identify(
 
     """
     settings = settings or IdentificationSettings()
-    if settings.method == 'iv' and arm.quasi_static:
-        raise IdentificationError(
-            'iv simulates the arm, and a quasi-static model has no inertia; use wls'
-        )
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
     notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
@@ -310,7 +306,7 @@ def identify(
         if _hidden(arm, theory):
             theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
-        fit, said = fit_by_instruments(fit, recordings, used)
+        fit, said = fit_by_instruments(arm, fit, recordings, used)
         notes += said
     notes += _remarks(fit, theory)
     certificate = None
