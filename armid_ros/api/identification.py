@@ -44,7 +44,7 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.estimators import Estimator
+from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import (
     corrected,

@@ -13,7 +13,7 @@ from __future__ import annotations
 USUAL_EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 #: Effects of some size; `armid_ros.effects.catalogue.EXAMPLES`.
 EFFECT_EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
-#: `armid_ros.identification.estimators.ESTIMATORS`.
+#: `armid_ros.identification.fitting.least_squares.ESTIMATORS`.
 ESTIMATORS = ('ols', 'wls', 'irls', 'iv')
 #: Units of time of a table; `armid_ros.recording.tables.settings.TIME_UNITS`.
 TIME_UNITS = ('s', 'ms', 'us', 'ns')

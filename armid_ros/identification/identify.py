@@ -10,15 +10,14 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.estimators import Estimator, ESTIMATORS
-from armid_ros.identification.estimators.instruments import fit_by_instruments
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques
 from armid_ros.identification.fitting.excited import excited
 from armid_ros.identification.fitting.halves import halves_error, HalvesError
 from armid_ros.identification.fitting.held import base_spread, determined
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
+from armid_ros.identification.fitting.instruments import fit_by_instruments
 from armid_ros.identification.fitting.jackknife import scatter
-from armid_ros.identification.fitting.least_squares import Method
+from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
 from armid_ros.identification.fitting.nonlinear import (
     fit_values,
     FittedValues,
@@ -282,10 +281,6 @@ def identify(
 
     """
     settings = settings or IdentificationSettings()
-    if settings.method == 'iv' and arm.quasi_static:
-        raise IdentificationError(
-            'iv simulates the arm, and a quasi-static model has no inertia; use wls'
-        )
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
     notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
@@ -311,7 +306,7 @@ def identify(
         if _hidden(arm, theory):
             theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
-        fit, said = fit_by_instruments(fit, recordings, used)
+        fit, said = fit_by_instruments(arm, fit, recordings, used)
         notes += said
     notes += _remarks(fit, theory)
     certificate = None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
-from armid_ros.identification.estimators import IN_WORDS
+from armid_ros.identification.fitting.least_squares import IN_WORDS
 from armid_ros.recording import Recording
 from armid_ros.report.families import effects_in_words
 from armid_ros.report.judgement import judge

@@ -17,7 +17,7 @@ from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.elastic.identification import Accelerometers, read_runs
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
 from armid_ros.excitation.schedule import MAX_DURATION
-from armid_ros.identification.estimators import ESTIMATORS
+from armid_ros.identification.fitting.least_squares import ESTIMATORS
 from armid_ros.pair.exercises import EXERCISES
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.recording.tables.settings import TIME_UNITS

@@ -24,7 +24,7 @@ from functools import partial
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.estimators.instruments import (
+from armid_ros.identification.fitting.instruments import (
     by_instruments,
     linear_problem,
     smoothed,
@@ -172,16 +172,16 @@ def check_noise(
     """
     if repeats < 2:
         raise IdentificationError(f'{repeats} simulations do not tell a mean from chance: take 2')
-    tick = _steps(repeats + 2, progress)
+    report = progress or (lambda share: None)
     about = partial(
         linear_problem, result.arm, result.base, used=result.used, linear=result.passes == 1
     )
     problem = about(recordings)
-    tick()
+    report(1.0 / (repeats + 2))
     weights = solve(problem, result.settings.least_squares).weights
     calm = smoothed(recordings, result.used)
     exact = about(calm)
-    tick()
+    report(2.0 / (repeats + 2))
     found = by_instruments(problem, [part.columns for part in exact], weights)
     unit = 1.0 / np.sqrt(np.diag(found.covariance))
     sizes, axes = np.linalg.eigh(found.spread * np.outer(unit, unit))
@@ -189,33 +189,30 @@ def check_noise(
     statistic = float(np.sum((axes.T @ (found.difference * unit)) ** 2 * counted))
     freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # what to expect of it
 
+    # A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what
+    # was found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times
+    # the difference of the torques of what was found along the exact and the noisy motion.
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
-    bias, bias_std = _simulated_bias(
-        result, calm, exact, about, weights, noise, rng, repeats, tick
-    )
+    values, std = result.estimate.values, result.estimate.std
+    scale = np.where(std > 0.0, std, 1.0)
+    w, torque = _weighted(exact, weights, scale), _torque(exact, weights, values)
+    biases = []
+    for k in range(repeats):
+        noisy = about([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
+        both = np.column_stack([w, torque - _torque(noisy, weights, values)])
+        gain = np.linalg.lstsq(_weighted(noisy, weights, scale), both, rcond=None)[0]
+        biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
+        report((k + 3.0) / (repeats + 2))
     return NoiseCheck(
         statistic=statistic,
         freedom=freedom,
         p_value=float(chi2.sf(statistic, freedom)),
         instrumental=Estimate(result.base.parameters, found.values, found.covariance),
         position_noise=noise,
-        bias=bias,
-        bias_std=bias_std,
-        std=result.estimate.std,
+        bias=scale * np.mean(biases, axis=0),
+        bias_std=scale * np.std(biases, axis=0, ddof=1) / np.sqrt(repeats),
+        std=std,
     )
-
-
-def _steps(count: int, progress: Callable[[float], None] | None) -> Callable[[], None]:
-    """Return what is called after each of some steps of equal length."""
-    done = 0
-
-    def tick() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done / count)
-
-    return tick
 
 
 def position_noise(recording: Recording) -> FloatArray:
@@ -229,41 +226,6 @@ def position_noise(recording: Recording) -> FloatArray:
     frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
     level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))
-
-
-def _simulated_bias(
-    result: Identification,
-    calm: Sequence[Recording],
-    exact: Sequence[Regression],
-    about: Callable[[Sequence[Recording]], Sequence[Regression]],
-    weights: FloatArray,
-    noise: FloatArray,
-    rng: np.random.Generator,
-    repeats: int,
-    tick: Callable[[], None],
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Return how much noisy positions change a fit, and the standard error of that.
-
-    A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what was
-    found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times the
-    difference of the torques of what was found along the exact and the noisy motion.
-
-    """
-    scale = np.where(result.estimate.std > 0.0, result.estimate.std, 1.0)
-    w = _weighted(exact, weights, scale)
-    found = _torque(exact, weights, result.estimate.values)
-    biases = []
-    for _ in range(repeats):
-        noisy = [replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm]
-        again = about(noisy)
-        off = found - _torque(again, weights, result.estimate.values)
-        both = np.column_stack([w, off])
-        gain = np.linalg.lstsq(_weighted(again, weights, scale), both, rcond=None)[0]
-        biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
-        tick()
-    spread = np.std(biases, axis=0, ddof=1) / np.sqrt(repeats)
-    return scale * np.mean(biases, axis=0), scale * spread
 
 
 def _torque(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:

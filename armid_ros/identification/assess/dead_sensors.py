@@ -155,7 +155,10 @@ def dead_encoders(
             )
         elif (
             robot is not None
-            and _until_the_end(recording, start, stop)
+            # what has died stays dead; a joint that turns round slowly, or comes to rest, goes
+            # from one end of its friction to the other while a coarse encoder reads the same
+            and stop == len(recording)
+            and stop - start > _PART * len(recording)
             and _moves_unseen(robot, motions, j, (t[start], t[stop - 1]))
         ):
             yield (
@@ -215,17 +218,6 @@ def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
     way -= (t - t[0]) * way[-1] / (t[-1] - t[0])
     walk = _WALK * np.sqrt(_white(dq) * np.sum(steps**2))
     return max(float(np.ptp(way) - walk), 0.0)
-
-
-def _until_the_end(recording: Recording, start: int, stop: int) -> bool:
-    """
-    Return whether a reading stays the same until the end, for a part of the recording at least.
-
-    What has died stays dead. A joint that turns round slowly, or comes to rest, goes from one end
-    of its friction to the other while a coarse encoder reads the same.
-
-    """
-    return stop == len(recording) and stop - start > _PART * len(recording)
 
 
 def _moves_unseen(

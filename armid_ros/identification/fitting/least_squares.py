@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args, Literal
 
 from armid_ros.identification.fitting.triangle import (
     fit_scaled,
@@ -33,6 +33,17 @@ from scipy import fft
 import scipy.linalg
 
 Method = Literal['ols', 'wls', 'irls']
+Estimator = Literal['ols', 'wls', 'irls', 'iv']
+
+#: All estimators.
+ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
+#: Description of each estimator.
+IN_WORDS: dict[Estimator, str] = {
+    'ols': 'ordinary least squares',
+    'wls': 'least squares weighted by the noise of each joint',
+    'irls': 'least squares weighted by the noise of each joint, outliers weighted down',
+    'iv': 'instrumental variables from a simulation of the arm',
+}
 
 #: Residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 % efficiency).
 _HUBER = 1.345

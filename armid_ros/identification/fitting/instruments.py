@@ -83,6 +83,7 @@ class Instrumented:
 
 
 def fit_by_instruments(
+    arm: ArmModel,
     fit: FittedValues,
     recordings: Sequence[Recording],
     used: Conditioning,
@@ -92,6 +93,8 @@ def fit_by_instruments(
 
     Parameters
     ----------
+    arm : ArmModel
+        The description.
     fit : FittedValues
         Weighted least squares.
     recordings : sequence of Recording
@@ -106,7 +109,16 @@ def fit_by_instruments(
     notes : tuple of str
         What a person should know of it.
 
+    Raises
+    ------
+    IdentificationError
+        If the description is quasi-static: it has no inertia to simulate.
+
     """
+    if arm.quasi_static:
+        raise IdentificationError(
+            'iv simulates the arm, and a quasi-static model has no inertia; use wls'
+        )
     notes, free = tuple[str, ...](), ungrouped(fit.arm, fit.base)
     base, now, simulated = fit.base, fit, True
     limits = bounds(fit.arm, base)

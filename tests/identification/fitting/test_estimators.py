@@ -13,7 +13,7 @@ from armid_ros.identification import (
     PhysicalSettings,
     SignalSettings,
 )
-from armid_ros.identification.estimators import ESTIMATORS
+from armid_ros.identification.fitting.least_squares import ESTIMATORS
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
