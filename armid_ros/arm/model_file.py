@@ -135,11 +135,7 @@ def save_model(
     [0.3 0.3 0.3]
 
     """
-    document = model_document(arm, robot, estimate)
-    if misfit is not None:
-        document['misfit'] = misfit.document()
-    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99)
-    write_file(path, text)
+    write_file(path, model_text(arm, robot, estimate, misfit))
 
 
 def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = None) -> ArmModel:
@@ -212,9 +208,13 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
         return _arm(checked_model(text), robot)
 
 
-def model_text(arm: ArmModel, robot: str, estimate: Estimate | None = None) -> str:
-    """Return what model.yaml holds; arguments as of `model_document`."""
+def model_text(
+    arm: ArmModel, robot: str, estimate: Estimate | None = None, misfit: Misfit | None = None
+) -> str:
+    """Return what `save_model` writes."""
     document = model_document(arm, robot, estimate)
+    if misfit is not None:
+        document['misfit'] = misfit.document()
     return str(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99))
 
 
