@@ -56,7 +56,7 @@ def inspect(
     """
     from armid_ros.api.inspection import inspect as run
     from armid_ros.api.inspection import read_all_joints, topics_of
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.files import json_text, write_file
@@ -84,7 +84,7 @@ def inspect(
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(recording, robot, topics=topics, rng=seed)
     if staged is not None:
-        origin = Origin(robot_source or '', provenance=provenance([bag], seed=seed))
+        origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
         page = found.page(origin)
         write_file(staged.folder / 'inspection.html', page)
         staged.keep()
