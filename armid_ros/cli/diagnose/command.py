@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.diagnose import partner as partner_options
@@ -115,18 +115,15 @@ def diagnose(
     model: Path | None,
     baseline: tuple[Path, ...],
     no_baseline: bool,
-    material: float,
-    everything: bool,
     effects: str,
     residual: str | None,
     strict: bool,
-    cutoff: float | None,
-    decimation: int | None,
     partner: str | None,
     partner_topic: str | None,
     ties: tuple[str, ...],
     seed: int,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
@@ -167,15 +164,12 @@ def diagnose(
             recordings,
             validate=held_out,
             baseline=before,
-            cutoff=cutoff,
-            decimation=decimation,
-            material=material,
-            everything=everything,
             misfit=misfit,
             partner=beside,
             tied=diagnose_ties,
             rng=seed,
             progress=tick,
+            **asked,
         )
         source = options.kept_source(robot_source, robot, staged.folder)
         origin = ResultOrigin(
