@@ -87,7 +87,7 @@ def model_text(
             entry['shapes'] = parameter_table(shapes, np.array(effect.shape), std)
         effects.append(entry | effect.particulars())
         start += len(values)
-    document = {
+    document: dict[str, Any] = {
         'schema': SCHEMA,
         'robot': robot,
         'gravity': [float(g) for g in arm.robot.gravity],
