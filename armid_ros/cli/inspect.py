@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-import textwrap
 from typing import TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
-from armid_ros.cli.terminal import print_rows, progress, say
+from armid_ros.cli.terminal import print_rows, progress, say, wrapped
 import click
 
 if TYPE_CHECKING:
@@ -121,11 +120,5 @@ def _print(found: Inspection) -> None:
         del row['step']
     print_rows(rows, as_json=False, right=heads[1:], spare=('moving', heads[3]))
     for remark in found.remarks:
-        say(_wrapped(f'{_SIGNS[remark.weight]} {remark.text}'))
-    say(_wrapped(found.verdict, ''))
-
-
-def _wrapped(text: str, indent: str = '  ') -> str:
-    return textwrap.fill(
-        text, 80, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-    )
+        say(wrapped(f'{_SIGNS[remark.weight]} {remark.text}', others='  '))
+    say(wrapped(found.verdict))
