@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.comparison import compare as run
 from armid_ros.identification.assess.comparison import Comparison
@@ -61,13 +61,13 @@ class ComparisonResult(Shown):
         """Return what comparison.json holds."""
         return self.core.document()
 
-    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html."""
         from armid_ros.report.compare_report import compare_report
 
         return compare_report(self.core, origin.provenance)
 
-    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write comparison.json and report.html into a folder."""
         document = self.document()
         write_file(folder / 'report.html', self.page(origin))

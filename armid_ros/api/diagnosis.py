@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
@@ -160,7 +160,7 @@ class DiagnosisResult(Shown):
             'next_run': None if extras.next_run is None else extras.next_run.document(),
         }
 
-    def page(self, origin: Origin = DEFAULT_ORIGIN, patch: str = '') -> str:
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN, patch: str = '') -> str:
         """Return report.html with the verdict and the evidence, and the text of model.yaml."""
         return diagnosis_report(
             self.core,
@@ -172,7 +172,7 @@ class DiagnosisResult(Shown):
             provenance=origin.provenance,
         )
 
-    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write diagnosis.json, model.yaml and report.html into a folder, numbers first."""
         model, document = folder / 'model.yaml', self.document()
         source = origin.of(self.description.robot).source
@@ -344,10 +344,7 @@ def diagnose(
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
-    if isinstance(arm, IdentificationResult):
-        misfit = arm.misfit
-    elif _is_written(arm):
-        misfit = read_misfit(arm, model)
+    misfit = _misfit(arm, model) if misfit is None else misfit
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
         material=material,
@@ -377,6 +374,13 @@ def diagnose(
     if residual is None:
         return found
     return found.with_residual(rng if isinstance(rng, int) else 0)
+
+
+def _misfit(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
+    """Return what a model left when it was identified, where that is known."""
+    if isinstance(arm, IdentificationResult):
+        return arm.misfit
+    return read_misfit(arm, model) if _is_written(arm) else None
 
 
 def _since(

@@ -19,7 +19,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
 )
-from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -144,7 +144,7 @@ class ExcitationResult(Shown):
         scene = self.scene
         return fitness(self.run, self.core.limits, scene.collision, scene.floor, scene.obstacles)
 
-    def document(self, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what excitation.json holds."""
         core = replace(self.core, excitation=self.run.excitation)
         information, settings = core.information, core.settings
@@ -184,7 +184,7 @@ class ExcitationResult(Shown):
             ],
         }
 
-    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html on the quality of the run."""
         from armid_ros.report.excitation_report import CheckedRun, excitation_report
 
@@ -198,7 +198,7 @@ class ExcitationResult(Shown):
             planned=CheckedRun(self.run, self.fitness),
         )
 
-    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """
         Write excitation.yaml, .csv and .json, a bag with the run, and report.html into a folder.
 

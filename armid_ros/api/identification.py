@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
 from armid_ros.arm.export_check import torque_check
@@ -172,7 +172,7 @@ class IdentificationResult(Shown):
             return {}
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
 
-    def document(self, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what identification.json holds, but for exports and digests of recordings."""
         robot = origin.of(self.description.robot).robot
         document = identification_document(
@@ -189,7 +189,7 @@ class IdentificationResult(Shown):
             write_file(Path(path), text)
         return text
 
-    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with all curves, numbers and doubts."""
         from armid_ros.report.identification_report import Assessment, identification_report
 
@@ -205,7 +205,7 @@ class IdentificationResult(Shown):
             provenance=origin.provenance,
         )
 
-    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write model.yaml, identification.json, report.html and the exports into a folder."""
         document = self.document(origin)
         source = origin.of(self.description.robot).source

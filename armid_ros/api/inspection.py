@@ -17,7 +17,7 @@ from armid_ros.api.arguments import (
     robot_of,
     RobotLike,
 )
-from armid_ros.api.table import DEFAULT_ORIGIN, Origin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
 from armid_ros.inspection import inspect as look
@@ -82,13 +82,13 @@ class InspectionResult(Shown):
         """Return what ``armid inspect --json`` prints."""
         return inspection_document(self.core)
 
-    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return inspection.html with all curves."""
         from armid_ros.report.inspection_report import inspection_report
 
         return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
 
-    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write inspection.json and inspection.html into a folder."""
         document = self.document()
         write_file(folder / 'inspection.json', json_text(document, indent=1))

@@ -64,7 +64,7 @@ class Summary:
 
 
 @dataclass(frozen=True)
-class Origin:
+class ResultOrigin:
     """
     What files of a result say of where it comes from.
 
@@ -83,14 +83,14 @@ class Origin:
     source: str = ''
     provenance: Provenance | None = None
 
-    def of(self, robot: Robot) -> Origin:
+    def of(self, robot: Robot) -> ResultOrigin:
         """Return the same with the defaults filled in."""
         known = source_of(robot)
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 
 #: Shipped names and paths, without provenance.
-DEFAULT_ORIGIN = Origin()
+DEFAULT_ORIGIN = ResultOrigin()
 
 
 class Shown(ABC):
@@ -105,7 +105,7 @@ class Shown(ABC):
         """Return the result for programs."""
 
     @abstractmethod
-    def page(self, origin: Origin = DEFAULT_ORIGIN) -> str:
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return the report, one HTML file."""
 
     def report(self, path: str | Path = 'report.html') -> Path:
@@ -114,7 +114,7 @@ class Shown(ABC):
         return Path(path)
 
     @abstractmethod
-    def fill(self, folder: Path, origin: Origin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write all files of the result into a folder that exists; return its document."""
 
     def save(self, folder: str | Path) -> Path:

@@ -35,7 +35,18 @@ def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     """Keep pairs of names, each of which has to be one."""
-    return _kept(ctx, parameter, tuple(_rule(text) for text in value))
+    rules = []
+    for text in value:
+        old, colon, new = text.partition(':')
+        if not colon:
+            first, equals, second = text.partition('=')
+            right = f'{first}:{second}' if equals else f'{text}:NEW'
+            raise RecordingError(
+                f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
+                f"option for each pair: --rename '{right}' --rename fer_:panda_"
+            )
+        rules.append((old, new))
+    return _kept(ctx, parameter, tuple(rules))
 
 
 _OPTIONS = (
@@ -102,18 +113,6 @@ def options(command: Any) -> Any:
     return command
 
 
-def _rule(text: str) -> tuple[str, str]:
-    old, colon, new = text.partition(':')
-    if not colon:
-        first, equals, second = text.partition('=')
-        right = f'{first}:{second}' if equals else f'{text}:NEW'
-        raise RecordingError(
-            f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
-            f"option for each pair: --rename '{right}' --rename fer_:panda_"
-        )
-    return old, new
-
-
 def settings() -> ColumnSettings:
     """Return what the options of the running command say."""
     from armid_ros.recording.tables import ColumnSettings, numbers
@@ -160,7 +159,12 @@ def read(
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
-    _no_pairs(paths, said.rename)
+    for path in paths if said.rename else ():
+        if ':' in path.name and not path.exists():  # a second pair without an option of its own
+            raise RecordingError(
+                f"there is no recording '{path}'; names to exchange need an option for each pair: "
+                f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
+            )
     return [
         read_anything(
             path,
@@ -173,16 +177,6 @@ def read(
         )
         for path in paths
     ]
-
-
-def _no_pairs(paths: Sequence[Path], rename: Sequence[tuple[str, str]]) -> None:
-    """Refuse a pair of names that was taken as a recording, as it has no option of its own."""
-    for path in paths if rename else ():
-        if ':' in path.name and not path.exists():
-            raise RecordingError(
-                f"there is no recording '{path}'; names to exchange need an option for each pair: "
-                f"--rename '{rename[-1][0]}:{rename[-1][1]}' --rename '{path}'"
-            )
 
 
 def _coupling(text: str) -> tuple[str, str, float]:

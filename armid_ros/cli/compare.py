@@ -25,7 +25,7 @@ def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -
 
     """
     from armid_ros.api.comparison import compare as run
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.files import json_text
@@ -35,7 +35,7 @@ def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -
     staged = options.stage(out, SCHEMA)
     result = run(before, after)
     sources = [Path(one.source) for one in (result.core.before, result.core.after)]
-    document = result.fill(staged.folder, Origin(provenance=provenance(sources)))
+    document = result.fill(staged.folder, ResultOrigin(provenance=provenance(sources)))
     staged.keep()
     if as_json:
         click.echo(json_text(document))

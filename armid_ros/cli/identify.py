@@ -98,7 +98,7 @@ def identify(
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     from armid_ros.api.identification import identify as run
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
@@ -125,7 +125,7 @@ def identify(
             **asked,
         )
         tick(1.0, 'writing')
-        origin = Origin(
+        origin = ResultOrigin(
             robot_source,
             options.kept_source(robot_source, robot, staged.folder),
             provenance([*bags, *validate], result.document()['settings'], seed),

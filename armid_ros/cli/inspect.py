@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-import textwrap
 from typing import TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
-from armid_ros.cli.terminal import print_rows, progress, say
+from armid_ros.cli.terminal import print_rows, progress, say, wrapped
 import click
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ def inspect(
     """
     from armid_ros.api.inspection import inspect as run
     from armid_ros.api.inspection import read_all_joints, topics_of
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.files import json_text, write_file
@@ -84,7 +83,7 @@ def inspect(
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(recording, robot, topics=topics, rng=seed)
     if staged is not None:
-        origin = Origin(robot_source or '', provenance=provenance([bag], seed=seed))
+        origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
         page = found.page(origin)
         write_file(staged.folder / 'inspection.html', page)
         staged.keep()
@@ -121,11 +120,5 @@ def _print(found: Inspection) -> None:
         del row['step']
     print_rows(rows, as_json=False, right=heads[1:], spare=('moving', heads[3]))
     for remark in found.remarks:
-        say(_wrapped(f'{_SIGNS[remark.weight]} {remark.text}'))
-    say(_wrapped(found.verdict, ''))
-
-
-def _wrapped(text: str, indent: str = '  ') -> str:
-    return textwrap.fill(
-        text, 80, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-    )
+        say(wrapped(f'{_SIGNS[remark.weight]} {remark.text}', others='  '))
+    say(wrapped(found.verdict))

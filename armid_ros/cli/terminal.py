@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import textwrap
 import threading
 import time
 from typing import Any
@@ -20,6 +21,18 @@ def say(text: str, colour: str | None = None) -> None:
     """Print a line, on a terminal in a colour."""
     shown = visible(text)
     click.echo(shown if colour is None else click.style(shown, fg=colour))
+
+
+def wrapped(text: str, first: str = '', others: str = '') -> str:
+    """Return a text in lines of 80 columns, indented, that break at blanks alone."""
+    return textwrap.fill(
+        text,
+        80,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.api.diagnosis import diagnose
-from armid_ros.api.table import Origin
+from armid_ros.api.table import ResultOrigin
 from armid_ros.arm import ArmModel
 from armid_ros.cli.diagnose.command import show
 from armid_ros.cli.terminal import progress, say
@@ -170,7 +170,7 @@ def tell_story(
             progress=tick,
         )
         robot = known.robot.name
-        found.fill(out, Origin(robot, robot))
+        found.fill(out, ResultOrigin(robot, robot))
     return ToldStory(hidden, found.core)
 
 

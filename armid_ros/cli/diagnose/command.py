@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.diagnose import partner as partner_options
@@ -115,24 +115,21 @@ def diagnose(
     model: Path | None,
     baseline: tuple[Path, ...],
     no_baseline: bool,
-    material: float,
-    everything: bool,
     effects: str,
     residual: str | None,
     strict: bool,
-    cutoff: float | None,
-    decimation: int | None,
     partner: str | None,
     partner_topic: str | None,
     ties: tuple[str, ...],
     seed: int,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
         raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
     from armid_ros.api.diagnosis import diagnose as run
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
@@ -158,9 +155,8 @@ def diagnose(
         )
         options.tell_damage(*recordings, *held_out, *before)
         if beside is not None:
-            how = options.read_settings()
             recordings, held_out = (
-                partner_options.read_together(named, some, beside, partner_topic, how)
+                partner_options.read_together(named, some, beside, partner_topic)
                 for named, some in ((bags, recordings), (validate, held_out))
             )
         result = run(
@@ -168,18 +164,17 @@ def diagnose(
             recordings,
             validate=held_out,
             baseline=before,
-            cutoff=cutoff,
-            decimation=decimation,
-            material=material,
-            everything=everything,
             misfit=misfit,
             partner=beside,
             tied=diagnose_ties,
             rng=seed,
             progress=tick,
+            **asked,
         )
         source = options.kept_source(robot_source, robot, staged.folder)
-        origin = Origin(robot_source, source, provenance([*bags, *validate, *baseline], seed=seed))
+        origin = ResultOrigin(
+            robot_source, source, provenance([*bags, *validate, *baseline], seed=seed)
+        )
         result.fill(staged.folder, origin)
         staged.keep()
         if residual is not None:
@@ -196,9 +191,14 @@ def diagnose(
     else:
         show(result.core)
         _show_extras(out, result)
-    if result.verdict == 'bad_data':
+    _exit(result.verdict, strict)
+
+
+def _exit(verdict: str, strict: bool) -> None:
+    """End with a code of its own where a script must not go on."""
+    if verdict == 'bad_data':
         click.get_current_context().exit(2)
-    if strict and result.verdict in ('unknown', 'not_repeatable'):
+    if strict and verdict in ('unknown', 'not_repeatable'):
         click.get_current_context().exit(3)
 
 

@@ -15,7 +15,7 @@ import click
 if TYPE_CHECKING:
     from armid_ros.effects.tied import Partner
     from armid_ros.model.spring_ties import Tie
-    from armid_ros.recording import ReadSettings, Recording
+    from armid_ros.recording import Recording
     from armid_ros.robots import Robot
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
@@ -77,15 +77,14 @@ def read_together(
     recordings: Sequence[Recording],
     partner: Partner,
     topic: str | None,
-    settings: ReadSettings,
 ) -> list[Recording]:
     """Add the motion of the partner, from the same bags, to recordings of the arm."""
-    from armid_ros.cli.options import tell_damage
+    from armid_ros.cli import options
     from armid_ros.recording import read_recording, recorded_together
 
-    joints = partner.robot.joints
-    others = [read_recording(bag, joints=joints, topic=topic, settings=settings) for bag in bags]
-    tell_damage(*others)
+    joints, how = partner.robot.joints, options.read_settings()
+    others = [read_recording(bag, joints=joints, topic=topic, settings=how) for bag in bags]
+    options.tell_damage(*others)
     return [
         recorded_together(recording, other, partner.robot, partner.ties)
         for recording, other in zip(recordings, others, strict=True)

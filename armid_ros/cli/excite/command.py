@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 import math
 from pathlib import Path
@@ -18,15 +19,15 @@ from armid_ros.cli.choices import (
     SPEED_CLASSES,
     TARGETS,
 )
-from armid_ros.cli.terminal import progress, say
+from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.errors import TrajectoryError
 import click
 
 if TYPE_CHECKING:
     from armid_ros.api.excitation import ExcitationResult
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
-    from armid_ros.excitation import DesignProgress
+    from armid_ros.excitation import DesignProgress, TransferPlanner
     from armid_ros.files import Staged
     from armid_ros.motion import FloatArray
     from armid_ros.robots import Robot
@@ -220,17 +221,17 @@ def excite(
         SCHEMA,
         transfer_planner,
     )
-    from armid_ros.api.table import Origin
+    from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.excite.springs import (
         refuse_other_options,
         require_free,
         write_course,
     )
+    from armid_ros.cli.origin import provenance
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.parallel import INTERRUPTED
     from armid_ros.files import json_text
-    from armid_ros.report.provenance import hash_files, Provenance, versions
 
     refuse_other_options(click.get_current_context())
     robot = _driven(robot_source, gravity, joints, after)
@@ -241,38 +242,27 @@ def excite(
         write_course(kind, scene, duration, share, seed, out)
         return
     arm, other = _arms(robot, model, effects, focus, texts, rival)
+    if acceleration is not None:
+        limits = options.per_joint(acceleration, robot, '--acceleration')
     settings |= {
         'focus': tuple(name.partition('@')[0] for name in focus.split(',') if name),
-        'acceleration': limits
-        if acceleration is None
-        else options.per_joint(acceleration, robot, '--acceleration'),
+        'acceleration': limits,
         'noise': options.per_joint(torque_noise, robot, '--torque-noise'),
         'clearance': clearance,
     }
     known = design_settings(duration, periods, **settings)
-    planners = {
-        speed: transfer_planner(arm, replace(known, speed=speed), scene)
-        for speed in dict.fromkeys(speeds)
-    }
-    planner, given = planners[speeds[0]], options.per_joint(start, robot, '--start')
-    fault = '' if given is None else planner.fault(given)
-    if fault:
-        raise TrajectoryError(f'--start: {fault}')
-    pose, zero_fault = planner.free_start() if given is None else (given, '')
-    folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in planners}
+    planner = transfer_planner(arm, replace(known, speed=speeds[0]), scene)
+    pose, whose = _start(options.per_joint(start, robot, '--start'), planner)
+    folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}
     for folder in folders.values():
         require_free(folder)
     staged = {s: options.stage(f, SCHEMA, robot_source) for s, f in folders.items()}
     recordings = options.read(after, robot, None)
     beside = [path for path in (model, environment, joint_limits) if path is not None]
-    read: list[str | Path] = [robot_source, *after, *beside]
+    read = [Path(robot_source.split(' ')[0]), *after, *beside]
     missing = list(folders)
     for number, (speed, folder) in enumerate(folders.items()):
         with progress('designing') as tick:
-
-            def told(now: DesignProgress, begun: int = number, name: str = str(speed)) -> None:
-                tick((begun + now.done) / len(folders), f'designing {name}, cost {now.cost:.2f}')
-
             result = design_excitation(
                 arm,
                 duration=duration,
@@ -282,26 +272,33 @@ def excite(
                 after=recordings,
                 rival=other,
                 rng=seed,
-                progress=told,
+                progress=_shown(tick, number, len(folders), speed),
                 speed=speed,
                 **settings,
             )
             tick((number + 1.0) / len(folders), 'writing')
-            files = Provenance(files=hash_files(read), versions=versions(), seed=seed)
-            origin = Origin(robot_source, provenance=files)
+            origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
             document = _written(staged[speed], result, origin)
         missing.remove(speed)
         if as_json:
             click.echo(json_text(document))
         else:
-            whose = 'as given' if given is not None else 'the zero of the description'
-            if zero_fault:
-                whose = f'the zero of the description is not free: {zero_fault}'
             _print(folder, document, result, whose)
         if result.core.stopped == INTERRUPTED:
             break
     if missing:
         click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
+
+
+def _shown(
+    tick: Tick, number: int, count: int, speed: str | float
+) -> Callable[[DesignProgress], None]:
+    """Return what shows the progress of one design of several."""
+
+    def shown(now: DesignProgress) -> None:
+        tick((number + now.done) / count, f'designing {speed}, cost {now.cost:.2f}')
+
+    return shown
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
@@ -318,6 +315,18 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
     drives = f'{", ".join(others)}; --joints A,B,... drives them'
     say(f'not driven, as they belong to no arm: {drives}', 'yellow')
     return robot
+
+
+def _start(given: FloatArray | None, planner: TransferPlanner) -> tuple[FloatArray, str]:
+    """Return the pose to start from, and what it is in words."""
+    if given is not None:
+        fault = planner.fault(given)
+        if fault:
+            raise TrajectoryError(f'--start: {fault}')
+        return given, 'as given'
+    pose, fault = planner.free_start()
+    zero = 'the zero of the description'
+    return pose, f'{zero} is not free: {fault}' if fault else zero
 
 
 def _arms(
@@ -342,7 +351,7 @@ def _arms(
     return arm, other
 
 
-def _written(staged: Staged, result: ExcitationResult, origin: Origin) -> dict[str, Any]:
+def _written(staged: Staged, result: ExcitationResult, origin: ResultOrigin) -> dict[str, Any]:
     """Write a design; where no way leads to it, its coefficients alone, unless one was there."""
     try:
         document = result.fill(staged.folder, origin)
