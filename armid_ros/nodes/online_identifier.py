@@ -40,7 +40,7 @@ from armid_ros.nodes.parameters.identifier import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
 from armid_ros.nodes.running.process import run
-from armid_ros.recording.header import header_stamp
+from armid_ros.recording.message_types import header_stamp
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.clock import Clock, ClockType

@@ -22,7 +22,7 @@ from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
-from armid_ros.recording.header import header_stamp
+from armid_ros.recording.message_types import header_stamp
 from rclpy.clock import Clock, ClockType
 
 OpenBag = Callable[[Path], BagWriter]

@@ -23,13 +23,11 @@ from typing import Self
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular, reading
 from armid_ros.recording.compression import message_content, unpacked, ZSTD
-from armid_ros.recording.damage import Damage
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Source, Topic
 from armid_ros.recording.sqlite_source import SqliteSource
-import numpy as np
 
 _STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
     '.mcap': McapSource,
@@ -196,9 +194,7 @@ class Bag:
             messages.append(message_content(block.message(at), self._settings.memory_limit))
             size += len(messages[-1])
             self._settings.require(size, 'a block of messages')
-        length = np.array([len(message) for message in messages], np.int64)
-        start = np.cumsum(length) - length
-        return MessageBlock(b''.join(messages), start, length, block.log_time, block.publish_time)
+        return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import BYTE_ORDERS
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter
@@ -19,7 +20,6 @@ IMU = 'sensor_msgs/msg/Imu'
 #: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
 _NUMBERS = 37
 _ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
-_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 
 
 def write_accelerations(
@@ -90,7 +90,7 @@ def read_accelerations(
         messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
     if not messages:
         raise RecordingError(f'{path}: {topic} has no messages')
-    order = _ORDERS.get(messages[0][:2])
+    order = BYTE_ORDERS.get(messages[0][:2])
     if order is None or len(messages[0]) < 16:
         raise RecordingError(f'{path}: {topic} is not CDR')
     layout = _layout(int(np.frombuffer(messages[0], order + 'u4', 1, 12)[0]), order)

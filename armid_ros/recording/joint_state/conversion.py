@@ -100,9 +100,7 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
             messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
         except Exception:  # the decoder counts it as malformed
             messages.append(bytes(4))
-    length = np.array([len(message) for message in messages], np.int64)
-    start = np.cumsum(length) - length
-    return MessageBlock(b''.join(messages), start, length, block.log_time, block.publish_time)
+    return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
 def _part(message: Any, path: list[str]) -> Any:
