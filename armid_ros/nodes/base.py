@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
-from armid_ros.nodes.complaints import Complaints
+from armid_ros.nodes.complaints import Complaints, FATAL, surviving
 from armid_ros.nodes.parameters.table import (
     as_declared,
     declare,
@@ -17,7 +17,6 @@ from armid_ros.nodes.parameters.table import (
     NodeParameter,
     unknown,
 )
-from armid_ros.nodes.running.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType

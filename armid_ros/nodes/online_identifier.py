@@ -28,9 +28,14 @@ from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.disturbances import disturbance, DISTURBANCES
-from armid_ros.nodes.messages.estimates import estimate_message, FILES, save_identification
+from armid_ros.nodes.messages.estimates import (
+    change_status,
+    estimate_message,
+    FILES,
+    parameter_status,
+    save_identification,
+)
 from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
-from armid_ros.nodes.messages.learning_status import change_status, parameter_status
 from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,

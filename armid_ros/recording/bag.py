@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import heapq
 import os
 from pathlib import Path
@@ -197,15 +197,10 @@ class Bag:
         return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Sorts BAG_2.mcap before BAG_10.mcap."""
-
-    file: Path
-
-    def key(self) -> tuple[tuple[int, str], ...]:
-        pieces = re.split(r'(\d+)', self.file.name)
-        return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
+def _by_number(file: Path) -> tuple[tuple[int, str], ...]:
+    """Return what sorts BAG_2.mcap before BAG_10.mcap."""
+    pieces = re.split(r'(\d+)', file.name)
+    return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
 
 
 def _storage_suffix(file: Path) -> str:
@@ -243,4 +238,4 @@ def _files_of(path: Path) -> BagMetadata:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
             f'bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-    return BagMetadata(tuple(sorted(found, key=lambda file: _Part(file).key())))
+    return BagMetadata(tuple(sorted(found, key=_by_number)))

@@ -133,7 +133,7 @@ class SqliteSource:
     def _opened(self, settings: ReadSettings) -> dict[str, set[str]]:
         """Return the columns of the tables, once the file is known to be one of rosbag2."""
         database = self._database
-        database.text_factory = _lenient
+        database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(settings.memory_limit, _LONGEST))
         with suppress(sqlite3.Error):  # not known to old versions
             database.execute('PRAGMA trusted_schema = OFF')
@@ -203,10 +203,6 @@ class SqliteSource:
             self._damage.add(f'the database is damaged: {error}')
         if rows:
             yield rows
-
-
-def _lenient(text: bytes) -> str:
-    return text.decode('utf-8', 'replace')
 
 
 def _text(value: object) -> str:
