@@ -22,7 +22,6 @@ from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
-from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -120,7 +119,7 @@ class IdentificationRunNode(ArmidNode):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._script = self._steps()
         self._wait: Wait = ('begins', lambda: True)
-        self.create_timer(_LOOK_PERIOD, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.look_every(_LOOK_PERIOD, self.look)
 
     @property
     def finished(self) -> bool:

@@ -48,7 +48,6 @@ from armid_ros.nodes.running.process import run
 from armid_ros.recording.message_types import header_stamp
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -134,8 +133,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
         self.pace('estimate_rate', self.publish_estimate)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
+        self.look_every(_LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:

@@ -22,7 +22,6 @@ from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
 from armid_ros.recording.message_types import header_stamp
-from rclpy.clock import Clock, ClockType
 
 OpenBag = Callable[[Path], BagWriter]
 
@@ -107,10 +106,9 @@ class RecorderNode(ArmidNode):
         self.last_stamps: dict[str, int] = {}
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(LOOK_PERIOD, self.look, clock=steady)
-        self.create_timer(FLUSH_PERIOD, self._flush, clock=steady)
-        self.create_timer(WATCH_PERIOD, self.watch, clock=steady)
+        self.look_every(LOOK_PERIOD, self.look)
+        self.look_every(FLUSH_PERIOD, self._flush)
+        self.look_every(WATCH_PERIOD, self.watch)
         if self.value('record'):
             self.start()
 
