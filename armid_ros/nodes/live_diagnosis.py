@@ -18,8 +18,7 @@ from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
-from armid_ros.nodes.messages.disturbances import disturbance
-from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.messages.joint_states import disturbance, JointStateReader
 from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,

@@ -27,7 +27,6 @@ from armid_ros.identification.online.learning_progress import LearningProgress, 
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.messages.disturbances import disturbance, DISTURBANCES
 from armid_ros.nodes.messages.estimates import (
     change_status,
     estimate_message,
@@ -35,7 +34,12 @@ from armid_ros.nodes.messages.estimates import (
     parameter_status,
     save_identification,
 )
-from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
+from armid_ros.nodes.messages.joint_states import (
+    disturbance,
+    DISTURBANCES,
+    JointSample,
+    JointStateReader,
+)
 from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Linear accelerations as sensor_msgs/Imu, to and from bags."""
+"""Arms that are measured on both sides: their topics, and accelerations as sensor_msgs/Imu."""
 
 from __future__ import annotations
 
 from pathlib import Path
+import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
@@ -16,6 +17,8 @@ from armid_ros.recording.writer import BagWriter
 import numpy as np
 import numpy.typing as npt
 
+#: Motors as seen at the joints, links, and what the loops are asked for.
+MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
 #: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
 _NUMBERS = 37
@@ -124,3 +127,9 @@ def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
             'itemsize': 4 + padded + 8 * _NUMBERS,
         }
     )
+
+
+def imu_topic(link: str) -> str:
+    """Return the topic of the accelerometer on a link, whose name ROS may not take as it is."""
+    name = re.sub('[^A-Za-z0-9_]', '_', link)
+    return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'
