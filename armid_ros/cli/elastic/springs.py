@@ -15,7 +15,7 @@ from armid_ros.elastic.identification.output import springs_document, SPRINGS_SC
 from armid_ros.elastic.report.springs_page import springs_report
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
-from armid_ros.recording.elastic_topics import LINK
+from armid_ros.recording.imu import LINK
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import Robot
 import click

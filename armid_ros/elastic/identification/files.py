@@ -29,8 +29,14 @@ from armid_ros.recording import (
     topics,
     write_joint_states,
 )
-from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
-from armid_ros.recording.imu import read_accelerations, write_accelerations
+from armid_ros.recording.imu import (
+    imu_topic,
+    LINK,
+    MOTOR,
+    read_accelerations,
+    REFERENCE,
+    write_accelerations,
+)
 from armid_ros.recording.message_types import STRING
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.writer import whole_bag

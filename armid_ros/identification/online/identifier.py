@@ -424,6 +424,7 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
     return joint_gate(
         arm.robot.prismatic,
         'qvt' if settings.measured_velocity else 'qt',
+        torque_limit=arm.robot.torque_limit,
         max_gap=settings.longest_damage,
         false_alarm_time=changes.false_alarm_time,
     )

@@ -178,7 +178,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     """
     robot = surroundings.robot
     if value('file'):
-        return _loaded(value('file'), surroundings)
+        return checked(load_excitation(value('file')), surroundings.planner, value('file'))
     arm = surroundings.planner.arm
     own = {effect.name for effect in arm.effects}
     for name in filter(None, value('effects')):
@@ -200,10 +200,6 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     )
     rng = np.random.default_rng(value('seed'))
     return design(arm, settings, rng, collision=surroundings.bodies).excitation
-
-
-def _loaded(path: str, surroundings: Surroundings) -> Excitation:
-    return checked(load_excitation(path), surroundings.planner, path)
 
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:

@@ -164,15 +164,12 @@ def parameters_named(file: str, name: str) -> set[str]:
         for key, value in part.items() if isinstance(part, dict) else ():
             if key != 'ros__parameters':
                 pending.append((f'{pattern}/{str(key).lstrip("/")}', value))
-            elif _matches(pattern, name):
+                continue
+            # as rcl_yaml_param_parser has it
+            expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+            if re.fullmatch(expression, name):
                 found |= set(_flat(value))
     return found
-
-
-def _matches(pattern: str, name: str) -> bool:
-    """Whether a pattern of a parameter file is for a node, as rcl_yaml_param_parser has it."""
-    expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
-    return re.fullmatch(expression, name) is not None
 
 
 def _flat(value: Any, prefix: str = '') -> list[str]:
