@@ -67,8 +67,7 @@ def test_a_number_of_a_module_is_changed_wherever_it_was_imported_and_back_again
 def test_numbers_of_modules_are_all_found_once():
     found = of_modules()
     assert len(found) == len(set(found)) > 40
-    assert {'data/trajectory.py BLOCKS', 'data/trajectory.py _REST_SPEED'} <= set(found)
-    assert 'armid_ros/identification/rows/stamps.py _UNEVEN' in found
+    assert {'BLOCKS', '_REST_SPEED', '_UNEVEN'} <= {name.split()[-1] for name in found}
     with changed(found, 1.3):
         assert stamps._UNEVEN == pytest.approx(0.065)
         assert trajectory.BLOCKS == 8
