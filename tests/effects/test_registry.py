@@ -102,7 +102,7 @@ def test_the_diagnosis_looks_for_it(hose):
 
 
 def test_it_is_gone_with_its_registration(tmp_path):
-    with pytest.raises(ar.ArmidError, match="'hose'.*viscous_friction"):
+    with pytest.raises(ar.ArmidError, match=r"'hose'.*viscous_friction"):
         ar.make_effect('hose', ar.load_robot('two_link_elastic'))
     CATALOGUE.remove('viscous_friction')
     assert 'viscous_friction' in CATALOGUE
@@ -167,7 +167,7 @@ def test_a_class_without_its_methods_is_refused():
     kind = type(
         'Bare', (ar.Effect,), {'name': 'bare', 'summary': 'no', 'quantities': Hose.quantities}
     )
-    with pytest.raises(ar.ArmidError, match='action.*columns'):
+    with pytest.raises(ar.ArmidError, match=r'action.*columns'):
         ar.register(kind)
     with pytest.raises(ar.ArmidError, match='no class'):
         ar.register(Hose(('joint1',)))

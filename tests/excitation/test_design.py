@@ -159,7 +159,7 @@ def test_error_in_a_process_of_its_own_is_raised_here(two_link_arm, quick):
     )
     task = Task(replace(problem, limits=weak), None, None)
     rngs = np.random.default_rng(0).spawn(2)
-    with pytest.raises(TrajectoryError, match='shoulder.*2 N m'):
+    with pytest.raises(TrajectoryError, match=r'shoulder.*2 N m'):
         search_all(task, rngs, lambda done, found: None)
 
 

@@ -187,7 +187,7 @@ def test_a_rigid_arm_is_refused() -> None:
 def test_a_motor_without_inertia_is_refused_by_name() -> None:
     robot = load_robot('two_link_elastic')
     arm = ArmModel(robot).with_effect(make_effect('joint_elasticity@joint2', robot), [1e-4])
-    with pytest.raises(ModelError, match="'joint2'.*no inertia"):
+    with pytest.raises(ModelError, match=r"'joint2'.*no inertia"):
         Plant(arm, elasticity=Elasticity())
 
 

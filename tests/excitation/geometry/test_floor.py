@@ -50,7 +50,7 @@ def test_arms_of_other_people_that_stand_have_one_too(example_robot, name):
 @pytest.mark.parametrize('name', ['talos_left_arm', 'baxter'])
 def test_arms_that_hang_or_reach_below_their_base_are_asked_for(example_robot, name):
     collision = collision_model(load_robot(example_robot(f'{name}.urdf')))
-    with pytest.raises(TrajectoryError, match='--floor Z.*--floor none'):
+    with pytest.raises(TrajectoryError, match=r'--floor Z.*--floor none'):
         find_floor(collision)
     assert find_floor(collision, 'none').height is None
     assert find_floor(collision, '-0.93').height == -0.93
