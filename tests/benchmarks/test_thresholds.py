@@ -9,10 +9,9 @@ from armid_ros.diagnosis.search import look, trial
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict import document
 from armid_ros.identification.rows import stamps
-import numpy as np
 import pytest
 
-from benchmarks.lived_scoring import LivedJudged, LivedTruth
+from benchmarks.lived_scoring import LivedJudged
 from benchmarks.thresholds import (
     Asked,
     changed,
@@ -25,24 +24,10 @@ from benchmarks.thresholds import (
     varied,
 )
 from benchmarks.two_days import Answer, Named
+from tests.benchmarks.truths import truth
 
 NAMES = [field.name for field in fields(Thresholds)]
-TRUTH = LivedTruth(
-    key='development/14',
-    cause='rotor',
-    size='medium',
-    style='sines',
-    arm='ur5',
-    name='rotor_inertia',
-    joints=('elbow',),
-    parameters=(),
-    in_catalogue=True,
-    gap=1.5,
-    share_of_power=0.5,
-    share_of_excess=0.5,
-    gravity=np.zeros(3),
-    described=np.zeros(3),
-)
+TRUTH = truth(name='rotor_inertia', parameters=())
 RIGHT = LivedJudged(TRUTH, Answer('named', (Named('rotor_inertia', ('elbow',)),)))
 SILENT = LivedJudged(TRUTH, Answer('consistent'))
 

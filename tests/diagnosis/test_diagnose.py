@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says of arms in which something is hidden, or nothing."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
-from armid_ros.effects import Action, Effect, Quantity
+from armid_ros.diagnosis import diagnose, diagnosis_document
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.pseudo_inertia import pseudo_inertia
 import numpy as np
@@ -156,35 +155,6 @@ def test_faults_of_the_data_are_named_before_physics(bench, fault, word):
     assert found.verdict == 'bad_data'
     assert word in found.summary
     assert not found.findings
-
-
-@dataclass(frozen=True)
-class CubicSpring(Effect):
-    """A spring that hardens, tau = k q^3: an effect of one's own."""
-
-    name = 'cubic_spring'
-    summary = 'a spring that hardens'
-    quantities = (Quantity('cubic_stiffness', 'N m/rad^3'),)
-
-    def columns(self, motion, arm):
-        """Return q^3."""
-        columns = np.zeros((len(motion), motion.n_joints, len(self.joints)))
-        for position, joint in enumerate(self.indices(motion.joints)):
-            columns[:, joint, position] = motion.q[:, joint] ** 3
-        return columns
-
-    def action(self, values, arm):
-        """Return the torque of the springs."""
-        stiffness = np.zeros(arm.robot.n_joints)
-        stiffness[self.indices(arm.robot.joints)] = values
-        return Action(torque=lambda t, q, dq: stiffness * q**3)
-
-
-def test_an_effect_of_ones_own_is_one_class(bench):
-    hidden = bench.recordings(lambda m, tau: on_elbow(0.4 * m.q[:, 1] ** 3))
-    found = look(bench, hidden, settings=DiagnosisSettings(own=(CubicSpring,)))
-    assert [finding.name for finding in found.findings] == ['cubic_spring']
-    assert found.findings[0].values[0] == pytest.approx(0.4, rel=0.05)
 
 
 @pytest.mark.slow
