@@ -54,7 +54,7 @@ from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
 from armid_ros.report import identification_report
 from armid_ros.report.identification_report import Assessment
-from armid_ros.report.judgement import residual_trends
+from armid_ros.report.identification_summary import headline, joint_table, summary
 from armid_ros.robots import Robot
 import click
 import numpy as np
@@ -161,6 +161,7 @@ def identify(
     bodies: BodyOptions,
     seed: int,
     as_json: bool,
+    verbose: bool,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     staged = options.stage(out, SCHEMA, robot.robot_source)
@@ -206,7 +207,9 @@ def identify(
     if as_json:
         click.echo(json_text(document))
     else:
-        _print(out, document, work, exports)
+        _print(document, work, arm, exports, verbose)
+        files = ['report.html', 'model.yaml', 'identification.json', *exports]
+        say(f'{out}: {", ".join(files)}')
     if fit.strict and work.graded.word == 'unusable':
         click.get_current_context().exit(3)
 
@@ -263,32 +266,22 @@ def _work(
     return _Work(recordings, held_out, result, validation, graded, verification, scores, gains)
 
 
-def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
-    """Print what a person would stop at, then the table, then the rest."""
-    result = work.result
-    say(f'{work.graded.word}:')
-    for reason in work.graded.reasons:
-        say(f'  {reason}')
-    for lacking in () if work.verification is None else work.verification.left_out:
-        say(f'  {lacking}')
-    shown = [fit for fits in work.validation.values() for fit in fits] or result.training
-    trends = residual_trends(result.arm.robot.joints, shown)
-    if trends:
-        say(f'  {" ".join(trends.values())} The model lacks something there.')
+def _print(
+    document: dict[str, Any],
+    work: _Work,
+    description: ArmModel,
+    exports: dict[str, Exported],
+    verbose: bool,
+) -> None:
+    """Print grade, a row for each joint and the next step; with verbose, everything."""
+    for line in headline(work.graded, work.result, work.validation):
+        say(line)
     for line in work.gains.sentences() if work.gains else ():
         say(line)
-    print_parameters(document['parameters'])
-    if result.physical is not None:
-        _print_certificate(result.physical)
-    for recording in (*work.recordings, *work.held_out):
-        say(f'{recording.source}: {recording.report.describe()}')
-    _tell(result, work.verification, result.arm.robot.notes, exports)
-    if 'methods' in document:
-        _print_methods(document['methods'])
-    fitted = document['training']['relative_error_percent']
-    say(f'relative error {fitted:.2f} % on the data it was fitted to')
-    for entry in document['validation']:
-        say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
+    for line in joint_table(work.result, description, work.validation):
+        say(line)
+    if verbose:
+        _print_all(document, work, exports)
     for name, check in document.get('exports', {}).items():
         left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
         torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
@@ -297,8 +290,36 @@ def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, 
             f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
         )
         say(f'{name}: {torque}{left_out}')
-    files = ['model.yaml', 'identification.json', 'report.html', *exports]
-    say(f'{out}: {", ".join(files)}')
+    if 'methods' in document:
+        _print_methods(document['methods'])
+    recordings = [*work.recordings, *work.held_out]
+    for line in summary(work.result, work.validation, recordings, work.verification):
+        say(line)
+
+
+def _print_all(document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
+    """Print every parameter, the certificate, notes, and checks."""
+    result, verification = work.result, work.verification
+    print_parameters(document['parameters'])
+    if result.physical is not None:
+        _print_certificate(result.physical)
+    for note in (*result.arm.robot.notes, *result.notes):
+        say(f'note: {note}')
+    unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
+    if unseen:
+        named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
+        say(f'not identified: {named}')
+    for name, one in exports.items():
+        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
+        if kinds:
+            say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
+    if verification is not None:
+        for sentence in (*verification.sentences(), *verification.left_out):
+            say(f'check: {sentence}')
+    fitted = document['training']['relative_error_percent']
+    say(f'torque error {fitted:.2f} % on the data it was fitted to')
+    for entry in document['validation']:
+        say(f'torque error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
 
 
 def _export(arm: ArmModel, out: Path) -> dict[str, Exported]:
@@ -342,24 +363,3 @@ def _print_methods(scores: Sequence[dict[str, Any]]) -> None:
     for score in scores:
         if score['note']:
             say(f'{score["method"]}: {score["note"]}')
-
-
-def _tell(
-    result: Identification,
-    verification: Verification | None,
-    robot_notes: tuple[str, ...],
-    exports: dict[str, Exported],
-) -> None:
-    for note in (*robot_notes, *result.notes):
-        say(f'note: {note}')
-    unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
-    if unseen:
-        named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
-        say(f'not identified: {named}')
-    for name, one in exports.items():
-        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
-        if kinds:
-            say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
-    if verification is not None:
-        for sentence in verification.sentences():
-            say(f'check: {sentence}')

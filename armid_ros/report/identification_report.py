@@ -53,6 +53,10 @@ class Assessment:
         Estimators that were compared on the same data.
     exports : mapping of str to sequence of str
         Files for other programs, and what each has no place for.
+    reference : str
+        What parameters are compared with: the 'description', or in a simulation the 'truth'.
+    sections : sequence of Section
+        Further sections, shown before the next steps.
 
     """
 
@@ -60,6 +64,8 @@ class Assessment:
     grade: Grade | None = None
     methods: Sequence[MethodScore] = ()
     exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    reference: str = 'description'
+    sections: Sequence[Section] = ()
 
 
 def identification_report(
@@ -133,6 +139,7 @@ def identification_report(
             result.base.values(description.theta),
             result.unidentified,
             arm.robot.links,
+            assessment.reference,
         ),
         *_physical(result, assessment.exports),
         Correlations(result.estimate, arm.robot.links),
@@ -140,6 +147,7 @@ def identification_report(
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
         *([Methods(assessment.methods)] if assessment.methods else []),
+        *assessment.sections,
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

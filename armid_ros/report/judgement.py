@@ -193,8 +193,8 @@ def _error_findings(
 
 
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> dict[str, str]:
-    """Say what the residual of joints goes with, by joint; nothing of one that goes with none."""
-    said = {}
+    """Return a sentence for each joint whose residual depends on speed, position or load."""
+    sentences = {}
     for joint, name in enumerate(joints):
         shares = explained_shares(fits, joint)
         telling = [
@@ -202,8 +202,10 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> dict[str, str
         ]
         if telling:
             parts = ', '.join(f'{key} ({100.0 * shares[key]:.0f} %)' for key in telling)
-            said[name] = f'The residual of {name} goes with {parts}.'
-    return said
+            sentences[name] = (
+                f'{name}: the residual depends on {parts}; the model lacks an effect.'
+            )
+    return sentences
 
 
 def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
@@ -291,9 +293,9 @@ def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
     if len(residual) < 20:
         return {}
     axes = {
-        'its speed': [fit.motion.dq[:, joint] for fit in fits],
-        'its position': [fit.motion.q[:, joint] for fit in fits],
-        'its load': [fit.predicted[:, joint] for fit in fits],
+        'speed': [fit.motion.dq[:, joint] for fit in fits],
+        'position': [fit.motion.q[:, joint] for fit in fits],
+        'load': [fit.predicted[:, joint] for fit in fits],
     }
     return {
         name: Trend.of(np.concatenate(parts)[used], residual).share for name, parts in axes.items()

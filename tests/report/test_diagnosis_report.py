@@ -104,7 +104,7 @@ def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet
     drawing = html[html.index('<svg class="arm"') : html.index('</svg>')]
     assert re.findall('font-weight="600"[^>]*>([^<]*)<', drawing) == ['elbow']
     assert drawing.count('<circle') == 2
-    assert drawing.count('<line') == 3  # from the ground to the shoulder, and two links
+    assert drawing.count('<line') == 4  # to the shoulder, two links, and one to the name
     plain = quiet[quiet.index('<svg class="arm"') : quiet.index('</svg>')]
     assert 'var(--predicted)' not in plain
 

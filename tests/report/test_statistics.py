@@ -103,7 +103,7 @@ def test_missing_friction_is_seen_in_the_residual(case):
     coulomb = 0.1 * np.sign(fits[0].motion.dq)
     worse = replace(fits[0], predicted=fits[0].predicted - coulomb)
     judgement = judge(case.result, {source: (worse,)}, case.recordings)
-    speed = [line for line in judgement.beware if 'its speed (' in line]
+    speed = [line for line in judgement.beware if 'speed (' in line]
     assert len(speed) == len(case.result.arm.robot.joints)
 
 

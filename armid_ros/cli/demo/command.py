@@ -15,9 +15,11 @@ from armid_ros.cli.terminal import ConvergenceTable, progress, say
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError
 from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
-from armid_ros.files import json_text, load_yaml, read_text, settled
+from armid_ros.files import json_text, load_yaml, read_text, settled, write_file
 from armid_ros.identification import (
+    Grade,
     grade,
+    Identification,
     identification_document,
     identify,
     Score,
@@ -28,6 +30,9 @@ from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.identification.output import SCHEMA
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_recording, Recording
+from armid_ros.report import identification_report
+from armid_ros.report.identification_report import Assessment
+from armid_ros.report.sections.convergence import Convergence
 from armid_ros.robots import collision_model, load_robot, Robot
 from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -46,10 +51,7 @@ SENSORS = Sensors(
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
 #: What is written beside the story.
-_FILES = (
-    'bag, excitation.yaml, model.yaml, identification.json, torque.png, parameters.png, '
-    'convergence.png'
-)
+_FILES = 'bag, excitation.yaml, model.yaml, identification.json, report.html'
 
 
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
@@ -91,8 +93,8 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         'held_out': _held_out_error(result.arm, truth, rng),
     }
     save_model(new / 'model.yaml', result.arm, ROBOT, result.estimate)
-    with progress('drawing'):
-        _draw(new, robot, result, history, target, result.base.values(truth.theta))
+    page = _page(robot, result, history, target, truth, graded, recording)
+    write_file(new / 'report.html', page)
     if not as_json:
         say(f'{graded.word}: {graded.reasons[0]}')
         _tell(document, online, offline, Score.of(result.training).relative_error_percent)
@@ -166,31 +168,32 @@ def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) ->
     return float(100.0 * np.linalg.norm(arm.torque(motion) - tau) / np.linalg.norm(tau))
 
 
-def _draw(
-    out: Path,
+def _page(
     robot: Robot,
-    result: Any,
-    history: list[Any],
+    result: Identification,
+    history: list[Progress],
     online_truth: FloatArray,
-    truth: FloatArray,
-) -> None:
-    from armid_ros.report.figures import (
-        convergence_figure,
-        parameter_figure,
-        save_figure,
-        torque_figure,
-    )
-
-    save_figure(torque_figure(robot, result.training), out / 'torque.png')
-    save_figure(parameter_figure(result.estimate, truth), out / 'parameters.png')
-    figure = convergence_figure(
-        [now.t for now in history],
-        [now.estimate.values for now in history],
-        [now.estimate.std for now in history],
+    truth: ArmModel,
+    graded: Grade,
+    recording: Recording,
+) -> str:
+    """Return report.html, with the truth and the convergence of the online estimate."""
+    convergence = Convergence(
+        np.array([now.t for now in history]),
+        np.array([now.estimate.values for now in history]),
+        np.array([now.estimate.std for now in history]),
         online_truth,
         history[-1].estimate.parameters,
     )
-    save_figure(figure, out / 'convergence.png')
+    assessment = Assessment(grade=graded, reference='truth', sections=[convergence])
+    return identification_report(
+        result,
+        description=truth,
+        robot=robot.name,
+        recordings=[recording],
+        validation={},
+        assessment=assessment,
+    )
 
 
 def _read(bag: Path, robot: Robot) -> Recording:

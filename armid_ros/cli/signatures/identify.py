@@ -72,6 +72,9 @@ import click
     help='Test for encoder noise and simulate along the held-out bags.',
 )
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
+@click.option(
+    '--verbose', is_flag=True, help='Print every parameter, certificate, note and check too.'
+)
 @columns.options
 @options.topic
 @options.gravity
