@@ -83,7 +83,7 @@ def test_what_is_said_first_is_how_well_held_out_data_are_predicted(case):
 
 def test_without_held_out_data_it_is_said_that_there_are_none(case):
     judgement = judge(case.result, {}, case.recordings)
-    assert 'no data were held out' in judgement.sentences[1]
+    assert 'No data were held out' in judgement.sentences[1]
     assert any('validate' in step for step in judgement.next_steps)
 
 

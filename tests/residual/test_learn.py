@@ -122,7 +122,7 @@ def test_the_page_says_what_is_in_the_model_that_is_written(unknown):
         asked, DiagnosedRecordings(), robot='two_links', extras=Extras(residual=learned)
     )
     joint = asked.arm.robot.joints[1]
-    assert 'The model stays as it was given.' not in page
+    assert 'The model is unchanged.' not in page
     assert f'what was learned of {joint}' in page
     assert f'{joint}: the map predicts' in page
     assert 'what was learned of' not in plain

@@ -189,7 +189,7 @@ def show_story(told: ToldStory, out: Path) -> None:
             f'with the patched model'
         )
     say(f'What was hidden: {told.hidden.sentence(arm)}.')
-    say('It was found.' if told.found else 'It was not named first.')
+    say('It was found.' if told.found else 'The diagnosis did not rank it first.')
     say(f'{out}: {", ".join(_RUNS)}, diagnosis.json, model.yaml, report.html')
 
 

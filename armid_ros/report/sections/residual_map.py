@@ -63,7 +63,7 @@ class ResidualMap(Section):
 
     """
 
-    title: ClassVar[str] = 'Without a name'
+    title: ClassVar[str] = 'Learned residual'
     template: ClassVar[str] = 'residual_map.html'
     table: ClassVar[str] = TABLE_FILE
 
