@@ -32,6 +32,7 @@ from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.effects.registry import Kind
 from armid_ros.effects.slipping import Hysteresis
+from armid_ros.effects.traits import Traits
 
 __all__ = [
     'CATALOGUE',
@@ -43,6 +44,7 @@ __all__ = [
     'Kind',
     'Quantity',
     'Shape',
+    'Traits',
     'Displacing',
     'TorqueReading',
     'Action',

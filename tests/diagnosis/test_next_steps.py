@@ -38,7 +38,7 @@ def planned(rival, told):
 
 @pytest.mark.parametrize('name', [n for n, kind in CATALOGUE.items() if not kind.learned])
 def test_every_effect_says_what_to_look_at(name):
-    what = CATALOGUE[name].look_at
+    what = CATALOGUE[name].traits.look_at
     assert what and not what.endswith('.') and ':' not in what
 
 

@@ -135,7 +135,7 @@ def small_finding(bench, share):
         share,
         (0.2, 0.4),
         0.0,
-        sign=effect.sign,
+        sign=effect.traits.sign,
     )
 
 
@@ -385,7 +385,7 @@ def test_a_shape_that_the_data_do_not_determine_is_said_so_with_what_shows_it(
     open_gap = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
     summary = decide((found,), (), [open_gap], bench.arm, FLOOR).summary
     assert ('warm up time 206' in summary) is told
-    way = f'do not determine its warm up time; what shows it is {effect.shown_by}.'
+    way = f'do not determine its warm up time; what shows it is {effect.traits.shown_by}.'
     assert (way in summary) is not told
     rows = NamedParameters((found,)).rows
     assert ('not determined' in [row[-1] for row in rows]) is not told

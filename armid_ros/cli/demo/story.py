@@ -223,7 +223,7 @@ def draw_hidden(
 
 def _drawn(arm: ArmModel, motion: Motion, rng: np.random.Generator, asked: str) -> Hidden:
     head, at, joints = asked.partition('@')
-    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.familiar]))
+    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.traits.familiar]))
     effect = make_effect(f'{name}@{joints}' if at else name, arm.robot)
     if not at and len(effect.joints) > 1:
         effect = make_effect(f'{name}@{rng.choice(effect.joints)}', arm.robot)
