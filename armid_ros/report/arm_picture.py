@@ -19,6 +19,7 @@ from itertools import product
 from armid_ros.motion import FloatArray
 from armid_ros.report.strip import Camera
 from armid_ros.robots import Robot
+from armid_ros.robots.sticks import sticks
 import numpy as np
 import pinocchio as pin
 
@@ -26,8 +27,8 @@ _HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
 #: Height of a line of text and width of a letter [px].
 _LINE, _LETTER = 16.0, 8.5
 _VIEWS = tuple(Camera(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
-#: Poses that are tried, and how far the last body is drawn beyond its centre of mass.
-_POSES, _BEYOND = 12, 2.0
+#: Poses that are tried.
+_POSES = 12
 #: Points nearer to each other than this are one [m].
 _SAME = 1e-4
 
@@ -133,7 +134,7 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         x, y = scale * (point - low)
         return round(left + float(x), 1), round(_EDGE + float(scale * size[1] - y), 1)
 
-    owners = [*_slides(robot), *(owner for owner, _, _ in _bodies(robot.model))]
+    owners = [*_slides(robot), *(owner for owner, _ in sticks(robot.model))]
     ways = [
         Stick(*place(line[0]), *place(line[1]), owner > 0 and robot.joints[owner - 1] in marked)
         for owner, line in zip(owners, lines, strict=True)
@@ -174,18 +175,6 @@ def _middle(robot: Robot) -> FloatArray:
     return middle
 
 
-def _bodies(model: pin.Model) -> list[tuple[int, FloatArray, FloatArray]]:
-    """Return lines in the frames of the joints that carry them: joint, beginning and end."""
-    nothing, lines = np.zeros(3), []
-    for joint in range(model.njoints):
-        carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
-        ends = [np.array(model.jointPlacements[k].translation) for k in carried]
-        if joint and not ends:
-            ends = [_BEYOND * np.array(model.inertias[joint].lever)]
-        lines += [(joint, nothing, end) for end in ends]
-    return lines
-
-
 def _slides(robot: Robot) -> list[int]:
     """Return the joints that slide, as the model counts them."""
     return [k for k, slides in enumerate(robot.prismatic, start=1) if slides]
@@ -204,8 +193,8 @@ def _flat(robot: Robot, q: FloatArray, view: Camera) -> FloatArray:
         for k in _slides(robot)
     ]
     bodies = [
-        [data.oMi[joint].act(start), data.oMi[joint].act(end)]
-        for joint, start, end in _bodies(robot.model)
+        [data.oMi[joint].translation, data.oMi[joint].act(end)]
+        for joint, end in sticks(robot.model)
     ]
     return view.flat(np.array([*ways, *bodies]))
 
