@@ -98,6 +98,8 @@ class FitOptions:
         Whether the result is verified, and whether an unusable one is an error.
     payloads : tuple of str
         What is carried in which bag.
+    verbose : bool
+        Whether everything is printed.
 
     """
 
@@ -108,6 +110,7 @@ class FitOptions:
     verifies: bool
     strict: bool
     payloads: tuple[str, ...]
+    verbose: bool
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,6 @@ def identify(
     bodies: BodyOptions,
     seed: int,
     as_json: bool,
-    verbose: bool,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
     staged = options.stage(out, SCHEMA, robot.robot_source)
@@ -207,7 +209,7 @@ def identify(
     if as_json:
         click.echo(json_text(document))
     else:
-        _print(document, work, arm, exports, verbose)
+        _print(document, work, arm, exports, fit.verbose)
         files = ['report.html', 'model.yaml', 'identification.json', *exports]
         say(f'{out}: {", ".join(files)}')
     if fit.strict and work.graded.word == 'unusable':

@@ -8,10 +8,9 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.action import Action, DryFriction, merge_actions
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
-from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
