@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, Traits
 from armid_ros.estimate import ParameterName
 import pytest
 
@@ -142,7 +142,7 @@ def test_names_that_are_one_cause_are_one_thing_to_look_at():
 
 
 def test_an_effect_of_ones_own_says_it_as_well():
-    hose = SimpleNamespace(said_as='hose', look_at='the clamps of the hose')
+    hose = SimpleNamespace(said_as='hose', traits=Traits(look_at='the clamps of the hose'))
     found = diagnosis('hose', ('elbow',), effects=(hose,))
     assert next_steps(found)[0] == 'Look at elbow first: the clamps of the hose.'
     assert len(next_steps(diagnosis('hose', ('elbow',)))) == 1

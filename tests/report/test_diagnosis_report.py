@@ -220,7 +220,7 @@ def test_bad_data_have_no_green_tick():
     assert found.verdict == 'bad_data'
     page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
     assert '<li class="fine">' not in page
-    assert 'What was recorded is at fault' in page
+    assert 'The recorded signals are at fault' in page
     sound = [replace(one, source=f'before {k}') for k, one in enumerate(bench.recordings(seed=1))]
     both = DiagnosedRecordings(turned, baseline=sound)
     beside = diagnosis_report(found, both, robot='two_links')
