@@ -14,6 +14,7 @@ import click
 
 if TYPE_CHECKING:
     from armid_ros.api.identification import IdentificationResult
+    from armid_ros.arm import ArmModel
     from armid_ros.identification import PhysicalCertificate
 
 
@@ -70,6 +71,9 @@ if TYPE_CHECKING:
     help='Test for encoder noise and simulate along the held-out bags.',
 )
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
+@click.option(
+    '--verbose', is_flag=True, help='Print every parameter, certificate, note and check too.'
+)
 @columns.options
 @parameters.topic
 @parameters.gravity
@@ -92,6 +96,7 @@ def identify(
     mass_range: float | None,
     boxes: tuple[str, ...],
     strict: bool,
+    verbose: bool,
     seed: int,
     as_json: bool,
     **asked: Any,
@@ -135,41 +140,46 @@ def identify(
     if as_json:
         click.echo(json_text(document))
     else:
-        _print(out, document, result)
+        _print(document, result, arm, verbose)
+        files = ['report.html', 'model.yaml', 'identification.json', *result.exports]
+        say(f'{out}: {", ".join(files)}')
     if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)
 
 
-def _print(out: Path, document: dict[str, Any], found: IdentificationResult) -> None:
-    """Print what a person would stop at, then the table, then the rest."""
-    from armid_ros.report.judgement import residual_trends
+def _print(
+    document: dict[str, Any], found: IdentificationResult, description: ArmModel, verbose: bool
+) -> None:
+    """Print grade, a row for each joint and the next step; with verbose, everything."""
+    from armid_ros.report.identification_summary import headline, joint_table, summary
 
-    result, verification = found.core, found.verification
-    say(f'{found.grade}:')
-    for reason in found.graded.reasons:
-        say(f'  {reason}')
-    for lacking in () if verification is None else verification.left_out:
-        say(f'  {lacking}')
-    shown = [fit for fits in found.validation.values() for fit in fits] or result.training
-    trends = residual_trends(result.arm.robot.joints, shown)
-    if trends:
-        say(f'  {" ".join(trends.values())} The model lacks something there.')
+    for line in headline(found.graded, found.core, found.validation):
+        say(line)
     for line in found.gains.sentences() if found.gains else ():
         say(line)
+    for line in joint_table(found.core, description, found.validation):
+        say(line)
+    if verbose:
+        _print_all(document, found)
+    for name, check in document.get('exports', {}).items():
+        left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
+        torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
+        torque = torque or (
+            f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
+            f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
+        )
+        say(f'{name}: {torque}{left_out}')
+    recordings = [*found.recordings, *found.held_out]
+    for line in summary(found.core, found.validation, recordings, found.verification):
+        say(line)
+
+
+def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
+    """Print every parameter, the certificate, notes, and checks."""
+    result, verification = found.core, found.verification
     print_parameters(document['parameters'])
     if result.physical is not None:
         _print_certificate(result.physical)
-    for recording in (*found.recordings, *found.held_out):
-        say(f'{recording.source}: {recording.report.describe()}')
-    _print_notes(found)
-    _print_errors(document)
-    files = ['model.yaml', 'identification.json', 'report.html', *found.exports]
-    say(f'{out}: {", ".join(files)}')
-
-
-def _print_notes(found: IdentificationResult) -> None:
-    """Print what limits the result, and what was checked."""
-    result, verification = found.core, found.verification
     for note in (*result.arm.robot.notes, *result.notes):
         say(f'note: {note}')
     unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
@@ -180,24 +190,13 @@ def _print_notes(found: IdentificationResult) -> None:
         kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
         if kinds:
             say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
-    for sentence in () if verification is None else verification.sentences():
-        say(f'check: {sentence}')
-
-
-def _print_errors(document: dict[str, Any]) -> None:
-    """Print how well torques are predicted, and how well the exported files agree."""
+    if verification is not None:
+        for sentence in (*verification.sentences(), *verification.left_out):
+            say(f'check: {sentence}')
     fitted = document['training']['relative_error_percent']
-    say(f'relative error {fitted:.2f} % on the data it was fitted to')
+    say(f'torque error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
-        say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
-    for name, check in document.get('exports', {}).items():
-        left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
-        torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
-        torque = torque or (
-            f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
-            f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
-        )
-        say(f'{name}: {torque}{left_out}')
+        say(f'torque error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
 
 
 def _print_certificate(certificate: PhysicalCertificate) -> None:

@@ -49,12 +49,18 @@ class Assessment:
         What it is good for; found out where it is not given.
     exports : mapping of str to sequence of str
         Files for other programs, and what each has no place for.
+    reference : str
+        What parameters are compared with: the 'description', or in a simulation the 'truth'.
+    sections : sequence of Section
+        Further sections, shown before the next steps.
 
     """
 
     verification: Verification | None = None
     grade: Grade | None = None
     exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    reference: str = 'description'
+    sections: Sequence[Section] = ()
 
 
 def identification_report(
@@ -128,12 +134,14 @@ def identification_report(
             result.base.values(description.theta),
             result.unidentified,
             arm.robot.links,
+            assessment.reference,
         ),
         *_physical(result, assessment.exports),
         Correlations(result.estimate, arm.robot.links),
         _excitation(result),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
+        *assessment.sections,
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
-from armid_ros.effects import CATALOGUE
+from armid_ros.effects import CATALOGUE, Traits
 from armid_ros.estimate import ParameterName
 import pytest
 
@@ -38,7 +38,7 @@ def planned(rival, told):
 
 @pytest.mark.parametrize('name', [n for n, kind in CATALOGUE.items() if not kind.learned])
 def test_every_effect_says_what_to_look_at(name):
-    what = CATALOGUE[name].look_at
+    what = CATALOGUE[name].traits.look_at
     assert what and not what.endswith('.') and ':' not in what
 
 
@@ -133,7 +133,7 @@ def test_names_that_are_one_cause_are_one_thing_to_look_at():
 
 
 def test_an_effect_of_ones_own_says_it_as_well():
-    hose = SimpleNamespace(said_as='hose', look_at='the clamps of the hose')
+    hose = SimpleNamespace(said_as='hose', traits=Traits(look_at='the clamps of the hose'))
     found = diagnosis('hose', ('elbow',), effects=(hose,))
     assert 'elbow' in next_steps(found)[0] and 'the clamps' in next_steps(found)[0]
     assert len(next_steps(diagnosis('hose', ('elbow',)))) == 1

@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
 #: What is written beside the story.
-_FILES = (
-    'bag, excitation.yaml, model.yaml, identification.json, torque.png, parameters.png, '
-    'convergence.png'
-)
+_FILES = 'bag, excitation.yaml, model.yaml, identification.json, report.html'
 
 
 @click.command(epilog='Example: armid demo --gravity earth --out demo')
@@ -44,7 +41,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     from armid_ros.cli.demo import steps
     from armid_ros.cli.demo.story import show_story, tell_story
     from armid_ros.excitation import save_excitation
-    from armid_ros.files import json_text, settled
+    from armid_ros.files import json_text, settled, write_file
     from armid_ros.identification import (
         grade,
         identification_document,
@@ -97,8 +94,8 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         'held_out': steps.held_out_error(result.arm, truth, rng),
     }
     save_model(new / 'model.yaml', result.arm, steps.ROBOT, result.estimate)
-    with progress('drawing'):
-        steps.draw(new, robot, result, history, target, result.base.values(truth.theta))
+    page = steps.page(result, history, target, truth, graded, recording)
+    write_file(new / 'report.html', page)
     if not as_json:
         say(f'{graded.word}: {graded.reasons[0]}')
         _tell(document, online, offline, Score.of(result.training).relative_error_percent)

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from armid_ros.arm import ArmModel
 from armid_ros.cli.terminal import progress
@@ -14,15 +15,14 @@ from armid_ros.errors import ModelError, visible
 from armid_ros.estimate import Estimate
 from armid_ros.excitation import design, DesignSettings, Excitation
 from armid_ros.files import load_yaml, read_text
+from armid_ros.identification import Grade, Identification
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.lockstep import Progress, run_lockstep
-from armid_ros.report.figures import (
-    convergence_figure,
-    parameter_figure,
-    save_figure,
-    torque_figure,
-)
+from armid_ros.recording import Recording
+from armid_ros.report import identification_report
+from armid_ros.report.identification_report import Assessment
+from armid_ros.report.sections.convergence import Convergence
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -93,25 +93,31 @@ def held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> 
     return float(100.0 * np.linalg.norm(arm.torque(motion) - tau) / np.linalg.norm(tau))
 
 
-def draw(
-    out: Path,
-    robot: Robot,
-    result: Any,
-    history: list[Any],
+def page(
+    result: Identification,
+    history: Sequence[Progress],
     online_truth: FloatArray,
-    truth: FloatArray,
-) -> None:
-    """Draw the figures."""
-    save_figure(torque_figure(robot, result.training), out / 'torque.png')
-    save_figure(parameter_figure(result.estimate, truth), out / 'parameters.png')
-    figure = convergence_figure(
-        [now.t for now in history],
-        [now.estimate.values for now in history],
-        [now.estimate.std for now in history],
+    truth: ArmModel,
+    graded: Grade,
+    recording: Recording,
+) -> str:
+    """Return report.html, with the truth and the convergence of the online estimate."""
+    convergence = Convergence(
+        np.array([now.t for now in history]),
+        np.array([now.estimate.values for now in history]),
+        np.array([now.estimate.std for now in history]),
         online_truth,
         history[-1].estimate.parameters,
     )
-    save_figure(figure, out / 'convergence.png')
+    assessment = Assessment(grade=graded, reference='truth', sections=[convergence])
+    return identification_report(
+        result,
+        description=truth,
+        robot=truth.robot.name,
+        recordings=[recording],
+        validation={},
+        assessment=assessment,
+    )
 
 
 class ConvergenceTable:

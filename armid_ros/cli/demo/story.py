@@ -187,7 +187,7 @@ def show_story(told: ToldStory, out: Path) -> None:
             f'with the patched model'
         )
     say(f'What was hidden: {told.hidden.sentence(arm)}.')
-    say('It was found.' if told.found else 'It was not named first.')
+    say('It was found.' if told.found else 'The diagnosis did not rank it first.')
     say(f'{out}: {", ".join(_RUNS)}, diagnosis.json, model.yaml, report.html')
 
 
@@ -221,7 +221,7 @@ def draw_hidden(
 
 def _drawn(arm: ArmModel, motion: Motion, rng: np.random.Generator, asked: str) -> Hidden:
     head, at, joints = asked.partition('@')
-    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.familiar]))
+    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.traits.familiar]))
     effect = make_effect(f'{name}@{joints}' if at else name, arm.robot)
     if not at and len(effect.joints) > 1:
         effect = make_effect(f'{name}@{rng.choice(effect.joints)}', arm.robot)

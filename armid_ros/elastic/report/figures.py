@@ -13,7 +13,7 @@ from armid_ros.elastic.identification import (
 )
 from armid_ros.elastic.identification.names import unpack
 from armid_ros.elastic.identification.tuning import Tuning
-from armid_ros.report.figures.parameters import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.report.figures.style import (
     COLOURS,
     legend,

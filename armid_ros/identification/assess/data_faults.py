@@ -287,10 +287,10 @@ def _described_friction(arm: ArmModel) -> list[str]:
         joint
         for k, joint in enumerate(robot.joints)
         if any(
-            getattr(robot, f'urdf_{kind.urdf_attribute}')[k] > 0.0
+            getattr(robot, f'urdf_{kind.traits.urdf_attribute}')[k] > 0.0
             and (kind.name, joint) not in there
             for kind in CATALOGUE.values()
-            if kind.urdf_attribute
+            if kind.traits.urdf_attribute
         )
     ]
     if not stated:

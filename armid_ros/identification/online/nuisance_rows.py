@@ -69,7 +69,7 @@ class NuisanceRows:
         self._effects = [
             kind.on(arm.robot).with_shape(shape) if shape else kind.on(arm.robot)
             for kind in CATALOGUE.values()
-            for shape in kind.nuisance
+            for shape in kind.traits.nuisance
             if kind.name not in known
         ]
         self.parameters = tuple(
