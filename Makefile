@@ -33,7 +33,7 @@ MESSAGES := $(shell find msg_schemas -name __pycache__ -prune -o -type f -print)
 INTERFACES := $(shell find tests/interfaces -type f 2>/dev/null)
 
 .DEFAULT_GOAL := all
-.PHONY: all demo test test-fast test-long numeric docs fuzz chaos coverage lint bench endurance benchmark lock clean help check
+.PHONY: all demo test test-fast test-long numeric docs fuzz chaos golden coverage lint bench endurance benchmark lock clean help check
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
 
@@ -43,7 +43,8 @@ all: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## set up .venv: ROS 2, armid_msgs,
 demo: $(STAMPS)/armid_ros $(VENV)/setup.bash  ## identify the shipped arm on the moon, from excitation to figures in OUT
 	$(BIN)/armid demo --out $(OUT)
 
-# One that waits for ever says where, and is ended.
+# A test that waits for ever is ended, and shows where; a worker that cannot be ended ends all.
+LONGEST ?= 4200
 THREADS ?= 1
 RUN_TESTS = OMP_NUM_THREADS=$(THREADS) OPENBLAS_NUM_THREADS=$(THREADS) $(BIN)/pytest \
 	--durations=15 --numprocesses=auto --dist=loadfile --max-worker-restart=2 \
@@ -51,7 +52,7 @@ RUN_TESTS = OMP_NUM_THREADS=$(THREADS) OPENBLAS_NUM_THREADS=$(THREADS) $(BIN)/py
 
 test: lint  ## lint, types, layers, and every test that has to pass: what CI runs
 	@date +%s >$(STAMPS)/begun
-	ARMID_FUZZ=100 $(RUN_TESTS) -m 'not long' $(PYTEST)
+	ARMID_FUZZ=100 timeout --kill-after=30 $(LONGEST) env $(RUN_TESTS) -m 'not long' $(PYTEST)
 	@$(BIN)/python benchmarks/reference_loop.py $$(cat $(STAMPS)/begun)
 
 test-fast: lint  ## while you work: lint, types, layers, and the tests that a change usually breaks
@@ -86,6 +87,9 @@ docs: $(STAMPS)/armid_ros $(STAMPS)/test  ## the documentation site, in build/si
 fuzz: $(STAMPS)/armid_ros $(STAMPS)/test  ## read 10,000 damaged files of every kind, and keep what fails in tests/fuzz/failures
 	ARMID_FUZZ=$(or $(FUZZ),10000) OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/pytest \
 		--numprocesses=0 tests/fuzz $(PYTEST)
+
+golden: $(STAMPS)/armid_ros $(STAMPS)/test  ## write the answers of every command anew; git diff tests/golden shows what changed
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.golden $(CASES)
 
 coverage: override PYTEST += --cov=armid_ros --cov-report=term
 coverage: test  ## test, and which lines the tests run; takes half as long again

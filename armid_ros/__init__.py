@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     from armid_ros.api.arguments import read_recording
     from armid_ros.api.comparison import compare, ComparisonResult
     from armid_ros.api.diagnosis import diagnose, DiagnosisResult
+    from armid_ros.api.excitation import design_excitation, ExcitationResult
     from armid_ros.api.identification import IdentificationResult, identify
     from armid_ros.api.inspection import inspect, InspectionResult
-    from armid_ros.api.simulation import design_excitation, ExcitationResult, simulate
+    from armid_ros.api.simulation import simulate
     from armid_ros.arm import ArmModel, load_model, save_model
     from armid_ros.effects import Effect, make_effect, Quantity, register
     from armid_ros.errors import ArmidError
@@ -70,8 +71,8 @@ _HOMES = {
     'compare': 'armid_ros.api.comparison',
     'ComparisonResult': 'armid_ros.api.comparison',
     'simulate': 'armid_ros.api.simulation',
-    'design_excitation': 'armid_ros.api.simulation',
-    'ExcitationResult': 'armid_ros.api.simulation',
+    'design_excitation': 'armid_ros.api.excitation',
+    'ExcitationResult': 'armid_ros.api.excitation',
     'Estimate': 'armid_ros.estimate',
     'ArmidError': 'armid_ros.errors',
 }

@@ -5,8 +5,7 @@ What each rule of the diagnosis earns: the score as it is, and without the rule.
 
     python -m benchmarks.ablation [KIND] [--cases FIRST:LAST] [--only RULE ...] [--processes N]
 
-KIND is one of benchmarks.lived that is there to choose by. What was measured, and what became of
-each rule, is in docs/reference/rates.md.
+KIND is a development set of benchmarks.lived.
 
 """
 
@@ -92,7 +91,7 @@ def all_names(retrial: Any, taken: Sequence[Any], change: Any = None) -> Any:
     return tuple(one.step for one in taken), retrial.fitted(taken, change)
 
 
-#: By the names of the table in docs/reference/rates.md.
+#: By what each rule does.
 RULES = {
     'names that may be nothing go': Rule(('verdict.attribution.may_be_nothing',), no),
     'small names that close a gap stay': Rule(('verdict.attribution._opens',), no),

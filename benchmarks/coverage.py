@@ -57,11 +57,11 @@ class Tally:
         )
 
 
-def multisine(joints, duration, rng):
+def multisine(joints, duration, rng, amplitude=0.5):
     """Return a rich motion, exact to the second derivative."""
     t = np.arange(round(duration * RATE)) / RATE
     w = 2 * np.pi * np.array([0.1, 0.2, 0.5])[:, None]
-    size = np.array([0.5, 0.3, 0.1])[:, None]
+    size = amplitude * np.array([1.0, 0.6, 0.2])[:, None]
     angle = w[None] * t[:, None, None] + rng.uniform(0, 2 * np.pi, (3, len(joints)))
     return Motion(
         joints,

@@ -20,7 +20,8 @@ from dataclasses import replace
 import multiprocessing
 import os
 
-from armid_ros.api.simulation import design_excitation, simulate
+from armid_ros.api.excitation import design_excitation
+from armid_ros.api.simulation import simulate
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 import numpy as np

@@ -36,7 +36,7 @@ from armid_ros.motion import FloatArray
 import numpy as np
 
 from benchmarks.bic_selection import bic_selection
-from benchmarks.looks import look
+from benchmarks.looks import look, results_of
 from tests.hidden.cases import Case, make_case, VISIBLE
 from tests.hidden.catalogue import HIDDEN
 from tests.hidden.scoring import confusion, Finding, Judged, Metric, Outcome, score, Truth
@@ -319,7 +319,7 @@ def main() -> None:
         judged = run(specs, options.processes, judge_single if options.single else judge)
         print(f'\n{report(judged)}')
         if record is not None:
-            record.table = report(judged)
+            record['results'] = results_of(score(judged))
     if options.baseline:
         compare(judged, run(specs, options.processes, judge_baseline))
     if options.out:

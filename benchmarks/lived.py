@@ -35,7 +35,7 @@ import numpy as np
 from benchmarks.hidden_effects import table
 from benchmarks.lived_questions import score_of_question
 from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, score
-from benchmarks.looks import look
+from benchmarks.looks import look, results_of
 from benchmarks.plain_ranking import plain_ranking
 from benchmarks.two_days import Answer, ask, identification_of
 from tests.hidden.lived.adapter import recording_of, robot_of
@@ -178,12 +178,12 @@ def main() -> None:
         locked = options.kind.startswith('locked')
         record = stack.enter_context(look(what)) if locked else None
         judged = run(options.kind, cases, options.processes, not options.no_again, question)
-        rows = table((*score(judged), *score_of_question(options.kind, judged)))
-        print(f'\n{what}\n{rows}')
+        metrics = (*score(judged), *score_of_question(options.kind, judged))
+        print(f'\n{what}\n{table(metrics)}')
         if not locked:
             print(breakdown(judged))
         if record is not None:
-            record.table = rows
+            record['results'] = results_of(metrics)
     if options.out:
         answers = [asdict(one) for one in judged]
         options.out.write_text(json.dumps(answers, indent=1, default=_plain), encoding='utf-8')

@@ -29,7 +29,7 @@ from armid_ros.robots import load_robot
 import numpy as np
 
 from benchmarks import real_recordings
-from benchmarks.estimators import multisine
+from benchmarks.coverage import multisine
 from benchmarks.offline_speed import CUTOFF_HZ, DECIMATION, motion, panda
 from tests.hidden.lived.arms import load_arm
 

@@ -22,9 +22,8 @@ ROOT = Path(__file__).parents[1]
 BESIDE_THE_DIAGNOSIS = (
     'pair/ties',
     'identification/assess/data_faults.py',
-    'identification/assess/dead_encoders.py',
+    'identification/assess/dead_sensors.py',
     'identification/assess/joint_units.py',
-    'identification/assess/torque_units.py',
     'identification/assess/velocities.py',
     'identification/rows/stamps.py',
     'excitation/templates.py',

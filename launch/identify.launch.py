@@ -16,18 +16,10 @@ from armid_ros.nodes.running.launching import (
     full_name,
     node,
     parameters_named,
+    SIMULATED_DRIVES,
 )
 from launch.actions import Shutdown
 
-#: The simulated arm of `simulate:=true`, where the parameter file has no other.
-DRIVES = {
-    'rate': 500.0,
-    'torque_noise': [0.05],
-    'effects': [
-        'viscous_friction:viscous_coefficient=0.5',
-        'coulomb_friction:coulomb_torque=0.2',
-    ],
-}
 ARGUMENTS = (
     Argument('robot', str, 'shipped name, URDF or xacro; empty: that of params_file'),
     Argument('gravity', str, 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
@@ -100,5 +92,5 @@ def start(given):
     if 'effort_topic' in given:
         nodes.append(one('joint_state_merger', some('effort_topic', 'joints'), {}, own))
     if simulate:
-        nodes.append(one('simulated_arm', some('robot', 'gravity'), DRIVES, topics))
+        nodes.append(one('simulated_arm', some('robot', 'gravity'), SIMULATED_DRIVES, topics))
     return nodes

@@ -2,17 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A simulated arm that is excited, identified online and recorded."""
 
-from armid_ros.nodes.running.launching import Argument, described, node
+from armid_ros.nodes.running.launching import Argument, described, node, SIMULATED_DRIVES
 
-#: The simulated arm, where neither an argument nor the parameter file has another.
-DRIVES = {
-    'rate': 500.0,
-    'torque_noise': [0.05],
-    'effects': [
-        'viscous_friction:viscous_coefficient=0.5',
-        'coulomb_friction:coulomb_torque=0.2',
-    ],
-}
 ARGUMENTS = (
     Argument('robot', str, 'shipped name, URDF or xacro; empty: humanoid_arm'),
     Argument('gravity', str, 'earth, moon, or x,y,z in the frame of the base [m/s^2]'),
@@ -42,7 +33,7 @@ def start(given):
     topics = ['joint_states', 'robot_description', 'joint_trajectory']
     excitation = some('robot', 'gravity', 'duration', 'floor')
     return [
-        node(given, 'simulated_arm', some('robot', 'gravity', 'rate'), DRIVES),
+        node(given, 'simulated_arm', some('robot', 'gravity', 'rate'), SIMULATED_DRIVES),
         node(given, 'online_identifier', some('gravity'), {}),
         node(given, 'recorder', some('bag'), {'topics': topics}),
         node(given, 'excitation_publisher', excitation, {'simulation': True}),

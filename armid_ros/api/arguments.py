@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ RobotLike = Robot | ArmModel | str | Path
 RecordingLike = Recording | str | Path
 #: A generator, or the seed of one.
 Rng = np.random.Generator | int
+#: Is called with the share of the work that is done and, where it changes, what is being done.
+Progress = Callable[..., None]
 
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
@@ -107,6 +109,8 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
     def named(recording: Recording) -> Recording:
         source = recording.source or 'recording'
+        if Path(source).exists():  # the same one, if it is given twice
+            return recording
         taken[source] = count = taken.get(source, 0) + 1
         return replace(recording, source=source if count == 1 else f'{source} {count}')
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import Shown, Summary
-from armid_ros.files import json_text, staged, write_file
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.comparison import compare as run
 from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
@@ -61,20 +61,18 @@ class ComparisonResult(Shown):
         """Return what comparison.json holds."""
         return self.core.document()
 
-    def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the page; return where it is."""
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return report.html."""
         from armid_ros.report.compare_report import compare_report
 
-        write_file(Path(path), compare_report(self.core))
-        return Path(path)
+        return compare_report(self.core, origin.provenance)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write comparison.json and report.html as ``armid compare`` does."""
-        with staged(Path(folder)) as result:
-            write_file(result.folder / 'comparison.json', json_text(self.document(), indent=1))
-            self.report(result.folder / 'report.html')
-            result.keep()
-        return result.out
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write comparison.json and report.html into a folder."""
+        document = self.document()
+        write_file(folder / 'report.html', self.page(origin))
+        write_file(folder / 'comparison.json', json_text(document, indent=1))
+        return document
 
     def summary(self) -> Summary:
         """Return what changed, the surest first."""

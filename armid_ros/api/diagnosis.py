@@ -4,35 +4,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, TYPE_CHECKING, TypeGuard
+from typing import Any, Literal, TYPE_CHECKING, TypeGuard, TypeVar
 
 from armid_ros.api.arguments import (
     arm_of,
     generator,
     is_model,
+    Progress,
     RecordingLike,
     recordings_of,
     Rng,
     RobotLike,
     some_recordings_of,
-    source_of,
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
-from armid_ros.diagnosis import Diagnosis, diagnosis_document, DiagnosisSettings
-from armid_ros.files import staged, write_file
+from armid_ros.diagnosis import (
+    Diagnosis,
+    diagnosis_document,
+    DiagnosisSettings,
+    EXPERIMENT_FILE,
+    next_run,
+)
+from armid_ros.effects.tied import Partner
+from armid_ros.excitation import save_excitation
+from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
+from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
 from armid_ros.identification.identified_from import identified_from, require_as_identified
 from armid_ros.identification.parameters_file import read_misfit
+from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
+from armid_ros.report.diagnosis_report import (
+    DiagnosedRecordings,
+    diagnosis_report,
+    Extras,
+    tone_of,
+)
 from armid_ros.report.notation import value_of
 from armid_ros.residual import (
     learn_residual,
@@ -40,6 +55,7 @@ from armid_ros.residual import (
     require_libraries,
     Residual,
     TABLE_FILE,
+    WORTH_A_MAP,
 )
 from armid_ros.simulation.bodies import require_any_mass
 import numpy as np
@@ -47,6 +63,8 @@ import numpy as np
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
     import pandas
+
+_Made = TypeVar('_Made')
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -60,10 +78,14 @@ class DiagnosisResult(Shown):
         Everything that the diagnosis found.
     description : ArmModel
         The model before.
-    recordings, held_out : tuple of Recording
-        What was looked at, and what was only predicted.
-    residual : Residual or None
-        What is left without a name, learned, where that was asked for.
+    recordings, held_out, baseline : tuple of Recording
+        What was looked at, what was only predicted, and what is from before.
+    settings : DiagnosisSettings
+        What was asked.
+    misfit : Misfit or None
+        What the model left when it was identified, where there is no baseline.
+    extras : Extras
+        What was made of the diagnosis: a learned residual, simulations, a next run.
 
     Examples
     --------
@@ -81,7 +103,15 @@ class DiagnosisResult(Shown):
     description: ArmModel
     recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
-    residual: Residual | None = None
+    baseline: tuple[Recording, ...] = ()
+    settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
+    misfit: Misfit | None = None
+    extras: Extras = field(default_factory=Extras)
+
+    @property
+    def residual(self) -> Residual | None:
+        """Return what is left without a name, learned, where that was asked for."""
+        return self.extras.residual
 
     @property
     def verdict(self) -> str:
@@ -122,33 +152,75 @@ class DiagnosisResult(Shown):
 
     def document(self) -> dict[str, Any]:
         """Return what diagnosis.json holds."""
-        learned = None if self.residual is None else self.residual.document(TABLE_FILE)
-        return {**diagnosis_document(self.core), 'residual': learned}
+        extras = self.extras
+        return {
+            **diagnosis_document(self.core),
+            'residual': None if self.residual is None else self.residual.document(TABLE_FILE),
+            'forward': [pair.document() for pair in extras.forward],
+            'next_run': None if extras.next_run is None else extras.next_run.document(),
+        }
 
-    def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the page with the verdict and the evidence; return where it is."""
-        from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report, Extras
-
-        page = diagnosis_report(
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN, patch: str = '') -> str:
+        """Return report.html with the verdict and the evidence, and the text of model.yaml."""
+        return diagnosis_report(
             self.core,
-            DiagnosedRecordings(self.recordings, self.held_out),
-            robot=self._robot,
-            extras=Extras(residual=self.residual),
+            DiagnosedRecordings(self.recordings, self.held_out, self.baseline),
+            robot=origin.of(self.description.robot).robot,
+            settings=self.settings,
+            extras=self.extras,
+            patch=patch,
+            provenance=origin.provenance,
         )
-        write_file(Path(path), page)
-        return Path(path)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write diagnosis.json, model.yaml and report.html as ``armid diagnose`` does."""
-        with staged(Path(folder)) as result:
-            part = result.folder
-            write_file(part / 'diagnosis.json', json.dumps(self.document(), indent=1))
-            save_model(part / 'model.yaml', self.arm, self._robot, self.core.estimate)
-            if self.residual is not None:
-                write_file(part / TABLE_FILE, lookup_table(self.residual))
-            self.report(part / 'report.html')
-            result.keep()
-        return result.out
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write diagnosis.json, model.yaml and report.html into a folder, numbers first."""
+        model, document = folder / 'model.yaml', self.document()
+        source = origin.of(self.description.robot).source
+        save_model(model, self.arm, source, self.core.estimate, self.misfit)
+        write_file(folder / 'diagnosis.json', json_text(document, indent=1))
+        if self.residual is not None:
+            write_file(folder / TABLE_FILE, lookup_table(self.residual))
+        if self.extras.next_run is not None:
+            save_excitation(self.extras.next_run.excitation, folder / EXPERIMENT_FILE)
+        page = self.page(origin, model.read_text(encoding='utf-8'))
+        write_file(folder / 'report.html', page)
+        return document
+
+    def with_residual(self, seed: int) -> DiagnosisResult:
+        """Learn what has no name as a map of the state, or note why nothing is learned."""
+        if self.verdict not in WORTH_A_MAP:
+            said = self.verdict.replace('_', ' ')
+            return self._with_notes(f'nothing is learned where the verdict is {said}')
+        found, why = _tried('map', lambda: learn_residual(self.core, np.random.default_rng(seed)))
+        if found is None:
+            nothing = 'nothing was learned: the residual does not depend on the state of any joint'
+            return self._with_notes(*(why or (nothing,)))
+        return replace(self, extras=replace(self.extras, residual=found))
+
+    def with_simulations(self, progress: Progress) -> DiagnosisResult:
+        """Simulate the held-out recordings, with the model as it was and as it is patched."""
+        if not self.held_out or self.core.gap is None:
+            return self
+
+        def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
+            used = conditioning(list(self.recordings), self.settings.signals)
+            return simulate_held_out(
+                self.description, self.arm, used, self.held_out,
+                progress=lambda _, what: progress(1.0, what),
+            )  # fmt: skip
+
+        found, why = _tried('simulation', simulated)
+        forward, left_out = found or ((), ())
+        extras = replace(self.extras, forward=forward)
+        return replace(self, extras=extras)._with_notes(*left_out, *why)
+
+    def with_next_run(self, seed: int) -> DiagnosisResult:
+        """Plan a motion that separates names in doubt."""
+        run, why = _tried('next run', lambda: next_run(self.core, np.random.default_rng(seed)))
+        return replace(self, extras=replace(self.extras, next_run=run, no_run='; '.join(why)))
+
+    def _with_notes(self, *notes: str) -> DiagnosisResult:
+        return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
     def summary(self) -> Summary:
         """Return what was named, with values."""
@@ -171,8 +243,6 @@ class DiagnosisResult(Shown):
 
     def tone(self) -> str:
         """Return the colour of the verdict."""
-        from armid_ros.report.diagnosis_report import tone_of
-
         return tone_of(self.core)
 
     def sections(self) -> list[Section]:
@@ -183,10 +253,6 @@ class DiagnosisResult(Shown):
         if gap is None:
             return []
         return [GapBars(robot, gap, self.core.baseline, bool(self.core.findings))]
-
-    @property
-    def _robot(self) -> str:
-        return source_of(self.description.robot)
 
 
 def diagnose(
@@ -199,7 +265,13 @@ def diagnose(
     residual: Literal['gp'] | None = None,
     cutoff: float | None = None,
     decimation: int | None = None,
+    material: float = 0.01,
+    everything: bool = False,
+    misfit: Misfit | None = None,
+    partner: Partner | None = None,
+    tied: Any = None,
     rng: Rng = 0,
+    progress: Progress | None = None,
 ) -> DiagnosisResult:
     """
     Find what a model lacks.
@@ -226,8 +298,20 @@ def diagnose(
         Of the position filter [Hz]; from the noise by default.
     decimation : int, optional
         Keep one sample of this many.
+    material : float
+        Share of a joint's torque below which an effect does not matter.
+    everything : bool
+        Add effects to the model that do not matter, too.
+    misfit : Misfit, optional
+        What the model left when it was identified; by default as ``arm`` tells it.
+    partner : Partner, optional
+        A machine or person recorded with the arm, to which it may be tied.
+    tied : callable, optional
+        Diagnoses ties to the partner.
     rng : int or Generator
         Seed, or source of randomness.
+    progress : callable, optional
+        Called with the share that is done and what is being done.
 
     Returns
     -------
@@ -260,17 +344,36 @@ def diagnose(
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
+    misfit = _misfit(arm, model) if misfit is None else misfit
+    settings = DiagnosisSettings(
+        signals=SignalSettings(cutoff, decimation),
+        material=material,
+        everything=everything,
+        partner=partner,
+    )
     result = run(
         model,
         looked_at,
         validate=held_out,
         baseline=before,
-        misfit=_misfit(arm, model),
-        settings=DiagnosisSettings(signals=SignalSettings(cutoff, decimation)),
+        misfit=misfit,
+        settings=settings,
         rng=generator(rng),
+        progress=progress,
+        tied=tied if partner is not None else None,
     )
-    learned = None if residual is None else learn_residual(result, generator(rng))
-    return DiagnosisResult(result, model, tuple(looked_at), tuple(held_out), learned)
+    found = DiagnosisResult(
+        result,
+        model,
+        tuple(looked_at),
+        tuple(held_out),
+        tuple(before),
+        settings,
+        None if before else misfit,
+    )
+    if residual is None:
+        return found
+    return found.with_residual(rng if isinstance(rng, int) else 0)
 
 
 def _misfit(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
@@ -303,3 +406,11 @@ def _same(one: Recording, other: Recording) -> bool:
 
 def _is_written(arm: RobotLike) -> TypeGuard[str | Path]:
     return isinstance(arm, (str, Path)) and is_model(arm)
+
+
+def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
+    """Return what was made, or None and why there is none."""
+    try:
+        return make(), ()
+    except Exception as error:  # whatever it is, the diagnosis itself stands
+        return None, (f'there is no {what}: {error or type(error).__name__}',)

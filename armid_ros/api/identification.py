@@ -13,21 +13,22 @@ from typing import Any, TYPE_CHECKING
 from armid_ros.api.arguments import (
     arm_of,
     generator,
+    Progress,
     RecordingLike,
     recordings_of,
     Rng,
     RobotLike,
     some_recordings_of,
-    source_of,
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
-from armid_ros.arm.export import arm_mjcf, arm_urdf
+from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
+from armid_ros.arm.export_check import torque_check
 from armid_ros.diagnosis import known_misfit
 from armid_ros.estimate import Estimate
-from armid_ros.files import staged, write_file
+from armid_ros.files import write_file
 from armid_ros.identification import (
     Fit,
     Grade,
@@ -38,11 +39,19 @@ from armid_ros.identification import (
     PhysicalSettings,
     Score,
     SignalSettings,
+    Verification,
+    verify,
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.estimators.names import Estimator
+from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
+from armid_ros.identification.known_payload import (
+    corrected,
+    drive_gains,
+    DriveGains,
+    payloads_of,
+)
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
@@ -69,6 +78,10 @@ class IdentificationResult(Shown):
         What it only predicted.
     validation : dict of str to tuple of Fit
         Predictions of the held-out recordings, by their names.
+    verification : Verification or None
+        Test for encoder noise, and simulations along the held-out recordings.
+    gains : DriveGains or None
+        Gains of the drives, known from payloads.
 
     Examples
     --------
@@ -86,6 +99,8 @@ class IdentificationResult(Shown):
     recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...]
     validation: dict[str, tuple[Fit, ...]]
+    verification: Verification | None = None
+    gains: DriveGains | None = None
 
     @property
     def arm(self) -> ArmModel:
@@ -133,10 +148,11 @@ class IdentificationResult(Shown):
     @property
     def grade(self) -> str:
         """How far it can be believed, in a word."""
-        return self._graded.word
+        return self.graded.word
 
     @cached_property
-    def _graded(self) -> Grade:
+    def graded(self) -> Grade:
+        """Grade with its reasons."""
         return grade(self.core, self.description, self.recordings, self.validation, self.held_out)
 
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
@@ -149,9 +165,22 @@ class IdentificationResult(Shown):
 
         return DataFrame(self.document()['parameters'])
 
-    def document(self) -> dict[str, Any]:
-        """Return what identification.json holds."""
-        return identification_document(self.core, self._robot, self.validation, grade=self._graded)
+    @cached_property
+    def exports(self) -> dict[str, Exported]:
+        """Return the model for other programs by file name; empty unless links are bodies."""
+        if self.core.physical is None:
+            return {}
+        return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
+
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Return what identification.json holds, but for exports and digests of recordings."""
+        robot = origin.of(self.description.robot).robot
+        document = identification_document(
+            self.core, robot, self.validation, self.verification, self.graded
+        )
+        if self.gains:
+            document['drive_gains'] = self.gains.document()
+        return document
 
     def urdf(self, path: str | Path | None = None) -> str:
         """Return the description with the identified values; write it where a path is given."""
@@ -160,34 +189,38 @@ class IdentificationResult(Shown):
             write_file(Path(path), text)
         return text
 
-    def report(self, path: str | Path = 'report.html') -> Path:
-        """Write the page with all curves, numbers and doubts; return where it is."""
-        from armid_ros.report import identification_report
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return report.html with all curves, numbers and doubts."""
+        from armid_ros.report.identification_report import Assessment, identification_report
 
-        page = identification_report(
+        without_place = {name: one.without_place for name, one in self.exports.items()}
+        return identification_report(
             self.core,
             description=self.description,
-            robot=self._robot,
+            robot=origin.of(self.description.robot).robot,
             recordings=self.recordings,
             validation=self.validation,
             validation_recordings=self.held_out,
+            assessment=Assessment(self.verification, self.graded, exports=without_place),
+            provenance=origin.provenance,
         )
-        write_file(Path(path), page)
-        return Path(path)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write model.yaml, identification.json and report.html as ``armid identify`` does."""
-        with staged(Path(folder)) as result:
-            part = result.folder
-            save_model(part / 'model.yaml', self.arm, self._robot, self.estimate, self._misfit)
-            write_document(part / 'identification.json', with_contents(self.document()))
-            self.report(part / 'report.html')
-            if self.core.physical is not None:
-                self.urdf(part / 'identified.urdf')
-                text = arm_mjcf(self.arm).text
-                write_file(part / 'identified.mjcf.xml', text)
-            result.keep()
-        return result.out
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write model.yaml, identification.json, report.html and the exports into a folder."""
+        document = self.document(origin)
+        source = origin.of(self.description.robot).source
+        save_model(folder / 'model.yaml', self.arm, source, self.estimate, self._misfit)
+        for name, one in self.exports.items():
+            write_file(folder / name, one.text)
+        if self.exports:
+            document['exports'] = {
+                name: {**torque_check(one, self.arm), 'left_out': list(one.left_out)}
+                for name, one in self.exports.items()
+            }
+        write_file(folder / 'report.html', self.page(origin))
+        document = with_contents(document)
+        write_document(folder / 'identification.json', document)
+        return document
 
     def summary(self) -> Summary:
         """Return errors joint by joint, with the friction."""
@@ -241,10 +274,6 @@ class IdentificationResult(Shown):
             ),
         ]
 
-    @property
-    def _robot(self) -> str:
-        return source_of(self.description.robot)
-
     def _value(self, name: str, joint: str) -> str:
         for k, parameter in enumerate(self.estimate.parameters):
             if (parameter.name, parameter.joint) == (name, joint):
@@ -263,7 +292,10 @@ def identify(
     cutoff: float | None = None,
     decimation: int | None = None,
     physical: bool | PhysicalSettings = False,
+    verifies: bool = False,
+    payloads: Sequence[str] = (),
     rng: Rng = 0,
+    progress: Progress | None = None,
 ) -> IdentificationResult:
     """
     Fit the rigid body and the effects of an arm to recordings.
@@ -278,7 +310,7 @@ def identify(
         To be predicted and not to be fitted.
     effects : str
         Catalogue names with commas, for a robot without a model.
-    method : {'ols', 'wls', 'irls', 'iv', 'cloe', 'ekf'}
+    method : {'ols', 'wls', 'irls', 'iv'}
         Least squares with all joints alike, weighted by their noise, or robust as well;
         instrumental variables, closed-loop output error, extended Kalman filter.
     cutoff : float, optional
@@ -287,8 +319,15 @@ def identify(
         Keep one sample of this many.
     physical : bool or PhysicalSettings
         Fit links that can be bodies; ``urdf`` then describes one.
+    verifies : bool
+        Test for encoder noise and simulate along the held-out recordings.
+    payloads : sequence of str
+        What the arm is known to carry in a recording, as 'BAG=KG@LINK[:X,Y,Z]', which fixes the
+        gains of the drives.
     rng : int or Generator
         Seed, or source of randomness.
+    progress : callable, optional
+        Called with the share that is done and what is being done.
 
     Returns
     -------
@@ -317,8 +356,26 @@ def identify(
     )
     require_once(training, held_out)
     check_held_out(model.robot, held_out)
+    tick, source = progress or (lambda *_: None), generator(rng)
     known = PhysicalSettings() if physical is True else physical or None
     settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
-    result = run(model, training, settings, rng=generator(rng))
+    gains = None
+    if payloads:
+        every = [*training, *held_out]
+        loaded = payloads_of(payloads, [Path(one.source) for one in every], every, model.robot)
+        gains = drive_gains(model, training, loaded, settings.signals, source)
+        training, held_out = (
+            list(corrected(model, some, loaded, gains, settings.signals))
+            for some in (training, held_out)
+        )
+    tick(0.0, 'identifying')
+    result = run(model, training, settings, rng=source, progress=tick)
     validation = {recording.source: result.predict([recording]) for recording in held_out}
-    return IdentificationResult(result, model, tuple(training), tuple(held_out), validation)
+    found = IdentificationResult(
+        result, model, tuple(training), tuple(held_out), validation, gains=gains
+    )
+    if verifies:
+        tick(1.0, 'verifying')
+        verification = verify(result, model, training, held_out, rng=source, progress=tick)
+        found = replace(found, verification=verification)
+    return found

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
@@ -16,15 +17,25 @@ from armid_ros.api.arguments import (
     robot_of,
     RobotLike,
 )
-from armid_ros.api.table import Shown, Summary
-from armid_ros.files import json_text, staged, write_file
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.errors import RecordingError
+from armid_ros.files import json_text, write_file
 from armid_ros.inspection import inspect as look
 from armid_ros.inspection import Inspection, inspection_document
-from armid_ros.recording import Recording
+from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.contents import bag_contents, TopicContent
+from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.ros1 import is_ros1
-from armid_ros.recording.tables import ColumnSettings, is_table, measured, open_table, plan
+from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.tables import (
+    ColumnSettings,
+    is_table,
+    measured,
+    open_table,
+    plan,
+    TablePlan,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -71,21 +82,18 @@ class InspectionResult(Shown):
         """Return what ``armid inspect --json`` prints."""
         return inspection_document(self.core)
 
-    def report(self, path: str | Path = 'inspection.html') -> Path:
-        """Write the page with all curves; return where it is."""
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return inspection.html with all curves."""
         from armid_ros.report.inspection_report import inspection_report
 
-        write_file(Path(path), inspection_report(self.core))
-        return Path(path)
+        return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
 
-    def save(self, folder: str | Path) -> Path:
-        """Write inspection.json and inspection.html."""
-        with staged(Path(folder)) as result:
-            text = json_text(self.document(), indent=1)
-            write_file(result.folder / 'inspection.json', text)
-            self.report(result.folder / 'inspection.html')
-            result.keep()
-        return result.out
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write inspection.json and inspection.html into a folder."""
+        document = self.document()
+        write_file(folder / 'inspection.json', json_text(document, indent=1))
+        write_file(folder / 'inspection.html', self.page(origin))
+        return document
 
     def summary(self) -> Summary:
         """Return the joints, and the worst of what was remarked."""
@@ -108,7 +116,11 @@ def _without_detail(row: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def inspect(
-    recording: RecordingLike, robot: RobotLike | None = None, *, rng: Rng = 0
+    recording: RecordingLike,
+    robot: RobotLike | None = None,
+    *,
+    topics: tuple[TopicContent, ...] | None = None,
+    rng: Rng = 0,
 ) -> InspectionResult:
     """
     Look at a recording: rate, gaps, ranges, units that look wrong, whether identify takes it.
@@ -119,6 +131,8 @@ def inspect(
         A bag or a table.
     robot : model, robot, name or path, optional
         With it limits and units are checked, and an identification is tried.
+    topics : tuple of TopicContent, optional
+        All topics of the bag; read from it by default where no robot is given.
     rng : int or Generator
         Seed, or source of randomness.
 
@@ -140,17 +154,78 @@ def inspect(
 
     """
     described = None if robot is None else robot_of(robot)
-    topics: tuple[TopicContent, ...] = ()
     if described is not None:
         (read,) = recordings_of(recording, described)
     elif isinstance(recording, Recording):
         read = recording
     else:
-        path = Path(recording)
-        if is_table(path):
-            read = measured(plan(open_table(path), ColumnSettings()))
-        else:
-            topics = () if is_ros1(path) else bag_contents(path)
-            most = max(topics, key=lambda one: (len(one.joints) > 0, one.count))
-            read = read_anything(path, joints=most.joints, topic=most.name)
-    return InspectionResult(look(read, described, topics=topics, rng=generator(rng)))
+        topics = topics_of(Path(recording)) if topics is None else topics
+        read = read_all_joints(Path(recording), topics)
+    found = look(read, described, topics=topics or (), rng=generator(rng))
+    return InspectionResult(found)
+
+
+def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[TopicContent, ...]:
+    """Return the topics of a bag of ROS 2; of other recordings none."""
+    return () if is_table(path) or is_ros1(path) else bag_contents(path, settings)
+
+
+def read_all_joints(
+    path: Path,
+    topics: tuple[TopicContent, ...],
+    *,
+    joints: Sequence[str] | None = None,
+    topic: str | None = None,
+    columns: ColumnSettings | None = None,
+    show: Callable[[TablePlan], None] | None = None,
+    settings: ReadSettings = DEFAULT,
+) -> Recording:
+    """
+    Read a recording without a robot.
+
+    Parameters
+    ----------
+    path : Path
+        A bag or a table.
+    topics : tuple of TopicContent
+        Topics of the bag.
+    joints : sequence of str, optional
+        Which joints; by default all of the topic, or of the table.
+    topic : str, optional
+        JointState topic; by default the one with the most messages.
+    columns : ColumnSettings, optional
+        What is known of a table and of units.
+    show : callable, optional
+        Is given how a table is read.
+    settings : ReadSettings
+        How a bag is read.
+
+    Raises
+    ------
+    RecordingError
+        There is no such topic, or joints have to be named.
+
+    """
+    said = columns or ColumnSettings()
+    if is_table(path):
+        settled = plan(open_table(path, episode=said.episode), said, joints)
+        if show is not None:
+            show(settled)
+        return measured(settled)
+    if joints is None:
+        if is_ros1(path):
+            raise RecordingError(
+                f'{path}: of a bag of ROS 1 say which joints: --robot or --joints'
+            )
+        there = [one for one in topics if one.joints]
+        if topic is not None:
+            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
+        if not there:
+            known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
+            named = f'{topic} of ' if topic else 'topic of '
+            raise RecordingError(
+                f'{path}: no {named}{JOINT_STATE}; there are {known or "no topics"}'
+            )
+        chosen = max(there, key=lambda one: one.count)
+        topic, joints = chosen.name, chosen.joints
+    return read_anything(path, joints=list(joints), topic=topic, columns=said, settings=settings)

@@ -6,12 +6,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 import textwrap
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.api.arguments import source_of
+from armid_ros.files import staged, write_file
+from armid_ros.robots import Robot
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
+    from armid_ros.report.provenance import Provenance
 
 #: Lines of a result in a terminal.
 LINES = 10
@@ -57,12 +63,66 @@ class Summary:
         return '\n'.join([*title, *_aligned(self.heads, rows), *below])
 
 
+@dataclass(frozen=True)
+class ResultOrigin:
+    """
+    What files of a result say of where it comes from.
+
+    Attributes
+    ----------
+    robot : str
+        What documents call the robot; by default its shipped name or its path.
+    source : str
+        How model.yaml refers to its description; by default the same.
+    provenance : Provenance or None
+        Files, versions and settings that the report names.
+
+    """
+
+    robot: str = ''
+    source: str = ''
+    provenance: Provenance | None = None
+
+    def of(self, robot: Robot) -> ResultOrigin:
+        """Return the same with the defaults filled in."""
+        known = source_of(robot)
+        return replace(self, robot=self.robot or known, source=self.source or known)
+
+
+#: Shipped names and paths, without provenance.
+DEFAULT_ORIGIN = ResultOrigin()
+
+
 class Shown(ABC):
-    """A result that prints as its summary."""
+    """A result that prints as its summary and is written as the commands write it."""
 
     @abstractmethod
     def summary(self) -> Summary:
         """Return the result in short."""
+
+    @abstractmethod
+    def document(self) -> dict[str, Any]:
+        """Return the result for programs."""
+
+    @abstractmethod
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return the report, one HTML file."""
+
+    def report(self, path: str | Path = 'report.html') -> Path:
+        """Write the report; return where it is."""
+        write_file(Path(path), self.page())
+        return Path(path)
+
+    @abstractmethod
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write all files of the result into a folder that exists; return its document."""
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the files that the command of the same name writes, all or none."""
+        with staged(Path(folder)) as result:
+            self.fill(result.folder)
+            result.keep()
+        return result.out
 
     def __repr__(self) -> str:
         """Return at most ten lines."""

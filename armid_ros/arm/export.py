@@ -52,8 +52,8 @@ def arm_urdf(arm: ArmModel) -> Exported:
         If the parameters of a link are not those of a body.
 
     """
-    missing = _without_place(arm, lambda effect: effect.urdf_attribute)
-    found = _of_joints(arm, lambda effect: effect.urdf_attribute)
+    missing = _without_place(arm, lambda effect: effect.traits.urdf_attribute)
+    found = _of_joints(arm, lambda effect: effect.traits.urdf_attribute)
     text = export_urdf(
         arm.body,
         damping=found.get('damping'),
@@ -74,8 +74,8 @@ def arm_mjcf(arm: ArmModel) -> Exported:
         If the parameters of a link are not those of a body.
 
     """
-    missing = _without_place(arm, lambda effect: effect.mjcf_attribute)
-    found = _of_joints(arm, lambda effect: effect.mjcf_attribute)
+    missing = _without_place(arm, lambda effect: effect.traits.mjcf_attribute)
+    found = _of_joints(arm, lambda effect: effect.traits.mjcf_attribute)
     found['friction'] = found.pop('frictionloss', {})
     left_out = ['shapes', 'the base link']
     if np.any(np.isfinite(arm.robot.velocity_limit)):

@@ -22,7 +22,7 @@ from armid_ros.arm.arm_model import ArmModel
 from armid_ros.arm.misfit import Misfit
 from armid_ros.arm.model_check import checked_model, SCHEMA, wrong_unit
 from armid_ros.arm.words import in_words
-from armid_ros.effects import CATALOGUE, Effect, Kind
+from armid_ros.effects import CATALOGUE, Kind
 from armid_ros.effects.tied import tied_kind
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
@@ -49,9 +49,11 @@ def parameter_table(
     ]
 
 
-def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) -> dict[str, Any]:
+def model_text(
+    arm: ArmModel, robot: str, estimate: Estimate | None = None, misfit: Misfit | None = None
+) -> str:
     """
-    Return an arm model as the document that model.yaml holds.
+    Return what model.yaml holds.
 
     Parameters
     ----------
@@ -62,6 +64,8 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
     estimate : Estimate, optional
         Where the standard deviations come from; a parameter has one if it was estimated by itself
         and not in a group.
+    misfit : Misfit, optional
+        What the model leaves of recordings.
 
     """
     arm = in_words(arm)
@@ -78,24 +82,21 @@ def model_document(arm: ArmModel, robot: str, estimate: Estimate | None = None) 
         entry: dict[str, Any] = {'name': effect.name, 'joints': list(effect.joints)}
         entry['parameters'] = rows
         if effect.shapes:
-            entry['shapes'] = _shape_table(effect, arm.robot, known)
+            shapes = effect.shape_parameters(arm.robot)
+            std = [known.get((name.name, name.joint)) for name in shapes]
+            entry['shapes'] = parameter_table(shapes, np.array(effect.shape), std)
         effects.append(entry | effect.particulars())
         start += len(values)
-    return {
+    document: dict[str, Any] = {
         'schema': SCHEMA,
         'robot': robot,
         'gravity': [float(g) for g in arm.robot.gravity],
         'rigid_parameters': table[:size],
         'effects': effects,
     }
-
-
-def _shape_table(
-    effect: Effect, robot: Robot, known: dict[tuple[str, str], float]
-) -> list[dict[str, Any]]:
-    names = effect.shape_parameters(robot)
-    std = [known.get((name.name, name.joint)) for name in names]
-    return parameter_table(names, np.array(effect.shape), std)
+    if misfit is not None:
+        document['misfit'] = misfit.document()
+    return str(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99))
 
 
 def save_model(
@@ -135,11 +136,7 @@ def save_model(
     [0.3 0.3 0.3]
 
     """
-    document = model_document(arm, robot, estimate)
-    if misfit is not None:
-        document['misfit'] = misfit.document()
-    text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99)
-    write_file(path, text)
+    write_file(path, model_text(arm, robot, estimate, misfit))
 
 
 def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = None) -> ArmModel:
@@ -210,12 +207,6 @@ def read_model(text: str, robot: Robot, source: str) -> ArmModel:
     """
     with reading(source, ModelError):
         return _arm(checked_model(text), robot)
-
-
-def model_text(arm: ArmModel, robot: str, estimate: Estimate | None = None) -> str:
-    """Return what model.yaml holds; arguments as of `model_document`."""
-    document = model_document(arm, robot, estimate)
-    return str(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=99))
 
 
 def _gravity(given: Any) -> FloatArray:

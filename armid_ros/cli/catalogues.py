@@ -4,24 +4,30 @@
 
 from __future__ import annotations
 
-import textwrap
-
-from armid_ros.cli.terminal import print_rows, say
-from armid_ros.effects import CATALOGUE
-from armid_ros.robots import shipped_robots
+from armid_ros.cli import parameters
+from armid_ros.cli.terminal import print_rows, say, wrapped
+import click
 
 #: Stands for a blank at which no line ends.
 _JOINED = '\u00a0'
 
 
+@click.command(epilog='Example: armid robots')
+@parameters.as_json
 def robots(as_json: bool) -> None:
     """List the robots that are shipped."""
+    from armid_ros.robots import shipped_robots
+
     rows = [{'name': name, 'what it is': text} for name, text in shipped_robots().items()]
     print_rows(rows, as_json)
 
 
+@click.command(epilog='Example: armid effects --json')
+@parameters.as_json
 def effects(as_json: bool) -> None:
     """List the effects that can be simulated and estimated."""
+    from armid_ros.effects import CATALOGUE
+
     rows = [
         {
             'name': name,
@@ -35,27 +41,11 @@ def effects(as_json: bool) -> None:
         print_rows(rows, as_json)
         return
     for row in rows:
-        say(_wrapped(f'{row["name"]}: {row["what it is"]}', '', '    '))
-        say(_wrapped(', '.join(map(_unbroken, row['parameters'])), '    ', '    '))
-        if row['shapes']:
-            say(_wrapped(f'shape: {", ".join(map(_unbroken, row["shapes"]))}', '    ', '    '))
-
-
-def _unbroken(text: str) -> str:
-    """Keep a name and its unit on one line."""
-    return text.replace(' ', _JOINED)
-
-
-def _wrapped(text: str, first: str, others: str) -> str:
-    lines = textwrap.wrap(
-        text,
-        80,
-        initial_indent=first,
-        subsequent_indent=others,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return '\n'.join(lines).replace(_JOINED, ' ')
+        say(wrapped(f'{row["name"]}: {row["what it is"]}', others='    '))
+        for kind, head in (('parameters', ''), ('shapes', 'shape: ')):
+            names = ', '.join(name.replace(' ', _JOINED) for name in row[kind])
+            if names:
+                say(wrapped(head + names, '    ', '    ').replace(_JOINED, ' '))
 
 
 def _with_unit(name: str, unit: str) -> str:

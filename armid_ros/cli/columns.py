@@ -1,27 +1,122 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the options say of the columns of tables."""
+"""Options that say what a recording holds: which columns of a table are what, and the units."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
-from armid_ros.cli.signatures.columns import META
+from armid_ros.cli.choices import TIME_UNITS
 from armid_ros.errors import RecordingError
-from armid_ros.recording import Recording
-from armid_ros.recording.anything import read_anything
-from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.tables import ColumnSettings, numbers, TablePlan
-from armid_ros.recording.tables.settings import number
-from armid_ros.robots import Robot
 import click
 
+if TYPE_CHECKING:
+    from armid_ros.recording import ReadSettings, Recording
+    from armid_ros.recording.tables import ColumnSettings, TablePlan
+    from armid_ros.robots import Robot
+
+#: Where the context keeps which plans of tables have been shown.
 _SHOWN = 'armid.columns.shown'
+#: Where the context keeps what they say.
+META = 'armid.columns'
+
+
+def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Keep a value where `settings` finds it."""
+    ctx.meta.setdefault(META, {})[parameter.name] = value
+    return value
+
+
+def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
+    return click.option(*names, **{'callback': _kept, 'expose_value': False, **facts})
+
+
+def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Keep pairs of names, each of which has to be one."""
+    rules = []
+    for text in value:
+        old, colon, new = text.partition(':')
+        if not colon:
+            first, equals, second = text.partition('=')
+            right = f'{first}:{second}' if equals else f'{text}:NEW'
+            raise RecordingError(
+                f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
+                f"option for each pair: --rename '{right}' --rename fer_:panda_"
+            )
+        rules.append((old, new))
+    return _kept(ctx, parameter, tuple(rules))
+
+
+_OPTIONS = (
+    _option('--time', metavar='C', help='Column of time of a table; guessed by default.'),
+    _option(
+        '--position',
+        metavar='C',
+        help="Columns of positions: 'q{}' where {} is a joint's name or number, 'q[1..7]', or "
+        'names with commas; guessed by default.',
+    ),
+    _option('--velocity', metavar='C', help="The same of velocities; 'none' leaves them out."),
+    _option('--effort', metavar='C', help='The same of torques, forces or currents.'),
+    _option(
+        '--time-unit', type=click.Choice(TIME_UNITS), help='Of the column of time of a table.'
+    ),
+    _option('--rate', type=float, metavar='HZ', help='Rows per second of a table, without it.'),
+    _option(
+        '--degrees', is_flag=True, help='Positions and velocities are in degrees; of bags too.'
+    ),
+    _option(
+        '--position-scale',
+        metavar='X,...',
+        help='Makes positions and velocities rad (or m): one number, or one a joint; of bags too.',
+    ),
+    _option(
+        '--effort-scale',
+        '--current-gain',
+        metavar='X,...',
+        help='Makes efforts N m: torque constants [N m/A], gear ratios as 1798/7, signs; of bags '
+        'too.',
+    ),
+    _option(
+        '--zero',
+        metavar='X,...',
+        help="Added to the positions [rad or m], as '-pi/2'; of bags too.",
+    ),
+    _option(
+        '--gear',
+        metavar='X,...',
+        help='Values are those of the motors, which turn X times for a turn of the joint; of bags '
+        'too.',
+    ),
+    _option(
+        '--coupling',
+        multiple=True,
+        metavar='I,J=X',
+        help='With --gear: motor I turns X times for a turn of joint J, too.',
+    ),
+    _option(
+        '--rename',
+        multiple=True,
+        callback=_rules,
+        metavar='OLD:NEW',
+        help='Beginning of joint names in the file, and in the description; of bags too.',
+    ),
+    _option('--episode', type=int, metavar='N', help='Of a LeRobot dataset.'),
+)
+
+
+def options(command: Any) -> Any:
+    """Give a command the options; `settings` has what they say."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
 
 
 def settings() -> ColumnSettings:
     """Return what the options of the running command say."""
+    from armid_ros.recording.tables import ColumnSettings, numbers
+
     context = click.get_current_context(silent=True)
     said = context.meta.get(META, {}) if context is not None else {}
     if not said:
@@ -48,9 +143,11 @@ def read(
     paths: Sequence[Path],
     robot: Robot,
     topic: str | None,
-    reading: ReadSettings = DEFAULT,
+    reading: ReadSettings,
 ) -> list[Recording]:
     """Read bags and tables; guesses are shown on stderr, those of equal files once."""
+    from armid_ros.recording.anything import read_anything
+
     said = settings()
     context = click.get_current_context(silent=True)
     shown: set[str] = set() if context is None else context.meta.setdefault(_SHOWN, set())
@@ -62,7 +159,12 @@ def read(
             click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
         shown.add(body)
 
-    _no_pairs(paths, said.rename)
+    for path in paths if said.rename else ():
+        if ':' in path.name and not path.exists():  # a second pair without an option of its own
+            raise RecordingError(
+                f"there is no recording '{path}'; names to exchange need an option for each pair: "
+                f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
+            )
     return [
         read_anything(
             path,
@@ -77,17 +179,9 @@ def read(
     ]
 
 
-def _no_pairs(paths: Sequence[Path], rename: Sequence[tuple[str, str]]) -> None:
-    """Refuse a pair of names that was taken as a recording, as it has no option of its own."""
-    for path in paths if rename else ():
-        if ':' in path.name and not path.exists():
-            raise RecordingError(
-                f"there is no recording '{path}'; names to exchange need an option for each pair: "
-                f"--rename '{rename[-1][0]}:{rename[-1][1]}' --rename '{path}'"
-            )
-
-
 def _coupling(text: str) -> tuple[str, str, float]:
+    from armid_ros.recording.tables.settings import number
+
     pair, equals, ratio = text.partition('=')
     motor, comma, joint = pair.partition(',')
     if not equals or not comma:

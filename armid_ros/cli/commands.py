@@ -10,7 +10,7 @@ from functools import cache, partial
 from importlib import import_module
 import math
 import sys
-from typing import Any, NamedTuple
+from typing import Any
 
 from armid_ros.cli.node import lacking
 from armid_ros.errors import ArmidError, visible
@@ -19,59 +19,24 @@ from armid_ros.version import __version__
 import click
 from click.shell_completion import CompletionItem
 
-
-class Listed(NamedTuple):
-    """
-    Where a command is, and what the list of commands says of it.
-
-    Attributes
-    ----------
-    module : str
-        Below `armid_ros.cli.signatures`; imported when the command is called.
-    summary : str
-        First sentence of its help: listing the commands imports none of them.
-
-    """
-
-    module: str
-    summary: str
-
-
-#: The commands of the core in the order of the work; plug-ins add theirs.
+#: The commands of the core in the order of the work, and the modules below `armid_ros.cli` that
+#: declare them.
 COMMANDS = {
-    'demo': Listed(
-        'demo',
-        'Excite, move, identify online and offline; then find what was hidden in the arm.',
-    ),
-    'convert': Listed('convert', 'Make a bag of a table or of a bag of ROS 1.'),
-    'inspect': Listed('inspect', 'Look at a recording: a bag, or a table.'),
-    'excite': Listed(
-        'excite',
-        'Design a trajectory that shows the parameters, inside all limits and free of collisions.',
-    ),
-    'simulate': Listed('record', 'Let a simulated arm follow a trajectory and record it.'),
-    'call': Listed(
-        'call', 'Start, rehearse or stop the run of an excitation_publisher, or set its speed.'
-    ),
-    'identify': Listed('identify', 'Fit a model with uncertainties to recordings.'),
-    'diagnose': Listed('diagnose', 'Find which effect a model lacks, and add it.'),
-    'compare': Listed('compare', 'Say what changed between two identifications of one robot.'),
-    'recover': Listed(
-        'record',
-        'Make a recording whole whose writer was killed; the file itself is left as it is.',
-    ),
-    'view': Listed(
-        'view',
-        'Look at a recording in rerun: the moving arm, torques, and what a model does not '
-        'explain.',
-    ),
-    'layout': Listed(
-        'layout',
-        "Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name.",
-    ),
-    'robots': Listed('catalogues', 'List the robots that are shipped.'),
-    'effects': Listed('catalogues', 'List the effects that can be simulated and estimated.'),
-    'completion': Listed('completion', 'Print what makes a shell complete commands and options.'),
+    'demo': 'demo.command',
+    'convert': 'convert',
+    'inspect': 'inspect',
+    'excite': 'excite.command',
+    'simulate': 'record',
+    'call': 'call',
+    'identify': 'identify',
+    'diagnose': 'diagnose.command',
+    'compare': 'compare',
+    'recover': 'record',
+    'view': 'view',
+    'layout': 'layout',
+    'robots': 'catalogues',
+    'effects': 'catalogues',
+    'completion': 'completion',
 }
 
 
@@ -93,7 +58,7 @@ class Commands(click.Group):
         return None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with what they do; those of the core are not imported."""
+        """List the commands with the first sentence of their help, whole."""
         with formatter.section('Commands'):
             formatter.write_dl([(name, _summary(name)) for name in self.list_commands(ctx)])
 
@@ -140,7 +105,7 @@ def _imported(name: str) -> click.Command:
     """Import a command; no option of it takes a number that is not finite."""
     command: click.Command
     if name in COMMANDS:
-        module = import_module(f'armid_ros.cli.signatures.{COMMANDS[name].module}')
+        module = import_module(f'armid_ros.cli.{COMMANDS[name]}')
         command = getattr(module, name)
     else:
         command = load_plug_in(plug_ins('commands')[name])
@@ -150,8 +115,6 @@ def _imported(name: str) -> click.Command:
 
 def _summary(name: str) -> str:
     """Return the first sentence of the help of a command; of one that is broken, its error."""
-    if name in COMMANDS:
-        return COMMANDS[name].summary
     try:
         return _imported(name).get_short_help_str(1000)
     except (ArmidError, ModuleNotFoundError) as error:

@@ -6,33 +6,42 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.cli import options
-from armid_ros.cli.origin import provenance
+from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
-from armid_ros.files import json_text, write_file
-from armid_ros.identification.assess.comparison import compare as run
-from armid_ros.identification.assess.comparison import SCHEMA
-from armid_ros.identification.parameters_file import read_parameters
-from armid_ros.report.compare_report import compare_report, tell
 import click
 
 
+@click.command(epilog='Example: armid compare monday friday --out changes')
+@click.argument('before', metavar='A', type=click.Path(path_type=Path))
+@click.argument('after', metavar='B', type=click.Path(path_type=Path))
+@parameters.folder
+@click.option('--strict', is_flag=True, help='End with code 3 if one of them is unusable.')
+@parameters.as_json
 def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -> None:
-    """Say what changed between two identifications of one robot."""
+    """
+    Say what changed between two identifications of one robot.
+
+    A and B are folders that identify wrote, identification.json or model.yaml.
+
+    """
+    from armid_ros.api.comparison import compare as run
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.cli import options
+    from armid_ros.cli.origin import provenance
+    from armid_ros.files import json_text
+    from armid_ros.identification.assess.comparison import SCHEMA
+    from armid_ros.report.compare_report import tell
+
     staged = options.stage(out, SCHEMA)
-    first, second = read_parameters(before), read_parameters(after)
-    comparison = run(first, second)
-    files = [Path(first.source), Path(second.source)]
-    page = compare_report(comparison, provenance(files))
-    document = comparison.document()
-    write_file(staged.folder / 'report.html', page)
-    write_file(staged.folder / 'comparison.json', json_text(document, indent=1))
+    result = run(before, after)
+    sources = [Path(one.source) for one in (result.core.before, result.core.after)]
+    document = result.fill(staged.folder, ResultOrigin(provenance=provenance(sources)))
     staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:
-        for sentence in tell(comparison):
+        for sentence in tell(result.core):
             say(sentence)
         say(f'{out}: report.html, comparison.json')
-    if strict and comparison.unusable:
+    if strict and result.core.unusable:
         click.get_current_context().exit(3)

@@ -6,26 +6,32 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from armid_ros.cli import columns, options
+from armid_ros.cli import columns, parameters
 from armid_ros.cli.terminal import say
 from armid_ros.errors import RecordingError
-from armid_ros.files.cells import listed
-from armid_ros.recording import write_recording
-from armid_ros.recording.ros1 import convert_ros1, Copied, copy_renamed, is_ros1
-from armid_ros.recording.tables import (
-    is_table,
-    measured,
-    open_table,
-    plan,
-    refuse_columns,
-    refuse_units,
-    side_by_side,
-)
-from armid_ros.robots import Robot
 import click
 
+if TYPE_CHECKING:
+    from armid_ros.robots import Robot
 
+
+@click.command(
+    epilog="Example: armid convert run.csv --robot ur10.urdf --effort 'tau{}' --out run"
+)
+@click.argument('files', nargs=-1, required=True, type=click.Path(path_type=Path))
+@parameters.robot_described(
+    help='Shipped name or path of a URDF, whose joints the columns become; without it, joints '
+    'are called as the columns are.',
+)
+@click.option(
+    '--out', type=parameters.OutPath(path_type=Path), help='Bag to write; must not exist.'
+)
+@click.option('--dry-run', is_flag=True, help='Show what would be read from where; write nothing.')
+@columns.options
+@parameters.reading
+@parameters.joints
 def convert(
     files: tuple[Path, ...],
     robot_source: str | None,
@@ -33,7 +39,17 @@ def convert(
     dry_run: bool,
     joints: str | None,
 ) -> None:
-    """Make a bag of a table or of a bag of ROS 1."""
+    """
+    Make a bag of a table or of a bag of ROS 1.
+
+    Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
+    datasets. Columns that are not named are guessed, and shown. Several tables hold columns of the
+    same rows. Bags of ROS 1 and ROS 2 are copied, joints renamed.
+
+    """
+    from armid_ros.cli import options
+    from armid_ros.recording.tables import is_table
+
     if out is None and not dry_run:
         raise click.UsageError('--out says which bag to write; --dry-run writes none')
     robot = None
@@ -51,6 +67,10 @@ def convert(
 def _table(
     files: tuple[Path, ...], robot: Robot | None, joints: str | None, out: Path | None
 ) -> None:
+    from armid_ros.files.cells import listed
+    from armid_ros.recording import write_recording
+    from armid_ros.recording.tables import measured, open_table, plan, side_by_side
+
     said = columns.settings()
     table = side_by_side([open_table(path, episode=said.episode) for path in files])
     names = None if robot is None else robot.joints
@@ -74,6 +94,10 @@ def _table(
 
 
 def _bag(path: Path, out: Path | None) -> None:
+    from armid_ros.cli import options
+    from armid_ros.recording.ros1 import convert_ros1, copy_renamed, is_ros1
+    from armid_ros.recording.tables import refuse_columns, refuse_units
+
     said = columns.settings()
     refuse_columns(path, said)
     refuse_units(path, said)
@@ -89,11 +113,6 @@ def _bag(path: Path, out: Path | None) -> None:
         if is_ros1(path)
         else copy_renamed(path, out, rename, options.read_settings())
     )
-    _tell(copied)
-    say(f'{out}: {sum(count for _, _, count in copied.topics)} messages')
-
-
-def _tell(copied: Copied) -> None:
     for topic, kind, count in copied.topics:
         say(f'  {topic} ({kind}): {count} messages')
     for text in copied.left_out:
@@ -102,3 +121,4 @@ def _tell(copied: Copied) -> None:
         say(f'  {copied.damage}')
     if copied.renamed:
         say('  renamed: ' + ', '.join(f'{old} to {new}' for old, new in copied.renamed))
+    say(f'{out}: {sum(count for _, _, count in copied.topics)} messages')

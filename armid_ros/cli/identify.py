@@ -4,291 +4,163 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-import time
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
-from armid_ros.arm import ArmModel, save_model
-from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
-from armid_ros.arm.export_check import torque_check
-from armid_ros.cli import options
-from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
-from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import print_parameters, print_rows, progress, say, Tick
-from armid_ros.diagnosis import known_misfit
-from armid_ros.errors import IdentificationError
-from armid_ros.files import json_text, write_file
-from armid_ros.identification import (
-    Fit,
-    Grade,
-    grade,
-    Identification,
-    identification_document,
-    IdentificationSettings,
-    PhysicalCertificate,
-    PhysicalSettings,
-    Verification,
-    verify,
-    write_document,
-)
-from armid_ros.identification import (
-    identify as run,
-)
-from armid_ros.identification.estimators.names import Estimator, estimators_of
-from armid_ros.identification.estimators.side_by_side import (
-    compare_methods,
-    ComparisonSettings,
-    MethodScore,
-)
-from armid_ros.identification.identified_from import with_contents
-from armid_ros.identification.known_payload import (
-    corrected,
-    drive_gains,
-    DriveGains,
-    payloads_of,
-)
-from armid_ros.identification.output import SCHEMA
-from armid_ros.identification.rows.checks import check_held_out
-from armid_ros.recording import Recording, require_once
-from armid_ros.report import identification_report
-from armid_ros.report.identification_report import Assessment
-from armid_ros.report.judgement import residual_trends
-from armid_ros.robots import Robot
+from armid_ros.cli import columns, parameters
+from armid_ros.cli.choices import ESTIMATORS
+from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
 import click
-import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.api.identification import IdentificationResult
+    from armid_ros.arm import ArmModel
+    from armid_ros.identification import PhysicalCertificate
 
 
-@dataclass(frozen=True)
-class IdentificationData:
-    """
-    What is read.
-
-    Attributes
-    ----------
-    bags, validate : tuple of Path
-        Recordings to fit, and those that are only predicted.
-    topic : str or None
-        Of the joint states.
-
-    """
-
-    bags: tuple[Path, ...]
-    validate: tuple[Path, ...]
-    topic: str | None
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """
-    What is fitted, and how.
-
-    Attributes
-    ----------
-    effects : str
-        What acts beside the rigid body.
-    method : str
-        The estimator.
-    methods : str or None
-        Estimators to compare.
-    quasi_static : bool
-        Whether only weight and effects are fitted.
-    verifies, strict : bool
-        Whether the result is verified, and whether an unusable one is an error.
-    payloads : tuple of str
-        What is carried in which bag.
-
-    """
-
-    effects: str
-    method: Any
-    methods: str | None
-    quasi_static: bool
-    verifies: bool
-    strict: bool
-    payloads: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class BodyOptions:
-    """
-    What is known of the links as bodies.
-
-    Attributes
-    ----------
-    physical : bool
-        Whether links have to be bodies.
-    total_mass : float or None
-        Of all moving links [kg].
-    mass_range : float or None
-        Factor by which a link is off its described mass at most.
-    boxes : tuple of str
-        What contains a link.
-
-    """
-
-    physical: bool
-    total_mass: float | None
-    mass_range: float | None
-    boxes: tuple[str, ...]
-
-    def settings(self, robot: Robot) -> PhysicalSettings | None:
-        """Return what the fit takes."""
-        known = self.total_mass is not None or self.mass_range is not None or self.boxes
-        if not self.physical and known:
-            raise IdentificationError('--total-mass, --mass-range and --box go with --physical')
-        boxes = dict(options.box(text, robot) for text in self.boxes)
-        made = PhysicalSettings(
-            total_mass=self.total_mass, boxes=boxes, mass_range=self.mass_range
-        )
-        return made if self.physical else None
-
-
-@gathered(
-    robot=RobotChoice,
-    data=IdentificationData,
-    fit=FitOptions,
-    filters=FilterOptions,
-    bodies=BodyOptions,
+@click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
+@parameters.bags
+@parameters.robot
+@parameters.folder
+@parameters.validate
+@parameters.effects
+@click.option(
+    '--method',
+    type=click.Choice(ESTIMATORS),
+    default='wls',
+    show_default=True,
+    help='Least squares: all joints alike, weighted by their noise, or robust as well. Against '
+    'encoder noise: instrumental variables.',
 )
+@parameters.cutoff
+@parameters.decimation
+@click.option('--quasi-static', is_flag=True, help='Weight and effects only, for slow motions.')
+@click.option(
+    '--physical',
+    is_flag=True,
+    help='Fit links that can be bodies; writes identified.urdf and identified.mjcf.xml too.',
+)
+@click.option('--total-mass', type=float, help='Of all moving links [kg], with --physical.')
+@click.option(
+    '--mass-range',
+    type=float,
+    metavar='FACTOR',
+    help='By which a link is lighter or heavier than described at most, with --physical.',
+)
+@click.option(
+    '--box',
+    'boxes',
+    multiple=True,
+    metavar='JOINT=X,Y,Z:X,Y,Z',
+    help='Two corners [m], in the frame of the joint, of a box that contains its link, with '
+    '--physical; may be given several times.',
+)
+@click.option(
+    '--payload',
+    'payloads',
+    multiple=True,
+    metavar='BAG=KG@LINK[:X,Y,Z]',
+    help='What the arm is known to carry in a bag, with its centre in the frame of the link [m]; '
+    'fixes the gains of the drives where another bag is without it. May be given several times.',
+)
+@click.option(
+    '--verify/--no-verify',
+    'verifies',
+    default=True,
+    show_default=True,
+    help='Test for encoder noise and simulate along the held-out bags.',
+)
+@click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
+@click.option(
+    '--verbose', is_flag=True, help='Print every parameter, certificate, note and check too.'
+)
+@columns.options
+@parameters.topic
+@parameters.gravity
+@parameters.joints
+@parameters.seed
+@parameters.reading
+@parameters.as_json
 def identify(
-    robot: RobotChoice,
+    bags: tuple[Path, ...],
+    robot_source: str,
+    gravity: str,
+    joints: str | None,
+    topic: str | None,
     out: Path,
-    data: IdentificationData,
-    fit: FitOptions,
-    filters: FilterOptions,
-    bodies: BodyOptions,
+    validate: tuple[Path, ...],
+    effects: str,
+    quasi_static: bool,
+    physical: bool,
+    total_mass: float | None,
+    mass_range: float | None,
+    boxes: tuple[str, ...],
+    strict: bool,
+    verbose: bool,
     seed: int,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Fit a model with uncertainties to recordings."""
-    staged = options.stage(out, SCHEMA, robot.robot_source)
-    loaded = robot.load(data.bags, tell=False)
-    arm = options.with_effects(ArmModel(loaded, quasi_static=fit.quasi_static), fit.effects)
-    known = bodies.settings(loaded)
-    settings = IdentificationSettings(fit.method, filters.settings(), known)
-    compared = () if fit.methods is None else estimators_of(fit.methods)
+    from armid_ros.api.identification import identify as run
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.arm import ArmModel
+    from armid_ros.cli import options
+    from armid_ros.cli.origin import provenance
+    from armid_ros.errors import IdentificationError
+    from armid_ros.files import json_text
+    from armid_ros.identification import PhysicalSettings
+    from armid_ros.identification.output import SCHEMA
+
+    staged = options.stage(out, SCHEMA, robot_source)
+    robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
+    arm = options.with_effects(ArmModel(robot, quasi_static=quasi_static), effects)
+    if not physical and (total_mass is not None or mass_range is not None or boxes):
+        raise IdentificationError('--total-mass, --mass-range and --box go with --physical')
+    corners = dict(options.box(text, robot) for text in boxes)
+    known = PhysicalSettings(total_mass=total_mass, boxes=corners, mass_range=mass_range)
     with progress('reading') as tick:
-        work = _work(arm, data, settings, compared, fit, seed, tick)
-    result = work.result
-    document = identification_document(
-        result, robot.robot_source, work.validation, work.verification, work.graded
-    )
-    if work.gains:
-        document['drive_gains'] = work.gains.document()
-    if work.scores:
-        document['methods'] = [score.document() for score in work.scores]
-    source = options.kept_source(robot.robot_source, loaded, staged.folder)
-    misfit = known_misfit(result, work.recordings, work.held_out)
-    save_model(staged.folder / 'model.yaml', result.arm, source, result.estimate, misfit)
-    exports = _export(result.arm, staged.folder) if bodies.physical else {}
-    if exports:
-        document['exports'] = {
-            name: {**torque_check(one, result.arm, seed), 'left_out': list(one.left_out)}
-            for name, one in exports.items()
-        }
-    without_place = {name: one.without_place for name, one in exports.items()}
-    page = identification_report(
-        result,
-        description=arm,
-        robot=robot.robot_source,
-        recordings=work.recordings,
-        validation=work.validation,
-        validation_recordings=work.held_out,
-        assessment=Assessment(work.verification, work.graded, work.scores, without_place),
-        provenance=provenance([*data.bags, *data.validate], document['settings'], seed),
-    )
-    write_file(staged.folder / 'report.html', page)
-    document = with_contents(document)
-    write_document(staged.folder / 'identification.json', document)
+        result = run(
+            arm,
+            options.read(bags, robot, topic),
+            validate=options.read(validate, robot, topic),
+            physical=known if physical else False,
+            rng=seed,
+            progress=tick,
+            **asked,
+        )
+        tick(1.0, 'writing')
+        origin = ResultOrigin(
+            robot_source,
+            options.kept_source(robot_source, robot, staged.folder),
+            provenance([*bags, *validate], result.document()['settings'], seed),
+        )
+        document = result.fill(staged.folder, origin)
     staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:
-        _print(out, document, work, exports)
-    if fit.strict and work.graded.word == 'unusable':
+        _print(document, result, arm, verbose)
+        files = ['report.html', 'model.yaml', 'identification.json', *result.exports]
+        say(f'{out}: {", ".join(files)}')
+    if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)
 
 
-@dataclass(frozen=True)
-class _Work:
-    """What was made of the recordings."""
+def _print(
+    document: dict[str, Any], found: IdentificationResult, description: ArmModel, verbose: bool
+) -> None:
+    """Print grade, a row for each joint and the next step; with verbose, everything."""
+    from armid_ros.report.identification_summary import headline, joint_table, summary
 
-    recordings: Sequence[Recording]
-    held_out: Sequence[Recording]
-    result: Identification
-    validation: dict[str, tuple[Fit, ...]]
-    graded: Grade
-    verification: Verification | None
-    scores: Sequence[MethodScore]
-    gains: DriveGains | None
-
-
-def _work(
-    arm: ArmModel,
-    data: IdentificationData,
-    settings: IdentificationSettings,
-    compared: Sequence[Estimator],
-    options_of_fit: FitOptions,
-    seed: int,
-    tick: Tick,
-) -> _Work:
-    """Read, identify, predict what is held out, grade, verify, and compare methods."""
-    rng = np.random.default_rng(seed)
-    recordings = options.read(data.bags, arm.robot, data.topic)
-    held_out = options.read(data.validate, arm.robot, data.topic)
-    require_once(recordings, held_out)
-    check_held_out(arm.robot, held_out)
-    gains = None
-    if options_of_fit.payloads:
-        bags, signals = [*data.bags, *data.validate], settings.signals
-        read = [*recordings, *held_out]
-        loaded = payloads_of(options_of_fit.payloads, bags, read, arm.robot)
-        gains = drive_gains(arm, recordings, loaded, signals, rng)
-        recordings = corrected(arm, recordings, loaded, gains, signals)
-        held_out = corrected(arm, held_out, loaded, gains, signals)
-    tick(0.0, 'identifying')
-    result = run(arm, recordings, settings, rng=rng, progress=tick)
-    validation = {r.source: result.predict([r]) for r in held_out}
-    tick(1.0, 'grading')
-    graded = grade(result, arm, recordings, validation, held_out)
-    verification = None
-    if options_of_fit.verifies:
-        verification = verify(result, arm, recordings, held_out, rng=rng, progress=tick)
-    comparison = ComparisonSettings(compared, settings.signals, seed)
-    scores = compare_methods(
-        arm, recordings, held_out, comparison, clock=time.process_time, progress=tick
-    )
-    return _Work(recordings, held_out, result, validation, graded, verification, scores, gains)
-
-
-def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, Exported]) -> None:
-    """Print what a person would stop at, then the table, then the rest."""
-    result = work.result
-    say(f'{work.graded.word}:')
-    for reason in work.graded.reasons:
-        say(f'  {reason}')
-    for lacking in () if work.verification is None else work.verification.left_out:
-        say(f'  {lacking}')
-    shown = [fit for fits in work.validation.values() for fit in fits] or result.training
-    trends = residual_trends(result.arm.robot.joints, shown)
-    if trends:
-        say(f'  {" ".join(trends.values())} The model lacks something there.')
-    for line in work.gains.sentences() if work.gains else ():
+    for line in headline(found.graded, found.core, found.validation):
         say(line)
-    print_parameters(document['parameters'])
-    if result.physical is not None:
-        _print_certificate(result.physical)
-    for recording in (*work.recordings, *work.held_out):
-        say(f'{recording.source}: {recording.report.describe()}')
-    _tell(result, work.verification, result.arm.robot.notes, exports)
-    if 'methods' in document:
-        _print_methods(document['methods'])
-    fitted = document['training']['relative_error_percent']
-    say(f'relative error {fitted:.2f} % on the data it was fitted to')
-    for entry in document['validation']:
-        say(f'relative error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
+    for line in found.gains.sentences() if found.gains else ():
+        say(line)
+    for line in joint_table(found.core, description, found.validation):
+        say(line)
+    if verbose:
+        _print_all(document, found)
     for name, check in document.get('exports', {}).items():
         left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
         torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
@@ -297,16 +169,34 @@ def _print(out: Path, document: dict[str, Any], work: _Work, exports: dict[str, 
             f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
         )
         say(f'{name}: {torque}{left_out}')
-    files = ['model.yaml', 'identification.json', 'report.html', *exports]
-    say(f'{out}: {", ".join(files)}')
+    recordings = [*found.recordings, *found.held_out]
+    for line in summary(found.core, found.validation, recordings, found.verification):
+        say(line)
 
 
-def _export(arm: ArmModel, out: Path) -> dict[str, Exported]:
-    """Write the arm for other programs; return the files by name."""
-    made = {'identified.urdf': arm_urdf(arm), 'identified.mjcf.xml': arm_mjcf(arm)}
-    for name, exported in made.items():
-        write_file(out / name, exported.text)
-    return made
+def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
+    """Print every parameter, the certificate, notes, and checks."""
+    result, verification = found.core, found.verification
+    print_parameters(document['parameters'])
+    if result.physical is not None:
+        _print_certificate(result.physical)
+    for note in (*result.arm.robot.notes, *result.notes):
+        say(f'note: {note}')
+    unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
+    if unseen:
+        named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
+        say(f'not identified: {named}')
+    for name, one in found.exports.items():
+        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
+        if kinds:
+            say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
+    if verification is not None:
+        for sentence in (*verification.sentences(), *verification.left_out):
+            say(f'check: {sentence}')
+    fitted = document['training']['relative_error_percent']
+    say(f'torque error {fitted:.2f} % on the data it was fitted to')
+    for entry in document['validation']:
+        say(f'torque error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
 
 
 def _print_certificate(certificate: PhysicalCertificate) -> None:
@@ -320,46 +210,3 @@ def _print_certificate(certificate: PhysicalCertificate) -> None:
         for link in certificate.links
     ]
     print_rows(rows, as_json=False, right=('mass [kg]',))
-
-
-def _print_methods(scores: Sequence[dict[str, Any]]) -> None:
-    heads = {
-        'fitted [%]': 'training_error_percent',
-        'held out [%]': 'held_out_error_percent',
-        'position [mrad]': 'closed_loop_position_error_milli',
-        'bias [%]': 'bias_percent',
-        'scatter [%]': 'scatter_percent',
-        'time [s]': 'seconds',
-    }
-    rows = [
-        {
-            'method': score['method'],
-            **{h: '-' if score[k] is None else f'{score[k]:.3g}' for h, k in heads.items()},
-        }
-        for score in scores
-    ]
-    print_rows(rows, as_json=False, right=tuple(heads))
-    for score in scores:
-        if score['note']:
-            say(f'{score["method"]}: {score["note"]}')
-
-
-def _tell(
-    result: Identification,
-    verification: Verification | None,
-    robot_notes: tuple[str, ...],
-    exports: dict[str, Exported],
-) -> None:
-    for note in (*robot_notes, *result.notes):
-        say(f'note: {note}')
-    unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
-    if unseen:
-        named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
-        say(f'not identified: {named}')
-    for name, one in exports.items():
-        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
-        if kinds:
-            say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
-    if verification is not None:
-        for sentence in verification.sentences():
-            say(f'check: {sentence}')

@@ -5,32 +5,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-import textwrap
+from typing import TYPE_CHECKING
 
-from armid_ros.cli import columns, options
-from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import print_rows, progress, say
-from armid_ros.errors import RecordingError
-from armid_ros.files import json_text, write_file
-from armid_ros.files.cells import listed
-from armid_ros.inspection import inspect as look
-from armid_ros.inspection import Inspection, inspection_document
-from armid_ros.inspection.output import SCHEMA
-from armid_ros.recording import Recording
-from armid_ros.recording.anything import read_anything
-from armid_ros.recording.contents import bag_contents, TopicContent
-from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.ros1 import is_ros1
-from armid_ros.recording.tables import is_table, measured, open_table, plan
-from armid_ros.report.inspection_report import inspection_report
-from armid_ros.report.notation import counted, plain
-from armid_ros.report.sections.inspection import joint_heads, joint_rows, repetition
+from armid_ros.cli import columns, parameters
+from armid_ros.cli.terminal import print_rows, progress, say, wrapped
 import click
-import numpy as np
+
+if TYPE_CHECKING:
+    from armid_ros.inspection import Inspection
 
 _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 
 
+@click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
+@click.argument('bag', type=click.Path(path_type=Path))
+@parameters.robot_described(
+    help='Shipped name, path of a URDF, or - for the one in the bag; limits and units are '
+    'checked with it, and an identification is tried.',
+)
+@click.option(
+    '--out',
+    type=parameters.OutPath(file_okay=False, path_type=Path),
+    help='Folder to put the page with all curves into.',
+)
+@parameters.force
+@columns.options
+@parameters.topic
+@parameters.gravity
+@parameters.joints
+@parameters.seed
+@parameters.reading
+@parameters.as_json
 def inspect(
     bag: Path,
     robot_source: str | None,
@@ -41,68 +46,60 @@ def inspect(
     seed: int,
     as_json: bool,
 ) -> None:
-    """Look at a recording: a bag, or a table."""
+    """
+    Look at a recording: a bag, or a table.
+
+    Topics, joints, rate, gaps, ranges, units that look wrong, whether the motion repeats, and with
+    a robot whether identify takes it. Without --out it is printed only.
+
+    """
+    from armid_ros.api.inspection import inspect as run
+    from armid_ros.api.inspection import read_all_joints, topics_of
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.cli import options
+    from armid_ros.cli.origin import provenance
+    from armid_ros.files import json_text, write_file
+    from armid_ros.files.cells import listed
+    from armid_ros.inspection.output import SCHEMA
+
     staged = None if out is None else options.stage(out, SCHEMA, robot_source or '')
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, gravity, joints, [bag])
-    topics = () if is_table(bag) or is_ros1(bag) else bag_contents(bag, options.read_settings())
+    topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:
-            recording = _without_robot(bag, topics, topic, joints)
+            recording = read_all_joints(
+                bag,
+                topics,
+                joints=listed(joints) if joints else None,
+                topic=topic,
+                columns=columns.settings(),
+                show=lambda plan: click.echo('\n'.join(plan.lines()), err=True),
+                settings=options.read_settings(),
+            )
         else:
-            (recording,) = columns.read([bag], robot, topic, options.read_settings())
+            (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
-        found = look(recording, robot, topics=topics, rng=np.random.default_rng(seed))
+        found = run(recording, robot, topics=topics, rng=seed)
     if staged is not None:
-        page = inspection_report(
-            found, robot=robot_source or '', provenance=provenance([bag], seed=seed)
-        )
+        origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
+        page = found.page(origin)
         write_file(staged.folder / 'inspection.html', page)
         staged.keep()
     if as_json:
-        click.echo(json_text(inspection_document(found)))
+        click.echo(json_text(found.document()))
         return
-    _print(found)
+    _print(found.core)
     if out is not None:
         say(f'{out}: inspection.html')
 
 
-def _without_robot(
-    bag: Path, topics: tuple[TopicContent, ...], topic: str | None, joints: str | None
-) -> Recording:
-    """Read the joints that are named, or all that the topic or the table has."""
-    said = columns.settings()
-    wanted = list(listed(joints)) if joints else None
-    if is_table(bag):
-        settled = plan(open_table(bag, episode=said.episode), said, wanted)
-        for line in settled.lines():
-            click.echo(line, err=True)
-        return measured(settled)
-    if is_ros1(bag) and wanted is None:
-        raise RecordingError(f'{bag}: of a bag of ROS 1 say which joints: --robot or --joints')
-    if wanted is None:
-        chosen = _topic(bag, topics, topic)
-        topic, wanted = chosen.name, list(chosen.joints)
-    return read_anything(
-        bag, joints=wanted, topic=topic, columns=said, settings=options.read_settings()
-    )
-
-
-def _topic(bag: Path, topics: tuple[TopicContent, ...], wanted: str | None) -> TopicContent:
-    """Return the topic to look at: the one wanted, or the one with most messages."""
-    of_joints = [topic for topic in topics if topic.joints]
-    if wanted is not None:
-        of_joints = [t for t in of_joints if t.name.lstrip('/') == wanted.lstrip('/')]
-    if not of_joints:
-        listed = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
-        named = f'{wanted} of ' if wanted else 'topic of '
-        raise RecordingError(f'{bag}: no {named}{JOINT_STATE}; there are {listed or "no topics"}')
-    return max(of_joints, key=lambda topic: topic.count)
-
-
 def _print(found: Inspection) -> None:
     """Print within 80 columns."""
+    from armid_ros.report.notation import counted, plain
+    from armid_ros.report.sections.inspection import joint_heads, joint_rows, repetition
+
     recording, sampling = found.recording, found.sampling
     say(f'{recording.source}')
     for topic in found.topics:
@@ -123,11 +120,5 @@ def _print(found: Inspection) -> None:
         del row['step']
     print_rows(rows, as_json=False, right=heads[1:], spare=('moving', heads[3]))
     for remark in found.remarks:
-        say(_wrapped(f'{_SIGNS[remark.weight]} {remark.text}'))
-    say(_wrapped(found.verdict, ''))
-
-
-def _wrapped(text: str, indent: str = '  ') -> str:
-    return textwrap.fill(
-        text, 80, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-    )
+        say(wrapped(f'{_SIGNS[remark.weight]} {remark.text}', others='  '))
+    say(wrapped(found.verdict))

@@ -6,15 +6,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.cli import options
+from armid_ros.cli import parameters
 from armid_ros.cli.terminal import say
-from armid_ros.files import write_file
-from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout, SCHEMA
-from armid_ros.report.rviz import rviz_config
+import click
 
 
+@click.command(epilog='Example: armid layout --robot ur10.urdf --namespace left --out layouts')
+@parameters.robot
+@parameters.folder
+@click.option('--namespace', default='', help='Of the nodes, such as left_arm.')
+@parameters.joints
 def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
     """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
+    from armid_ros.cli import options
+    from armid_ros.files import write_file
+    from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout, SCHEMA
+    from armid_ros.report.rviz import rviz_config
+
     staged = options.stage(out, SCHEMA)
     robot = options.open_robot(robot_source, 'earth', joints)
     files = {

@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
-from armid_ros.cli.signatures.options import CRC, FORCE, MEMORY
+from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, Staged, staged, write_file
@@ -33,7 +32,6 @@ import click
 from click.core import ParameterSource
 import numpy as np
 
-_Command = TypeVar('_Command', bound=Callable[..., Any])
 Corners = tuple[Sequence[float], Sequence[float]]
 
 

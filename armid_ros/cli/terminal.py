@@ -6,21 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+import textwrap
 import threading
 import time
-from typing import Any, Self
+from typing import Any
 
 from armid_ros.errors import visible
-from armid_ros.estimate import Estimate
-from armid_ros.files import json_text
-from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.motion import FloatArray
 import click
-from rich.console import Console
-from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
-from rich.text import Text
 
 Tick = Callable[..., None]
 
@@ -31,6 +23,18 @@ def say(text: str, colour: str | None = None) -> None:
     click.echo(shown if colour is None else click.style(shown, fg=colour))
 
 
+def wrapped(text: str, first: str = '', others: str = '') -> str:
+    """Return a text in lines of 80 columns, indented, that break at blanks alone."""
+    return textwrap.fill(
+        text,
+        80,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
 @contextmanager
 def progress(what: str) -> Iterator[Tick]:
     """
@@ -39,6 +43,9 @@ def progress(what: str) -> Iterator[Tick]:
     Without a terminal there is a line on stderr every ten seconds.
 
     """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     console = Console(stderr=True)
     if not console.is_terminal:
         lines = ProgressLines(what, lambda line: click.echo(line, err=True), time.monotonic)
@@ -134,6 +141,11 @@ def print_rows(
         Columns that are left out, the first one first, where there is no room for all.
 
     """
+    from armid_ros.files import json_text
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
     if as_json:
         click.echo(json_text(list(rows), indent=1))
         return
@@ -164,12 +176,16 @@ def _width(rows: Sequence[dict[str, Any]], heads: Sequence[str]) -> int:
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
-    """Print a table of parameters; a value that the data do not tell from zero is no number."""
+    """Print a table of parameters; a value whose interval includes zero is no number."""
+    from armid_ros.identification.fitting.identifiability import excludes_zero
+
     shown = [
         {
             'parameter': row['name'],
             'joint': row['joint'],
-            'value': f'{row["value"]:.5g}' if _told(row) else 'includes 0',
+            'value': f'{row["value"]:.5g}'
+            if row['std'] is None or excludes_zero(row['value'], row['std'])
+            else 'includes 0',
             'std': '' if row['std'] is None else f'{row["std"]:.2g}',
             'unit': row['unit'],
         }
@@ -178,52 +194,5 @@ def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
     print_rows(shown, as_json=False, right=('value', 'std'))
 
 
-def _told(row: dict[str, Any]) -> bool:
-    return row['std'] is None or bool(excludes_zero(row['value'], row['std']))
-
-
 def _cell(value: Any) -> str:
     return visible(', '.join(map(str, value)) if isinstance(value, list) else str(value))
-
-
-class ConvergenceTable:
-    """
-    A live table of the last parameters, which are those of the effects.
-
-    Parameters
-    ----------
-    truth : ndarray, shape (P,)
-        What the estimate should come to.
-
-    """
-
-    ROWS = 12
-
-    def __init__(self, truth: FloatArray) -> None:
-        self._truth = truth
-        self._live = Live(console=Console(stderr=True), transient=True)
-
-    def __enter__(self) -> Self:
-        """Begin to show."""
-        self._live.start()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Leave the terminal as it was."""
-        self._live.stop()
-
-    def show(self, t: float, duration: float, estimate: Estimate, factor: float) -> None:
-        """Show the state at a time [s]."""
-        title = f'{t:.0f} of {duration:.0f} s, {factor:.1f} x real time'
-        table = Table(title=title, box=None, header_style='bold')
-        for head in ('parameter', 'joint', 'estimate', 'std', 'truth', 'unit'):
-            table.add_column(
-                head, justify='right' if head in ('estimate', 'std', 'truth') else 'left'
-            )
-        for k in range(len(self._truth))[-self.ROWS :]:
-            name = estimate.parameters[k]
-            numbers = (estimate.values[k], estimate.std[k], self._truth[k])
-            texts = [f'{number:.4f}' for number in numbers]
-            cells = (name.name, name.joint, *texts, name.unit)
-            table.add_row(*(Text(visible(cell)) for cell in cells))
-        self._live.update(table)

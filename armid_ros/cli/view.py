@@ -4,73 +4,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from armid_ros.arm import ArmModel
-from armid_ros.cli import columns, options
-from armid_ros.cli.groups import gathered, RobotChoice
+from armid_ros.cli import columns, parameters
 from armid_ros.cli.terminal import say
-from armid_ros.errors import ArmidError, OutputError
-from armid_ros.files.cells import listed
-from armid_ros.robots import Robot
-from armid_ros.view import log_scene, make_scene, open_stream, rerun
-from armid_ros.view.scene import Scene
+from armid_ros.errors import ArmidError
+import click
+
+if TYPE_CHECKING:
+    from armid_ros.view.scene import Scene
 
 
-@dataclass(frozen=True)
-class OptionalRobot:
-    """
-    The robot that is meant; without a source, that of the model or of the bag.
-
-    Attributes
-    ----------
-    robot_source, gravity, joints
-        As of a ``RobotChoice``.
-
-    """
-
-    robot_source: str | None
-    gravity: str
-    joints: str | None
-
-    def load(self, bags: Sequence[Path]) -> Robot:
-        """Load it; say what is not driven."""
-        source = '-' if self.robot_source is None else self.robot_source
-        return RobotChoice(source, self.gravity, self.joints).load(bags)
-
-
-@gathered(robot=OptionalRobot)
+@click.command(epilog='Example: armid view run.mcap --model found --out run.rrd')
+@click.argument('bag', required=False, type=click.Path(path_type=Path))
+@click.option(
+    '--model',
+    type=click.Path(path_type=Path),
+    help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
+    'and joints that the diagnosis names are coloured.',
+)
+@parameters.robot_described(help='As elsewhere; of the model by default.')
+@click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
+@click.option('--mark', metavar='A,B,...', help='Joints to be coloured.')
+@click.option('--live', is_flag=True, help='Show joint_states as they come; no BAG.')
+@click.option('--namespace', default='', help='With --live: of the nodes, such as left_arm.')
+@columns.options
+@parameters.topic
+@parameters.gravity
+@parameters.joints
+@parameters.reading
 def view(
     bag: Path | None,
     model: Path | None,
-    robot: OptionalRobot,
+    robot_source: str | None,
+    gravity: str,
+    joints: str | None,
     out: Path | None,
     mark: str | None,
     live: bool,
     namespace: str,
     topic: str | None,
 ) -> None:
-    """Look at a recording in rerun: the moving arm, torques, and what a model does not explain."""
+    """
+    Look at a recording in rerun: the moving arm, torques, and what a model does not explain.
+
+    With --live the arm is shown as it moves; the online identifier beside it has the predictions.
+
+    """
+    from armid_ros.arm import ArmModel
+    from armid_ros.cli import options
+    from armid_ros.files.cells import listed
+    from armid_ros.view import log_scene, make_scene, open_stream, rerun
+
     if live == (bag is not None):
         raise ArmidError('armid view shows a BAG, or with --live what is on the topics: name one')
-    if live:
-        _live(
-            {
-                'robot': robot.robot_source if robot.robot_source != '-' else '',
-                'joints': list(listed(robot.joints)) if robot.joints else [],
-                'mark': list(listed(mark)) if mark else [],
-                'out': str(out or ''),
-            },
-            namespace,
-        )
+    if bag is None:
+        rerun()  # is it there at all?
+        from armid_ros.nodes.viewer import show_topics
+
+        parameters_of_viewer = {
+            'robot': robot_source if robot_source != '-' else '',
+            'joints': list(listed(joints)) if joints else [],
+            'mark': list(listed(mark)) if mark else [],
+            'out': str(out or ''),
+        }
+        show_topics(parameters_of_viewer, namespace)
         return
-    assert bag is not None
-    arm = _arm(bag, model, robot)
-    (recording,) = columns.read([bag], arm.robot, topic)
+    robot = None
+    if robot_source is not None or model is None:
+        robot = options.open_robot(robot_source or '-', gravity, joints, [bag])
+    if model is not None:
+        arm = options.model_of(model / 'model.yaml' if model.is_dir() else model, robot)
+    else:
+        assert robot is not None
+        arm = ArmModel(robot)
+    (recording,) = options.read([bag], arm.robot, topic)
     marked = listed(mark) if mark else _named(model)
     scene = make_scene(arm, recording, marked)
     if out is None:
@@ -88,6 +98,9 @@ def view(
 
 def _save(scene: Scene, out: Path) -> None:
     """Write a file beside its place and move it there, so that it is whole or absent."""
+    from armid_ros.errors import OutputError
+    from armid_ros.view import log_scene, open_stream
+
     beside = out.with_name(f'.{out.name}.part')
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -99,21 +112,6 @@ def _save(scene: Scene, out: Path) -> None:
         beside.replace(out)
     except OSError as error:
         raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
-
-
-def _live(parameters: dict[str, Any], namespace: str) -> None:
-    rerun()  # is it there at all?
-    from armid_ros.nodes.viewer import show_topics
-
-    show_topics(parameters, namespace)
-
-
-def _arm(bag: Path, model: Path | None, robot: OptionalRobot) -> ArmModel:
-    """Return the model that is meant; without one, the bodies of the description."""
-    loaded = None if robot.robot_source is None else robot.load([bag])
-    if model is not None:
-        return options.model_of(model / 'model.yaml' if model.is_dir() else model, loaded)
-    return ArmModel(robot.load([bag]) if loaded is None else loaded)
 
 
 def _named(model: Path | None) -> tuple[str, ...]:

@@ -61,7 +61,9 @@ def doubt_of(
 
 def doubt_of_names(findings: Sequence[Finding]) -> str:
     """Say that what was named never happens between two days; empty where it may have."""
-    never = [one for one in findings if one.name in CATALOGUE and CATALOGUE[one.name].corrects]
+    never = [
+        one for one in findings if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects
+    ]
     if not never:
         return ''
     return (

@@ -14,6 +14,7 @@ from armid_ros.effects.action import (
     Displacement,
     DryFriction,
     law_derivatives,
+    merge_actions,
     NO_FRICTION,
     TorqueLaw,
     Transmission,
@@ -27,11 +28,11 @@ from armid_ros.effects.catalogue import (
     USUAL_EFFECTS,
 )
 from armid_ros.effects.layout import joint_columns, scatter
-from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
 from armid_ros.effects.registry import Kind
 from armid_ros.effects.slipping import Hysteresis
+from armid_ros.effects.traits import Traits
 
 __all__ = [
     'CATALOGUE',
@@ -43,6 +44,7 @@ __all__ = [
     'Kind',
     'Quantity',
     'Shape',
+    'Traits',
     'Displacing',
     'TorqueReading',
     'Action',

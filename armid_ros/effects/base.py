@@ -24,6 +24,7 @@ from typing import Any, ClassVar, Protocol, Self
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
 from armid_ros.effects.smooth import SmoothColumns
+from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import meant, ModelError
 from armid_ros.estimate import ParameterName
@@ -73,14 +74,8 @@ class Effect(ABC):
     summary: ClassVar[str]
     quantities: ClassVar[tuple[Quantity, ...]]
     shapes: ClassVar[tuple[Shape, ...]] = ()
-    #: The experiment that shows it best, as an engineer would do it.
-    shown_by: ClassVar[str] = 'faster motion'
-    #: What a person looks at on the robot before anything else is recorded.
-    look_at: ClassVar[str] = ''
-    #: What a positive value means, where the name does not say it.
-    sign: ClassVar[str] = ''
-    #: Whether a person says it by its weight, the first quantity, and where it is.
-    weighs: ClassVar[bool] = False
+    #: Words and prior knowledge; those of shipped effects are in a table.
+    traits: ClassVar[Traits] = Traits()
     #: Whether the torque of a joint at rest is anything between two levels, and so says nothing.
     holds_at_rest: ClassVar[bool] = False
     #: Whether the torque is linear in the quantities; to the first order only where it is not.
@@ -89,35 +84,18 @@ class Effect(ABC):
     instantaneous: ClassVar[bool] = True
     #: Whether it changes the rigid body or its gravity.
     changes_body: ClassVar[bool] = False
-    #: Whether every joint may be taken to have it.
-    everywhere: ClassVar[bool] = False
-    #: Whether it is fitted where nothing is said: nearly every arm has it.
-    usual: ClassVar[bool] = False
-    #: Whether it is friction: all that a joint has of it may change at once.
-    friction: ClassVar[bool] = False
-    #: Whether joints that each have the effect of another name have it in common here.
-    common: ClassVar[bool] = False
-    #: Shapes with which it is learned as a nuisance where nobody asked for it; () if it is not.
-    nuisance: ClassVar[tuple[tuple[float, ...], ...]] = ()
-    #: Whether it comes and goes all day: a change is put down to it where it explains as well.
-    comes_and_goes: ClassVar[bool] = False
-    #: Whether an engineer knows it by its curve; the demo hides one of these.
-    familiar: ClassVar[bool] = False
-    #: Attributes of a joint of URDF and of MJCF that hold its one quantity; '' if none does.
-    urdf_attribute: ClassVar[str] = ''
-    mjcf_attribute: ClassVar[str] = ''
-    #: Whether it says that the description is wrong, where others may be, and never happens.
-    corrects: ClassVar[bool] = False
-    #: Whether it comes from outside the arm: a person, another machine.
-    external: ClassVar[bool] = False
     #: Whether it is learned from the residual, and so names no cause.
     learned: ClassVar[bool] = False
     #: Whether its columns are made of the measured torque where there is one, noise included.
     reads_torque: ClassVar[bool] = False
     #: Whether its torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
-    #: Quantities that stand for causes of their own, if not all of them stand for one together.
-    separate: ClassVar[tuple[tuple[int, ...], ...]] = ()
+
+    def __init_subclass__(cls) -> None:
+        """Give a shipped effect its traits."""
+        super().__init_subclass__()
+        if vars(cls).get('name') in TRAITS:
+            cls.traits = TRAITS[cls.name]
 
     def __post_init__(self) -> None:
         """Fill in the default shape and check what was given."""
@@ -360,7 +338,7 @@ class Effect(ABC):
 
     def is_correction(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """Return whether such values, each (P,), say that the description is wrong."""
-        return self.corrects
+        return self.traits.corrects
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """

@@ -76,10 +76,10 @@ _EFFECTS: tuple[type[Effect], ...] = (
 CATALOGUE = Catalogue(_EFFECTS)
 
 #: Effects that are fitted with the rigid body by default.
-USUAL_EFFECTS = tuple(effect.name for effect in _EFFECTS if effect.usual)
+USUAL_EFFECTS = tuple(effect.name for effect in _EFFECTS if effect.traits.usual)
 
 #: Friction of one law that arms have as a rule, though nobody asks for it.
-UNASKED_FRICTION = tuple(e for e in _EFFECTS if e.nuisance == ((),) and not e.usual)
+UNASKED_FRICTION = tuple(e for e in _EFFECTS if e.traits.nuisance == ((),) and not e.traits.usual)
 
 _Kind = TypeVar('_Kind', bound=type[Effect])
 

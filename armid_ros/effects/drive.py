@@ -41,9 +41,6 @@ class RotorInertia(Effect):
 
     name = 'rotor_inertia'
     summary = 'inertia of rotor and gear, seen by its own joint only'
-    shown_by = 'fast motion of the joint in two postures of the arm'
-    look_at = 'the motor and the gear, which may be of another type than described'
-    mjcf_attribute = 'armature'
     quantities = (Quantity('rotor_inertia', 'kg m^2', lower=0.0, typical=(0.001, 1.1)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -79,8 +76,6 @@ class TorqueRipple(Effect):
 
     name = 'torque_ripple'
     summary = 'torque that repeats at a fixed angle of the joint: cogging, gear error'
-    shown_by = 'slow constant velocity at three speeds'
-    look_at = 'the gear and the motor, for a worn tooth, a bent shaft or weak magnets'
     quantities = (
         Quantity('ripple_sine', 'N m', typical=(0.002, 2.0)),
         Quantity('ripple_cosine', 'N m', typical=(0.002, 2.0)),
@@ -141,10 +136,7 @@ class ActuatorSaturation(TorqueReading):
 
     name = 'actuator_saturation'
     summary = 'torque beyond a level that the drive does not give, or does not report'
-    shown_by = 'the same motion at rising amplitudes'
-    look_at = 'the limits of current and torque in the settings of the drive'
     reads_torque = True
-    separate = ((0,), (1,))  # together they are measured minus modelled torque: anything
     quantities = (
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),

@@ -8,10 +8,9 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from armid_ros.effects.action import Action, DryFriction
+from armid_ros.effects.action import Action, DryFriction, merge_actions
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
-from armid_ros.effects.merge import merge_actions
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
 from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
@@ -31,14 +30,7 @@ class ViscousFriction(Effect):
 
     name = 'viscous_friction'
     summary = 'torque proportional to joint velocity'
-    shown_by = 'constant velocities, slow to fast, in both directions'
-    look_at = 'the grease, its temperature, the seals and the bearings'
-    friction = True
-    familiar = True
-    nuisance = ((),)
     urdf_attribute = mjcf_attribute = 'damping'
-    usual = True
-    everywhere = True
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -68,15 +60,6 @@ class CoulombFriction(Effect):
 
     name = 'coulomb_friction'
     summary = 'constant torque against the direction of motion; holds at rest'
-    shown_by = 'slow constant velocity in both directions'
-    look_at = 'the brake, the seals and the bearings, and whether it moves freely by hand'
-    friction = True
-    familiar = True
-    nuisance = ((),)
-    urdf_attribute = 'friction'
-    mjcf_attribute = 'frictionloss'
-    usual = True
-    everywhere = True
     quantities = (Quantity('coulomb_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     holds_at_rest = True
 
@@ -107,9 +90,6 @@ class AsymmetricFriction(Effect):
 
     name = 'asymmetric_friction'
     summary = 'friction that differs between the two directions of motion'
-    shown_by = 'static holds beside slow motion in both directions'
-    look_at = 'the brake, the gear, and cables that pull one way'
-    friction = True
     quantities = (
         Quantity('coulomb_asymmetry', 'N m', typical=(0.005, 2.0)),
         Quantity('viscous_asymmetry', 'N m s/rad', typical=(0.002, 5.0)),
@@ -165,10 +145,6 @@ class QuadraticFriction(Effect):
 
     name = 'quadratic_friction'
     summary = 'friction that grows with the square of the velocity, or flattens'
-    shown_by = 'constant velocities up to the limit'
-    look_at = 'what moves through air, oil or grease'
-    friction = True
-    familiar = True
     quantities = (Quantity('quadratic_coefficient', 'N m s^2/rad^2', typical=(0.0004, 1.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -200,11 +176,6 @@ class StribeckFriction(Effect):
 
     name = 'stribeck_friction'
     summary = 'breakaway torque beyond Coulomb friction, gone at higher velocity'
-    shown_by = 'constant velocities from 0.01 to 1 rad/s in both directions'
-    look_at = 'the kind, the age and the temperature of the grease'
-    friction = True
-    familiar = True
-    nuisance = ((0.03, 2.0), (0.1, 2.0), (0.3, 2.0))  # humps at low velocities
     quantities = (Quantity('stribeck_torque', 'N m', lower=0.0, typical=(0.001, 10.0)),)
     shapes = (
         Shape('stribeck_velocity', 'rad/s', 1e-4, 20.0, 0.1, (0.01, 0.03, 0.1, 0.3, 1.0)),
@@ -247,9 +218,6 @@ class ThermalFriction(Effect):
 
     name = 'thermal_friction'
     summary = 'viscous friction that changes while the joint warms up'
-    shown_by = 'the same motion cold and after half an hour of work'
-    look_at = 'how warm the gear was, and how long the arm had worked before'
-    friction = True
     quantities: ClassVar[tuple[Quantity, ...]] = (
         Quantity('viscous_change', 'N m s/rad', typical=(0.001, 6.0)),
     )
@@ -344,10 +312,6 @@ class FrictionLevel(Effect):
 
     name = 'friction_level'
     summary = 'friction of all joints by one factor'
-    shown_by = ViscousFriction.shown_by
-    look_at = 'how warm the arm was and how long it had stood; then the grease and the seals'
-    friction = True
-    common = True
     holds_at_rest = True
     quantities = (Quantity('friction_change', '', lower=-1.0, typical=(0.02, 3.0)),)
 

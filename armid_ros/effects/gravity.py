@@ -54,8 +54,6 @@ class GravityMagnitude(_GravityEffect):
 
     name = 'gravity_magnitude'
     summary = 'gravity stronger or weaker than in the model'
-    shown_by = 'fast motion beside static holds'
-    look_at = 'the gravity in the settings, and the scale of all torques'
     quantities = (Quantity('gravity_difference', 'm/s^2', typical=(0.05, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -86,8 +84,6 @@ class BaseTilt(_GravityEffect):
 
     name = 'base_tilt'
     summary = 'base mounted at an angle to gravity that the model does not have'
-    shown_by = 'static holds with the first joint turned around'
-    look_at = 'how the base stands and is bolted down, with a spirit level'
     quantities = tuple(
         Quantity(name, 'rad', lower=-np.pi, upper=np.pi, typical=(0.003, 0.1))
         for name in ('tilt_x', 'tilt_y')

@@ -28,11 +28,6 @@ class LoadDependentFriction(Effect):
 
     name = 'load_dependent_friction'
     summary = 'dry friction in proportion to the torque that the gear passes on'
-    shown_by = 'the same motion with and without a known payload'
-    look_at = 'the wear, the grease and the alignment of the gear'
-    friction = True
-    familiar = True
-    nuisance = ((),)
     quantities = (Quantity('load_coefficient', '', lower=0.0, upper=1.0, typical=(0.01, 0.4)),)
     holds_at_rest = True
 
@@ -64,8 +59,6 @@ class PreslidingHysteresis(Effect):
 
     name = 'presliding_hysteresis'
     summary = 'friction that builds up over a short way after each reversal'
-    shown_by = 'triangles of less than 0.02 rad at two rates'
-    look_at = 'the seals, the bearings and their preload'
     quantities = (Quantity('presliding_torque', 'N m', lower=0.0, typical=(0.005, 10.0)),)
     shapes = (
         Shape('breakaway_distance', 'rad', 1e-6, 1.0, 0.01, (0.001, 0.003, 0.01, 0.03, 0.1)),

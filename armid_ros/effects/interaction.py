@@ -136,9 +136,6 @@ class HumanInteraction(Attached):
 
     name = 'human_interaction'
     summary = 'spring and damper from a link to a person, another machine or the world'
-    shown_by = 'the same motion with the contact released'
-    look_at = 'whether a person, a table or a fixture touches the arm'
-    external = True
     smooth = True
     quantities = (
         Quantity('interaction_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),
@@ -198,9 +195,6 @@ class InterfaceSlack(Attached):
 
     name = 'interface_slack'
     summary = 'spring from a link to an anchor that pulls beyond a slack only'
-    shown_by = 'the same motion at two tensions of the strap'
-    look_at = 'the strap, cable, table or fixture that may hold it, and how tight or near it is'
-    external = True
     smooth = True
     quantities = (Quantity('slack_stiffness', 'N/m', lower=0.0, typical=(50.0, 50000.0)),)
     shapes = (

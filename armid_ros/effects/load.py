@@ -83,11 +83,6 @@ class Payload(_LinkBody):
 
     name = 'payload'
     summary = 'a body fixed to a link'
-    shown_by = 'the same motion with and without the tool'
-    look_at = 'the hand, the gripper, the tool, a part or a cable that it carries'
-    weighs = True
-    familiar = True
-    comes_and_goes = True
     quantities = tuple(
         Quantity(
             f'payload_{name}',
@@ -196,9 +191,6 @@ class LinkInertia(_LinkBody):
 
     name = 'link_inertia'
     summary = 'mass, centre or inertia of a link other than described'
-    corrects = True
-    shown_by = 'fast motion beside static holds'
-    look_at = 'the link and what is bolted to it, beside its description'
     quantities = tuple(
         Quantity(f'{name}_difference', unit)
         for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)

@@ -99,9 +99,6 @@ class CoupledJointFriction(_Pairs):
 
     name = 'coupled_joint_friction'
     summary = 'friction and inertia of a shaft that turns with the sum of two joints'
-    shown_by = 'motion of one joint of the pair at a time'
-    look_at = 'the gear, belt or tendon that the two joints share'
-    friction = True
     quantities = (
         Quantity('coupled_inertia', 'kg m^2'),
         Quantity('coupled_viscous_coefficient', 'N m s/rad'),
@@ -179,8 +176,6 @@ class JointCoupling(_Pairs):
 
     name = 'joint_coupling'
     summary = 'elastic coupling of two joints by a cable or tendon'
-    shown_by = 'static holds of one joint of the pair at many positions of the other'
-    look_at = 'cables, hoses and tendons that run along both joints'
     quantities = (Quantity('coupling_stiffness', 'N m/rad', typical=(0.1, 50.0)),)
 
     def __post_init__(self) -> None:
@@ -236,8 +231,6 @@ class TorqueCrosstalk(_Pairs, TorqueReading):
 
     name = 'torque_crosstalk'
     summary = 'torque of one joint in the reading of another'
-    shown_by = 'one joint loaded while the other one stands still'
-    look_at = 'how the torque sensors are mounted, and their cables'
     quantities = (Quantity('crosstalk', '', lower=-1.0, upper=1.0, typical=(0.001, 0.05)),)
 
     @classmethod

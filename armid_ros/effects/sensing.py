@@ -32,11 +32,6 @@ class TorqueOffset(Effect):
 
     name = 'torque_offset'
     summary = 'constant torque, in motion and at rest'
-    shown_by = 'static holds over the range of positions'
-    look_at = 'the zero of the torque sensor, with the joint unloaded'
-    familiar = True
-    usual = True
-    everywhere = True
     quantities = (Quantity('torque_offset', 'N m', typical=(0.004, 2.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
@@ -71,10 +66,6 @@ class TorqueGain(TorqueReading):
 
     name = 'torque_gain'
     summary = 'torque readings too large or too small by a share'
-    sign = 'readings are 1 plus that times the torque'
-    shown_by = 'the same motion with and without a known payload'
-    look_at = 'the scale of the torque in the driver, of the sensor or of the motor constant'
-    familiar = True
     quantities = (Quantity('gain_error', '', lower=-0.95, typical=(0.005, 0.3)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
@@ -110,8 +101,6 @@ class TorqueDrift(TorqueReading):
 
     name = 'torque_drift'
     summary = 'torque reading that drifts with time, whatever the motion'
-    shown_by = 'the same static hold, repeated for half an hour'
-    look_at = 'the temperature of the torque sensor, and when its zero was set'
     quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
@@ -151,10 +140,6 @@ class EncoderOffset(Displacing):
 
     name = 'encoder_offset'
     summary = 'zero of a position encoder that is off'
-    sign = 'the joint is at its reading plus that'
-    shown_by = 'hard stops, or a payload at two poses'
-    look_at = 'the zero of the encoder, at a mark or a stop of the joint'
-    familiar = True
     quantities = (Quantity('encoder_offset', 'rad', typical=(0.001, 0.1)),)
     linear = False
 

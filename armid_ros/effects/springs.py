@@ -34,9 +34,6 @@ class JointSpring(Effect):
 
     name = 'joint_spring'
     summary = 'spring on a joint: cable, hose, balancer'
-    shown_by = 'static holds over the range, with and without a payload'
-    look_at = 'cables, hoses and springs along the joint'
-    familiar = True
     quantities = (
         Quantity('spring_stiffness', 'N m/rad', lower=0.0, typical=(0.05, 50.0)),
         Quantity('spring_preload', 'N m', typical=(0.01, 50.0)),
@@ -72,9 +69,6 @@ class SoftLimit(Effect):
 
     name = 'soft_limit'
     summary = 'bumper or end stop that gives way'
-    shown_by = 'slow motion into and out of the end of the range'
-    look_at = 'the stops, and what the joint reaches there'
-    separate = ((0,), (1,))
     quantities = (
         Quantity('lower_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),
         Quantity('upper_stiffness', 'N m/rad', lower=0.0, typical=(2.0, 2000.0)),

@@ -63,8 +63,6 @@ class TimeDelay(LateReading):
 
     name = 'time_delay'
     summary = 'torque readings older than the positions they are recorded with'
-    shown_by = 'the same motion at two speeds, and a sweep of frequency'
-    look_at = 'how the driver stamps positions and torques'
     quantities = (Quantity('delay', 's', lower=-0.1, upper=0.1, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False
@@ -118,8 +116,6 @@ class TorqueLag(LateReading):
 
     name = 'torque_lag'
     summary = 'torque readings behind a low-pass: sensor filter, current loop'
-    shown_by = 'a sweep of frequency up to half of the bandwidth'
-    look_at = 'the filter of the torque in the driver or the sensor'
     quantities = (Quantity('lag', 's', lower=0.0, upper=0.2, typical=(0.0005, 0.02)),)
     linear = False
     instantaneous = False

@@ -44,8 +44,6 @@ class JointElasticity(Displacing):
 
     name = 'joint_elasticity'
     summary = 'elastic transmission between motor and link'
-    shown_by = 'a sweep of frequency through the resonance'
-    look_at = 'the belt, the gear, and the screws of its flanges'
     quantities = (Quantity('compliance', 'rad/(N m)', lower=0.0, typical=(2e-5, 1e-2)),)
     shapes = (Shape('retardation_time', 's', 0.0, 1.0, 0.0, (0.0, 0.001, 0.003, 0.01)),)
     linear = False
@@ -91,8 +89,6 @@ class Backlash(Displacing):
 
     name = 'backlash'
     summary = 'free play of a gear'
-    shown_by = 'slow reversals with the load pulling and pushing'
-    look_at = 'the play of the gear, by moving the link by hand while the motor holds'
     quantities = (Quantity('backlash', 'rad', lower=0.0, typical=(1e-4, 0.02)),)
     shapes = (Shape('crossing_width', 'rad', 1e-6, 1.0, 1e-3, tuple(1e-4 * 1.6 ** np.arange(12))),)
     linear = False

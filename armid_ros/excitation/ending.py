@@ -69,7 +69,7 @@ class Ending:
         away = np.abs(monitor.pose.q - self.gate.run.at([phase]).q[0]).max()
         if not away <= tolerance or not monitor.unsteady(_REST, 2):
             return None
-        return self.gate.stop(phase, duration, monitor.pose.q)
+        return self.gate.stop(phase, duration, monitor.pose.q, monitor.velocity())
 
     def looked(
         self,

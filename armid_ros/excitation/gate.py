@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line
-from armid_ros.excitation.limits import check_limits, Limits
+from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY
 from armid_ros.excitation.run import Run
 from armid_ros.excitation.supervision import HANDOVER, held, slowed
 from armid_ros.excitation.transfer import TransferPlanner
@@ -20,11 +20,9 @@ import numpy as np
 #: often at most: the last one takes 4.8 times the duration.
 _LONGER, _TRIES = 1.25, 8
 #: Time of a small step, in units of what it takes at the velocity limit, and of the root of the
-#: step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest, and the rest is
-#: for the speed that the arm has.
+#: step over the acceleration limit: 1.875 and 2.4 for a quintic from rest to rest. A quintic that
+#: begins with a speed needs 3.94 times the speed over the acceleration limit: at most 6 are taken.
 _STEP = 3.0
-#: Velocity of a joint without a limit [rad/s or m/s].
-_UNSTATED = 1.0
 #: Interval with which the proof of clearance begins [s].
 _INTERVAL = 0.1
 #: Effort of a joint that is expected at least, as a share of its limit: dry friction of a wrist.
@@ -89,13 +87,22 @@ class MotionGate:
         none = np.full(robot.n_joints, np.inf)
         limits = Limits(robot.joints, robot.lower, robot.upper, none, none, none, robot.prismatic)
         if planner.limits is not None:
-            limits = Limits.of(robot, speed=1.0, torque_fraction=1.0, position_margin=0.0)
-        limits = replace(limits, acceleration=np.maximum(limits.acceleration, 1.001 * peak))
+            limits = Limits.of(
+                robot,
+                speed=1.0,
+                torque_fraction=1.0,
+                position_margin=0.0,
+                acceleration=planner.acceleration,
+            )
+        usual = np.maximum(limits.acceleration, 1.001 * peak)
+        given = np.isfinite(planner.given_acceleration)
+        limits = replace(limits, acceleration=np.where(given, limits.acceleration, usual))
         room = np.where(np.isfinite(robot.torque_limit), _LEAST_EFFORT * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
         gate = cls(run, rate, limits, planner.clearance, planner.margin, effort)
-        if planner.limits is not None:
-            gate._require(motion, torque, 'the run')
+        violations = check_limits(limits, motion, torque) if planner.limits is not None else ()
+        if violations:
+            raise TrajectoryError(f'the run is not sent: {violations[0]}')
         times = np.linspace(0.0, run.duration, int(np.ceil(run.duration / _INTERVAL)) + 1)
         if planner.clearance is not None:
             near = planner.clearance.first_fault(run.at, 1.5 * peak, times, planner.margin)
@@ -103,7 +110,9 @@ class MotionGate:
                 raise TrajectoryError(f'the run is not sent: {near}')
         return gate
 
-    def stop(self, phase: float, duration: float, measured: FloatArray) -> Motion:
+    def stop(
+        self, phase: float, duration: float, measured: FloatArray, velocity: FloatArray
+    ) -> Motion:
         """
         Return the way to rest along the run, which was checked as a whole.
 
@@ -113,14 +122,15 @@ class MotionGate:
             Where on the run the arm is [s].
         duration : float
             Time to come to rest [s]; longer where the acceleration limits require it.
-        measured : ndarray, shape (n,)
-            Where the arm is [rad or m]; NaN: unknown. A controller that begins there needs time
-            to get to the path.
+        measured, velocity : ndarray, shape (n,)
+            Position [rad or m] and velocity [rad/s or m/s] of the arm; NaN: unknown. A controller
+            that begins there needs time to get to the path.
 
-        Raises
-        ------
-        TrajectoryError
-            If no stop keeps the limits; the run has to exceed them itself for that.
+        Returns
+        -------
+        Motion
+            Within the positions and velocities of the run. An acceleration limit is exceeded only
+            if the longest stop exceeds it, too: a stop is always sent.
 
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
@@ -129,10 +139,13 @@ class MotionGate:
             if not check_limits(self.limits, motion):
                 break
             duration *= _LONGER
-        self._require(motion, None, 'the stop')
-        step = np.nan_to_num(np.abs(measured - self.run.at([phase]).q[0]))
-        lead = min(self._time_of(step), float(motion.t[-2]))
-        return motion.select(slice(int(np.searchsorted(motion.t, lead)), None))
+        path = self.run.at([phase])
+        step = np.nan_to_num(np.abs(measured - path.q[0]))
+        lead = self._time_of(step, np.nan_to_num(np.abs(velocity - path.dq[0])))
+        reached = int(np.searchsorted(motion.t, lead))
+        if reached < len(motion.t):
+            return motion.select(slice(reached, None))
+        return replace(motion.select(slice(-1, None)), t=np.array([lead]))
 
     def hold(self, set_point: FloatArray, measured: FloatArray, largest: float) -> Motion:
         """
@@ -181,7 +194,7 @@ class MotionGate:
         """
         beyond = np.nan_to_num(np.abs(effort)) - factor * self.effort
         j = int(np.argmax(beyond))
-        if factor == 0.0 or self.effort[j] == 0.0 or beyond[j] <= 0.0:  # noqa: RUF069 - as it is written
+        if not (factor > 0.0 and self.effort[j] > 0.0 and beyond[j] > 0.0):
             return ''
         return (
             f"joint '{self.limits.joints[j]}' takes {abs(effort[j]):.3g} "
@@ -189,14 +202,10 @@ class MotionGate:
             f'more than effort_factor {factor:g} allows'
         )
 
-    def _time_of(self, step: FloatArray) -> float:
-        """Return the time that a small step of each joint takes within the limits [s]."""
-        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, _UNSTATED)
+    def _time_of(self, step: FloatArray, speed: FloatArray | float = 0.0) -> float:
+        """Return the time of a small step that begins with a speed, within the limits [s]."""
+        velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
+        slowest = speed + np.sqrt(speed**2 + step * self.limits.acceleration)
         return _STEP * float(
-            max((step / velocity).max(), np.sqrt(step / self.limits.acceleration).max())
+            max((step / velocity).max(), (slowest / self.limits.acceleration).max())
         )
-
-    def _require(self, motion: Motion, torque: FloatArray | None, what: str) -> None:
-        violations = check_limits(self.limits, motion, torque)
-        if violations:
-            raise TrajectoryError(f'{what} is not sent: {violations[0]}')

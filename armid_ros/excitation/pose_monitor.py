@@ -24,6 +24,8 @@ _STILL = 0.004
 _WINDOW = 0.5
 #: Error of a position that the velocity limit does not bound: encoder noise [rad or m].
 _NOISE = 0.02
+#: Time over which a velocity is a difference of positions [s]: noise of 0.0001 rad is 0.01 rad/s.
+_DIFFERENCE = 0.01
 #: Delay of a transport: stamps may be further apart than arrivals by this much [s].
 _TRANSPORT = 0.1
 #: Velocity of a joint whose description states none [rad/s or m/s]: a turn a second.
@@ -151,6 +153,18 @@ class PoseMonitor:
         """Return why so many positions of the last 0.5 s were rejected; empty: fewer were."""
         recent = [fault for arrived, fault in self._rejections if now - arrived <= _WINDOW]
         return recent[-1] if len(recent) >= count else ''
+
+    def velocity(self) -> FloatArray:
+        """Return the velocity of each joint, shape (n,) [rad/s or m/s]; NaN: unknown."""
+        velocity = np.full(len(self.pose.joints), np.nan)
+        for source in self._sources.values():
+            states = source.states
+            for state in reversed(states):
+                passed = states[-1].arrived - state.arrived
+                if passed >= _DIFFERENCE:
+                    velocity[source.joints] = (states[-1].q - state.q) / passed
+                    break
+        return velocity
 
     def unsteady(self, span: float, count: int = AGREEING) -> str | None:
         """

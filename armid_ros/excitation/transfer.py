@@ -106,6 +106,8 @@ class TransferPlanner:
         Bodies to keep apart, the floor among them.
     margin : float
         Clearance to keep [m].
+    acceleration : ndarray, shape (n,), or None
+        Acceleration limits that are given for any motion [rad/s^2 or m/s^2]; NaN: none is.
 
     """
 
@@ -113,6 +115,14 @@ class TransferPlanner:
     limits: Limits | None
     clearance: ClearanceModel | None
     margin: float
+    acceleration: FloatArray | None = None
+
+    @property
+    def given_acceleration(self) -> FloatArray:
+        """Return the acceleration limits [rad/s^2 or m/s^2]; infinite where none is given."""
+        if self.acceleration is None:
+            return np.full(self.arm.robot.n_joints, np.inf)
+        return np.nan_to_num(self.acceleration, nan=np.inf)
 
     def __call__(
         self, start: FloatArray, goal: FloatArray, shortest: float = 0.0, seed: int = 0

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Any
 
-from armid_ros.cli.signatures import options
-from armid_ros.cli.signatures.late import done_by
+from armid_ros.cli import parameters as options
+from armid_ros.cli.late import done_by
 from armid_ros.errors import FleetError
 import click
 

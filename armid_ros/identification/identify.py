@@ -10,18 +10,14 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.estimators.names import (
-    Estimator,
-    least_squares_of,
-    require_estimator,
-)
-from armid_ros.identification.estimators.refine import refined
 from armid_ros.identification.fitting.cutoff import cutoff_of_torques
 from armid_ros.identification.fitting.excited import excited
 from armid_ros.identification.fitting.halves import halves_error, HalvesError
 from armid_ros.identification.fitting.held import base_spread, determined
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
-from armid_ros.identification.fitting.least_squares import Method
+from armid_ros.identification.fitting.instruments import fit_by_instruments
+from armid_ros.identification.fitting.jackknife import scatter
+from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
 from armid_ros.identification.fitting.nonlinear import (
     fit_values,
     FittedValues,
@@ -30,7 +26,6 @@ from armid_ros.identification.fitting.nonlinear import (
     ungrouped,
 )
 from armid_ros.identification.fitting.quasi_static import free_directions, with_uncertain_inertia
-from armid_ros.identification.fitting.scatter import scatter
 from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
 from armid_ros.identification.physical.physical_fit import fit_to_bodies
@@ -65,9 +60,9 @@ class IdentificationSettings:
 
     Attributes
     ----------
-    method : {'ols', 'wls', 'irls', 'iv', 'cloe', 'ekf'}
+    method : {'ols', 'wls', 'irls', 'iv'}
         Least squares: ordinary, weighted by the noise of each joint, or robust as well;
-        instrumental variables, closed-loop output error, extended Kalman filter.
+        instrumental variables.
     signals : SignalSettings
         Filtering and decimation.
     physical : PhysicalSettings or None
@@ -80,17 +75,20 @@ class IdentificationSettings:
     physical: PhysicalSettings | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a method that is not there, and bodies where it knows no constraints."""
-        require_estimator(self.method)
-        if self.physical is not None and self.method != self.least_squares:
+        """Refuse an unknown method, and constraints of bodies on instrumental variables."""
+        if self.method not in ESTIMATORS:
             raise IdentificationError(
-                f'{self.method} is not fitted among bodies: take ols, wls or irls for that'
+                f"no method '{self.method}'; use one of {', '.join(ESTIMATORS)}"
+            )
+        if self.physical is not None and self.method == 'iv':
+            raise IdentificationError(
+                'physical constraints are not available with method iv; use ols, wls or irls'
             )
 
     @property
     def least_squares(self) -> Method:
         """Return the least squares that the method is, or starts from."""
-        return least_squares_of(self.method)
+        return 'wls' if self.method == 'iv' else self.method
 
 
 @dataclass(frozen=True)
@@ -307,8 +305,10 @@ def identify(
         fit = _fitted(arm, base, problem, recordings, used, settings)
         if _hidden(arm, theory):
             theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
-    fit, said = refined(settings.method, arm, fit, recordings, used, rng)
-    notes += said + _remarks(fit, theory)
+    if settings.method == 'iv':
+        fit, said = fit_by_instruments(arm, fit, recordings, used)
+        notes += said
+    notes += _remarks(fit, theory)
     certificate = None
     if settings.physical is not None:
         fit, certificate = fit_to_bodies(

@@ -189,23 +189,18 @@ def read_parameters(path: str | Path) -> ParameterFile:
         path = found[0]
     text = read_text(path, ModelError)
     with reading(path, ModelError):
-        document = _document(text, path.suffix == '.json')
+        try:
+            document = load_json(text) if path.suffix == '.json' else load_yaml(text)
+        except (ValueError, yaml.YAMLError) as error:
+            reason = ' '.join(str(error).split())
+            raise ModelError(f'neither JSON nor YAML: {reason}') from error
+        if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
+            raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
+        document = checked_model(text) if document['schema'] == MODEL else document
         read = parameters_of(str(path), document)
     if document['schema'] == MODEL:
         return _beside(path, document) or _with_robot(read, path, text)
     return read if read.kinematics else _with_robot(read, path)
-
-
-def _document(text: str, is_json: bool) -> dict[str, Any]:
-    """Return what a text says, of a kind that has parameters."""
-    try:
-        document = load_json(text) if is_json else load_yaml(text)
-    except (ValueError, yaml.YAMLError) as error:
-        reason = ' '.join(str(error).split())
-        raise ModelError(f'neither JSON nor YAML: {reason}') from error
-    if not isinstance(document, dict) or document.get('schema') not in _SCHEMAS:
-        raise ModelError(f"its 'schema' has to be {' or '.join(_SCHEMAS)}")
-    return checked_model(text) if document['schema'] == MODEL else document
 
 
 def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:

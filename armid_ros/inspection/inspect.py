@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.senders import two_senders
@@ -88,14 +88,14 @@ class Inspection:
                 return 'No efforts: motion alone, from which nothing can be identified.'
             if any(remark.weight == 'bad' for remark in self.remarks):
                 return 'Not fit for identification as it is.'
-            return 'Fit to be identified, as far as can be said without --robot.'
+            return 'No fault found; add --robot to check limits and try a fit.'
         if self.trial.refused:
-            return 'armid identify refuses it.'
+            return '`armid identify` refuses this recording.'
         if self.trial.grade != 'good':
-            return f'armid identify calls what it makes of it {self.trial.grade}{self._why}'
+            return f'`armid identify` grades this recording {self.trial.grade}{self._why}'
         return (
-            f'armid identify takes it: relative error {self.trial.relative_error_percent:.1f} %, '
-            f'{self.trial.rank} of {self.trial.theory} parameters told apart.'
+            f'Ready for `armid identify`: {self.trial.rank} of {self.trial.theory} parameters are '
+            f'distinguishable (quick fit: {self.trial.relative_error_percent:.1f} % error).'
         )
 
     @property
@@ -151,7 +151,7 @@ def inspect(
     if trial is None or trial.refused:
         found += [Remark('bad', text) for text in dead_encoders(robot, recording)]
     if trial is not None and trial.refused:
-        found.insert(0, Remark('bad', f'identify refuses it: {trial.refused}'))
+        found.insert(0, Remark('bad', f'refused by `armid identify`: {trial.refused}'))
     elif trial is not None:
         found += _of_fit(trial, [remark.text for remark in found])
         found += [Remark('doubt', text) for text in trial.elsewhere]
@@ -198,20 +198,20 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
         yield Remark(
             'doubt',
             f'{sampling.gaps} {"gap" if sampling.gaps == 1 else "gaps"} in time, the longest '
-            f'{sampling.longest_step:.3g} s; stretches between them are filtered apart',
+            f'{sampling.longest_step:.3g} s; segments between gaps are filtered separately',
         )
     if sampling.jitter > _JITTER:
         yield Remark(
             'doubt',
             f'steps between samples vary by {100 * sampling.jitter:.0f} %; velocities and '
-            'accelerations from the positions are blurred by that',
+            'accelerations from the positions are less accurate',
         )
     yield from (Remark('doubt', text) for text in too_short_to_tell([recording]))
     if sampling.period is None:
         yield Remark(
             'note',
-            'the motion does not repeat; two periods of one excitation would tell noise from what '
-            'a model lacks',
+            'the motion does not repeat; two periods of one excitation separate noise from '
+            'model error',
         )
 
 
@@ -230,7 +230,7 @@ def _of_units(
         named = ', '.join(f'{j.name} reaches {max(-j.lower, j.upper):.4g}' for j in turned[:3])
         yield Remark('doubt', f'{named}: are positions in degrees, or those of motors?')
     if recording.dq is None:
-        yield Remark('note', 'no velocities; they are taken from the positions anyway')
+        yield Remark('note', 'no velocities; they are not needed, positions are differentiated')
         return
     yield from (Remark('doubt', text) for text in velocity_faults(recording))
     time_base = time_base_fault(recording)
@@ -302,7 +302,7 @@ def _of_filters(recording: Recording) -> Iterator[Remark]:
         named = ', '.join(f'{recording.joints[k]} {bands[k]:.2g} Hz' for k in known)
         yield Remark(
             'note',
-            f'efforts were low-passed before they were recorded ({named}): they are late by some '
-            f'{1e3 / (2.0 * np.pi * float(bands[known].min())):.0f} ms at most; '
+            f'efforts were low-passed before they were recorded ({named}): delay up to '
+            f'{1e3 / (2.0 * np.pi * float(bands[known].min())):.0f} ms; '
             '--effects torque_lag estimates it',
         )

@@ -232,19 +232,16 @@ class LiveDiagnosis:
             self._begin, self._changed = -np.inf, False
             self._outdate()
         if self.learning and self._holds(self.settings.learning):
-            self._learn()
+            # keep the motion so far, which tells the misfit of the model
+            began = self.window.end - self.settings.learning
+            motion = self.window.recording(began, 'the motion in which nothing was wrong')
+            self._healthy, self._learned = Healthy(self.belief.accepted, motion), True
+            self._asked_at = self.window.moved
         return kept
 
     def _holds(self, seconds: float) -> bool:
         """Return whether the window has motion of so many seconds."""
         return self.window.moved >= seconds <= self.window.end - self.window.begin
-
-    def _learn(self) -> None:
-        """Keep the motion so far, which tells the misfit of the model."""
-        began = self.window.end - self.settings.learning
-        motion = self.window.recording(began, 'the motion in which nothing was wrong')
-        self._healthy, self._learned = Healthy(self.belief.accepted, motion), True
-        self._asked_at = self.window.moved
 
     def request(self) -> DiagnosisRequest:
         """Return what to ask now."""
@@ -289,7 +286,11 @@ class LiveDiagnosis:
         self.latest = answer
         before = self.belief.model
         if answer.verdict in NAMING and answer.named:
-            self._agree(answer.named[0])
+            # count the questions in a row that put a name first
+            named = answer.named[0]
+            if self._agreed and self._agreed[-1] != named:
+                self._agreed = []
+            self._agreed.append(named)
             if self.confirmed:
                 self.belief = self.belief.proposing(answer)
         else:
@@ -331,9 +332,3 @@ class LiveDiagnosis:
     def _outdate(self) -> None:
         """Have the answer that is under way dropped when it comes."""
         self._outdated = self._under_way
-
-    def _agree(self, named: Named) -> None:
-        """Count the questions in a row that put a name first."""
-        if self._agreed and self._agreed[-1] != named:
-            self._agreed = []
-        self._agreed.append(named)

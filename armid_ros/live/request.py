@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import time
 
 from armid_ros.arm import ArmModel, Misfit
@@ -174,7 +174,8 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     try:
         changed = None if request.of_one_arm else onset(arm, window)
         if changed is not None:
-            window = since(window, changed)
+            window = window.select(window.t >= changed)
+            window = replace(window, t=window.t - (window.t[0] if len(window) else 0.0))
         if window.duration < request.shortest:
             text = f'the arm changed {window.duration:.0f} s ago: more motion is needed'
             return said(WAITING, text), None
@@ -189,20 +190,6 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     except ArmidError as error:
         return said('bad_data', str(error)), None
     return said(found.verdict, found.summary, found.findings, found.arm), found
-
-
-def since(recording: Recording, t: float) -> Recording:
-    """Return what a recording holds from a time on [s]."""
-    kept = recording.t >= t
-    begin = recording.t[kept][0] if kept.any() else 0.0
-    return Recording(
-        joints=recording.joints,
-        t=recording.t[kept] - begin,
-        q=recording.q[kept],
-        dq=None if recording.dq is None else recording.dq[kept],
-        tau=None if recording.tau is None else recording.tau[kept],
-        source=recording.source,
-    )
 
 
 def _misfit(

@@ -130,12 +130,6 @@ class Consistency:
         """Whether a body with positive density has these parameters."""
         return bool(self.eigenvalues[0] > 0.0)
 
-    @property
-    def triangle_margin(self) -> float:
-        """How far the largest moment is below the sum of the others, as a share of it."""
-        low, middle, high = self.moments
-        return float((low + middle - high) / high)
-
 
 def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> None:
     """

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import math
 from typing import Any
 
@@ -38,8 +38,6 @@ class ArmWatch:
         Decides which positions are believed.
     stamps : StampDifference
         Between stamps and the node's clock.
-    effort : ndarray, shape (n,)
-        Efforts of the last message, in the order of the joints; NaN: none.
 
     """
 
@@ -63,7 +61,7 @@ class ArmWatch:
         """
         self.monitor = PoseMonitor(robot, tolerance)
         self.stamps = StampDifference(node.get_clock())
-        self.effort: FloatArray = np.full(robot.n_joints, np.nan)
+        self._efforts: tuple[Iterable[str], Iterable[float]] = (), ()
         self._node, self._joints, self._on_state = node, robot.joints, on_state
         self._messages = JointStateMessages()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -79,6 +77,12 @@ class ArmWatch:
         self._states = node.create_subscription(
             JointState, 'joint_states', self._on_joint_states, qos_profile_sensor_data, raw=True
         )
+
+    @property
+    def effort(self) -> FloatArray:
+        """Return the efforts of the last message, shape (n,) [N m or N]; NaN: none."""
+        known = dict(zip(*self._efforts, strict=False))
+        return np.array([known.get(joint, math.nan) for joint in self._joints])
 
     def now(self) -> float:
         """Return the time of ages [s]: simulated without the steps of its clock, or steady."""
@@ -141,6 +145,5 @@ class ArmWatch:
         state = State(message.names, message.position, message.velocity, stamp)
         self.monitor.update(state, self.now())
         self.stamps.take(stamp)
-        known = dict(zip(message.names, message.effort, strict=False))
-        self.effort = np.array([known.get(joint, math.nan) for joint in self._joints])
+        self._efforts = message.names, message.effort
         self._on_state()

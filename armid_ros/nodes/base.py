@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
-from armid_ros.nodes.complaints import Complaints
+from armid_ros.nodes.complaints import Complaints, FATAL, surviving
 from armid_ros.nodes.parameters.table import (
     as_declared,
     declare,
@@ -17,7 +17,6 @@ from armid_ros.nodes.parameters.table import (
     NodeParameter,
     unknown,
 )
-from armid_ros.nodes.running.surviving import FATAL, surviving
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
@@ -78,9 +77,8 @@ class ArmidNode(Node):
         self.add_post_set_parameters_callback(self._apply)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_timer(1.0, self.publish_diagnostics)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_PATIENCE, self.look_for_clock, clock=steady)
-        self.create_timer(_PATIENCE, self.look_for_trouble, clock=steady)
+        self.look_every(_PATIENCE, self.look_for_clock)
+        self.look_every(_PATIENCE, self.look_for_trouble)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters to declare."""
@@ -100,6 +98,10 @@ class ArmidNode(Node):
         """Make a timer as rclpy does, with a callback that may fail."""
         guarded = self._surviving(callback, getattr(callback, '__name__', 'timer'))
         return super().create_timer(timer_period_sec, guarded, *args, **more)
+
+    def look_every(self, seconds: float, callback: Callable[[], None]) -> None:
+        """Call something in real time, whatever /clock says."""
+        self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def pace(self, parameter: str, callback: Callable[[], None]) -> None:
         """Call something as often as a parameter says [Hz], also once it is set anew."""

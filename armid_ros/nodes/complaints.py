@@ -1,18 +1,23 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Input that cannot be used is said once, counted always."""
+"""Input that cannot be used is logged once, counted always, and ends no callback."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import wraps
 import traceback
 from types import MappingProxyType
+from typing import Any
 
+from armid_ros.errors import ArmidError, RecordingEnded
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 #: Different texts said of one kind; a sender of random rubbish must not fill the log.
 _TEXTS_PER_KIND = 10
+#: What is no matter of a message: a disk that is full ends a recorder, and should.
+FATAL = (OSError, MemoryError, RecordingEnded)
 
 
 class Complaints:
@@ -69,3 +74,42 @@ class Complaints:
     def settle(self) -> None:
         """Begin a new period of reporting."""
         self.fresh = False
+
+
+def surviving(
+    callback: Callable[..., Any],
+    what: str,
+    complaints: Callable[[], Complaints],
+    running: Callable[[], bool],
+) -> Callable[..., Any]:
+    """
+    Return a callback that complains where another one would raise.
+
+    Parameters
+    ----------
+    callback : callable
+        Of a subscription or a timer.
+    what : str
+        What calls it, such as a topic.
+    complaints : callable
+        Returns where to complain.
+    running : callable
+        Returns whether ROS runs; while it shuts down exceptions are its way to say so.
+
+    """
+
+    @wraps(callback)
+    def survive(*args: Any) -> Any:
+        try:
+            return callback(*args)
+        except FATAL:
+            raise
+        except ArmidError as error:
+            complaints().say(what, f'{what}: {error}')
+        except Exception as error:
+            if not running():
+                raise
+            complaints().defect(what, error)
+        return None
+
+    return survive

@@ -382,8 +382,8 @@ class ExcitationPublisherNode(ArmidNode):
         self._gate = self._rehearsal = None
         self._outcome = 'stopped'
         self._ending = Ending(gate, self._begun, None, now, reason, blocked)
-        measured = self._arm.monitor.pose.q
-        motion = gate.stop(now - self._begun, self.value('stopping'), measured)
+        measured = self._arm.monitor.pose.q, self._arm.monitor.velocity()
+        motion = gate.stop(now - self._begun, self.value('stopping'), *measured)
         self._ending = replace(self._ending, last=motion)
         self._controller.bring_to_rest(write_trajectory(motion, float(motion.t[0])))
 

@@ -22,7 +22,6 @@ from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.client import Client
-from rclpy.clock import Clock, ClockType
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -120,7 +119,7 @@ class IdentificationRunNode(ArmidNode):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         self._script = self._steps()
         self._wait: Wait = ('begins', lambda: True)
-        self.create_timer(_LOOK_PERIOD, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.look_every(_LOOK_PERIOD, self.look)
 
     @property
     def finished(self) -> bool:
@@ -270,13 +269,19 @@ class IdentificationRunNode(ArmidNode):
         program = (command, *fitted, *validate, *given, *more, '--out', str(folder))
         self._program = self._start(program)
         yield f'armid {command} is under way', lambda: self._program.poll() is not None
-        if self._program.returncode and not _refuses_data(command, folder):
+        name, keys = _SAID[command]
+        document = {}
+        if (folder / name).is_file():
+            document = json.loads((folder / name).read_text(encoding='utf-8'))
+        # that data cannot be diagnosed is an answer
+        if self._program.returncode and document.get('verdict') != 'bad_data':
             known = f'; until then: {"; ".join(self._results)}' if self._results else ''
             raise ArmidError(
                 f'armid {command} ended with code {self._program.returncode}; the recordings are '
                 f'{", ".join(bags)}{known}'
             )
-        self._results.append(_result(command, folder))
+        told = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
+        self._results.append(f'{command}: {told or "done"} ({folder / "report.html"})')
 
     def _until(self, what: str, come: Callable[[], str]) -> Iterator[Wait]:
         """Wait until nothing is missing any more, for as long as patience lasts."""
@@ -309,22 +314,6 @@ class IdentificationRunNode(ArmidNode):
             if status.name == wanted:
                 values = {value.key: value.value for value in status.values}
                 self._state = {**values, 'message': status.message}
-
-
-def _refuses_data(command: str, folder: Path) -> bool:
-    """Tell whether a diagnosis says that the data cannot be diagnosed, which is an answer."""
-    file = folder / _SAID['diagnose'][0]
-    if command != 'diagnose' or not file.is_file():
-        return False
-    return bool(json.loads(file.read_text(encoding='utf-8'))['verdict'] == 'bad_data')
-
-
-def _result(command: str, folder: Path) -> str:
-    """Say what a command wrote, and where its report is."""
-    name, keys = _SAID[command]
-    document = json.loads((folder / name).read_text(encoding='utf-8'))
-    told = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
-    return f'{command}: {told or "done"} ({folder / "report.html"})'
 
 
 def main(args: Sequence[str] | None = None) -> None:

@@ -22,7 +22,6 @@ from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
 from armid_ros.nodes.running.process import run
 from armid_ros.robots import robot_from_urdf
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -102,7 +101,7 @@ class JointStateMergerNode(ArmidNode):
             self._adopt(names(self, 'joints'))
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
-        self.create_timer(_LOOK_PERIOD, self.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.look_every(_LOOK_PERIOD, self.look)
 
     def look(self) -> None:
         """Subscribe to what has appeared."""

@@ -18,8 +18,7 @@ from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
-from armid_ros.nodes.messages.disturbances import disturbance
-from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.messages.joint_states import disturbance, JointStateReader
 from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
@@ -30,7 +29,6 @@ from armid_ros.nodes.parameters.live import (
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -104,8 +102,7 @@ class LiveDiagnosisNode(ArmidNode):
         )
         for service in (self.accept, self.reject, self.save, self.next_run, self.reset):
             self.offer(f'~/{service.__name__}', service)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
+        self.look_every(_LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:

@@ -145,15 +145,11 @@ def run_lockstep(
 
     """
     with Stage(domain) as stage:
-        plant = stage.add_plant(arm, start_ns, rate)
         learner = stage.add(OnlineIdentifierNode, identifier)
-        recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
-        publisher = stage.add_publisher(arm, excitation, approach)
-        begun = stage.start(plant, publisher, recorder, learner)
-        duration = publisher.duration + (begun - start_ns) * 1e-9 + _REST
-        watch = _Watch(learner, duration, on_progress, period)
+        run = _Run(stage, arm, excitation, bag, topics, rate, approach, start_ns, learner)
+        watch = _Watch(learner, run.duration, on_progress, period)
         while watch.t < watch.duration:
-            watch.see(stage.step(plant, recorder, learner) - start_ns)
+            watch.see(run.step() - start_ns)
         return watch.progress()
 
 
@@ -187,15 +183,11 @@ def record_lockstep(
 
     """
     with Stage(domain) as stage:
-        plant = stage.add_plant(arm, EPOCH_NS, rate)
-        recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
-        publisher = stage.add_publisher(arm, excitation, approach)
-        begun = stage.start(plant, publisher, recorder)
-        duration, t = publisher.duration + (begun - EPOCH_NS) * 1e-9 + _REST, 0.0
-        while t < duration:
-            t = (stage.step(plant, recorder) - EPOCH_NS) * 1e-9
+        run, t = _Run(stage, arm, excitation, bag, topics, rate, approach, EPOCH_NS), 0.0
+        while t < run.duration:
+            t = (run.step() - EPOCH_NS) * 1e-9
             if on_progress is not None:
-                on_progress(min(t / duration, 1.0))
+                on_progress(min(t / run.duration, 1.0))
 
 
 def replay_lockstep(
@@ -305,79 +297,61 @@ class Stage:
                 )
             self._executor.spin_once(timeout_sec=0.1)
 
-    def add_plant(self, arm: SimulatedArm, start_ns: int, rate: float) -> SimulatedArmNode:
-        """Add a simulated arm, which moves on when it is told to."""
-        return self.add(
-            SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
-        )
 
-    def add_publisher(
-        self, arm: SimulatedArm, excitation: Excitation, approach: float
-    ) -> ExcitationPublisherNode:
-        """Add the publisher of an excitation, which waits."""
-        # The simulated arm looks at the limits, and nothing in a simulation can be hit.
-        planner = TransferPlanner(ArmModel(arm.plant.robot), None, None, 0.0)
-        return self.add(
-            ExcitationPublisherNode, excitation, planner, start=False, approach=approach
-        )
+class _Run:
+    """An excitation that is under way: duration is the time from the first stamp on [s]."""
 
-    def start(
+    def __init__(
         self,
-        plant: SimulatedArmNode,
-        publisher: ExcitationPublisherNode,
-        recorder: RecorderNode,
-        learner: OnlineIdentifierNode | None = None,
-    ) -> int:
-        """Start an excitation, wait until the arm moves, and return when it began [ns]."""
-        self.connect(plant, recorder, publisher, learner)
-        for _ in range(max(math.ceil(_SEEN * plant.value('rate')), AGREEING) + 1):
-            stamp = self.step(plant, recorder, learner)
-            self.spin_until(lambda stamp=stamp: publisher.last_stamp_ns == stamp, 'joint_states')
-        publisher.start()
-        self.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        return stamp
-
-    def connect(
-        self,
-        plant: SimulatedArmNode,
-        recorder: RecorderNode,
-        publisher: ExcitationPublisherNode,
+        stage: Stage,
+        arm: SimulatedArm,
+        excitation: Excitation,
+        bag: Path,
+        topics: Sequence[str],
+        rate: float,
+        approach: float,
+        start_ns: int,
         learner: OnlineIdentifierNode | None = None,
     ) -> None:
-        """Wait until everybody hears everybody, and the clock."""
+        self._stage, self._learner = stage, learner
+        self._plant = stage.add(
+            SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
+        )
+        self._recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
+        # The simulated arm looks at the limits, and nothing in a simulation can be hit.
+        planner = TransferPlanner(ArmModel(arm.plant.robot), None, None, 0.0)
+        publisher = stage.add(
+            ExcitationPublisherNode, excitation, planner, start=False, approach=approach
+        )
+        stage.spin_until(lambda: self._connected(publisher), 'discovery')
+        for _ in range(max(math.ceil(_SEEN * rate), AGREEING) + 1):
+            begun = self.step()
+            stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
+        publisher.start()
+        plant = self._plant
+        stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
+        self.duration = publisher.duration + (begun - start_ns) * 1e-9 + _REST
+
+    def _connected(self, publisher: ExcitationPublisherNode) -> bool:
+        """Whether everybody hears everybody, and the clock."""
+        recorder, learner = self._recorder, self._learner
         listeners = [recorder, publisher, *([] if learner is None else [learner])]
+        recorder.look()
+        self._plant.publish_clock()
+        return (
+            not recorder.missing
+            and (learner is None or _matched(learner))
+            and self._plant.readers >= len(listeners)
+            and publisher.readers >= 1
+            and all(node.get_clock().now().nanoseconds for node in listeners)
+        )
 
-        def connected() -> bool:
-            recorder.look()
-            plant.publish_clock()
-            return (
-                not recorder.missing
-                and (learner is None or _matched(learner))
-                and plant.readers >= len(listeners)
-                and publisher.readers >= 1
-                and all(node.get_clock().now().nanoseconds for node in listeners)
-            )
-
-        self.spin_until(connected, 'discovery')
-
-    def step(
-        self,
-        plant: SimulatedArmNode,
-        recorder: RecorderNode,
-        learner: OnlineIdentifierNode | None = None,
-    ) -> int:
-        """
-        Move the arm on, and wait until its joint state has arrived everywhere.
-
-        Raises
-        ------
-        ArmidError
-            If the arm complains, or nothing arrives.
-
-        """
+    def step(self) -> int:
+        """Move the arm on until its joint state is everywhere; return the stamp [ns]."""
+        plant, learner = self._plant, self._learner
         stamp, topic = plant.step(), plant.resolve_topic_name('joint_states')
-        stamps = recorder.last_stamps
-        self.spin_until(
+        stamps = self._recorder.last_stamps
+        self._stage.spin_until(
             lambda: (
                 stamps.get(topic) == stamp and (learner is None or learner.last_stamp_ns == stamp)
             ),

@@ -27,10 +27,19 @@ from armid_ros.identification.online.learning_progress import LearningProgress, 
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.messages.disturbances import disturbance, DISTURBANCES
-from armid_ros.nodes.messages.estimates import estimate_message, FILES, save_identification
-from armid_ros.nodes.messages.joint_states import JointSample, JointStateReader
-from armid_ros.nodes.messages.learning_status import change_status, parameter_status
+from armid_ros.nodes.messages.estimates import (
+    change_status,
+    estimate_message,
+    FILES,
+    parameter_status,
+    save_identification,
+)
+from armid_ros.nodes.messages.joint_states import (
+    disturbance,
+    DISTURBANCES,
+    JointSample,
+    JointStateReader,
+)
 from armid_ros.nodes.messages.stamp_difference import StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
@@ -40,10 +49,9 @@ from armid_ros.nodes.parameters.identifier import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
 from armid_ros.nodes.running.process import run
-from armid_ros.recording.header import header_stamp
+from armid_ros.recording.message_types import header_stamp
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -129,8 +137,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
         self.pace('estimate_rate', self.publish_estimate)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
+        self.look_every(_LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:

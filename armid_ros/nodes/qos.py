@@ -9,7 +9,7 @@ from typing import Any
 
 from armid_ros.recording.qos import QosProfile
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -36,19 +36,15 @@ def matching(publishers: Sequence[TopicEndpointInfo], depth: int = DEPTH) -> QoS
     profiles = [publisher.qos_profile for publisher in publishers]
     reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in profiles)
     latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in profiles)
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
-    )
+    return _profile(depth, reliable, latched)
 
 
 def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[QosProfile, ...]:
     """Return what the publishers of a topic offer, as a bag keeps it."""
     return tuple(
         QosProfile(
-            reliability=_name(publisher.qos_profile.reliability),
-            durability=_name(publisher.qos_profile.durability),
+            reliability=publisher.qos_profile.reliability.name.lower(),
+            durability=publisher.qos_profile.durability.name.lower(),
         )
         for publisher in publishers
     )
@@ -58,11 +54,14 @@ def offered(profiles: Sequence[QosProfile], depth: int = DEPTH) -> QoSProfile:
     """Return the profile to publish a recorded topic with: the least that all recorded offer."""
     best_effort = any(p.reliability == 'best_effort' for p in profiles)
     latched = bool(profiles) and all(p.latched for p in profiles)
+    return _profile(depth, not best_effort, latched)
+
+
+def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:
     return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
         depth=depth,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-        durability=(DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE),
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
 
 
@@ -137,7 +136,3 @@ class MatchedSubscription:
             self._node.destroy_subscription(self.subscription)
         self.subscription = None
         self._profile = None
-
-
-def _name(policy: ReliabilityPolicy | DurabilityPolicy) -> str:
-    return str(policy.name).lower()

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 import os
@@ -22,8 +21,7 @@ from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
-from armid_ros.recording.header import header_stamp
-from rclpy.clock import Clock, ClockType
+from armid_ros.recording.message_types import header_stamp
 
 OpenBag = Callable[[Path], BagWriter]
 
@@ -37,14 +35,6 @@ WATCH_PERIOD = 1.0
 _WARNED = 60.0
 #: Messages kept while simulated time has not begun.
 _HELD = 1000
-
-
-@dataclass(frozen=True)
-class Channel:
-    """A recorded topic: its subscription, and whether its messages carry a stamp."""
-
-    topic: str
-    stamped: bool
 
 
 class RecorderNode(ArmidNode):
@@ -108,7 +98,7 @@ class RecorderNode(ArmidNode):
         self._writer: BagWriter | None = None
         self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
         self._refused: dict[str, Sequence[str]] = {}  # types of topics that are not recorded
-        self._held: list[tuple[Channel, bytes]] = []
+        self._held: list[tuple[str, bool, bytes]] = []  # topic, whether it has stamps, message
         self._bags = 0
         self._count = 0
         self._begun = 0.0
@@ -116,10 +106,9 @@ class RecorderNode(ArmidNode):
         self.last_stamps: dict[str, int] = {}
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(LOOK_PERIOD, self.look, clock=steady)
-        self.create_timer(FLUSH_PERIOD, self._flush, clock=steady)
-        self.create_timer(WATCH_PERIOD, self.watch, clock=steady)
+        self.look_every(LOOK_PERIOD, self.look)
+        self.look_every(FLUSH_PERIOD, self._flush)
+        self.look_every(WATCH_PERIOD, self.watch)
         if self.value('record'):
             self.start()
 
@@ -264,41 +253,41 @@ class RecorderNode(ArmidNode):
             self._refused[topic] = types
             return
         self._refused.pop(topic, None)
-        channel = Channel(topic, is_stamped(message_type))
+        take = partial(self._on_message, topic, is_stamped(message_type))
         self._subscriptions_by_topic[topic] = MatchedSubscription(
-            self, message_type, topic, partial(self._on_message, channel), raw=True
+            self, message_type, topic, take, raw=True
         )
 
-    def _on_message(self, channel: Channel, data: bytes) -> None:
+    def _on_message(self, topic: str, stamped: bool, data: bytes) -> None:
         writer = self._writer
         if writer is None:
             return
         now = self.get_clock().now().nanoseconds
         if now == 0:  # simulated time has not begun
             if len(self._held) < _HELD:
-                self._held.append((channel, data))
+                self._held.append((topic, stamped, data))
             else:
                 self.complaints.say('message', 'messages are lost: /clock has not begun')
             return
         if self._held:
             self._write_held(writer, now)
-        self._write(writer, channel, data, now)
+        self._write(writer, topic, stamped, data, now)
 
     def _write_held(self, writer: BagWriter, now: int) -> None:
         held, self._held = self._held, []
-        for channel, data in held:
-            self._write(writer, channel, data, now)
+        for topic, stamped, data in held:
+            self._write(writer, topic, stamped, data, now)
 
-    def _write(self, writer: BagWriter, channel: Channel, data: bytes, now: int) -> None:
-        sent = header_stamp(data) if channel.stamped else 0
+    def _write(self, writer: BagWriter, topic: str, stamped: bool, data: bytes, now: int) -> None:
+        sent = header_stamp(data) if stamped else 0
         if self._simulated:  # /clock comes now and then only, but nothing comes before it is sent
             now = max(now, sent)
         try:
-            writer.write(channel.topic, data, now, sent or now)
+            writer.write(topic, data, now, sent or now)
         except RecordingError as error:
             self._give_up(str(error))
         self._count += 1
-        self.last_stamps[channel.topic] = sent
+        self.last_stamps[topic] = sent
 
     def _flush(self) -> None:
         if self._writer is not None:

@@ -20,7 +20,6 @@ from armid_ros.view.scene import joint_axes, joint_frames
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import ColorRGBA, String
 from visualization_msgs.msg import Marker, MarkerArray
@@ -84,9 +83,8 @@ class ResidualMarkersNode(ArmidNode):
         self.create_subscription(
             Diagnosis, 'live_diagnosis/diagnosis', self._on_diagnosis, LATCHED
         )
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.joint_states.match, clock=steady)
-        self.create_timer(1.0 / self.value('rate'), self.draw, clock=steady)
+        self.look_every(_LOOK_PERIOD, self.joint_states.match)
+        self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say what is drawn, and what is missing."""

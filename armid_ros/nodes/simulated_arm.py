@@ -116,7 +116,7 @@ class SimulatedArmNode(ArmidNode):
         if start_ns is None and not self._follows:
             self._origin_ns = self.get_clock().now().nanoseconds
         self._pending: tuple[int, Reference] | None = None
-        self.real_time = RealTime(self._elapsed, self.step)
+        self.real_time = RealTime(lambda: self._arm.state.t, self.step)
         self._owed = 0.0
         self._states = self.create_publisher(
             JointState,
@@ -295,9 +295,6 @@ class SimulatedArmNode(ArmidNode):
 
     def _on_model(self, message: String) -> None:
         self._become(read_model(message.data, self._arm.plant.arm.robot, 'model'))
-
-    def _elapsed(self) -> float:
-        return float(self._arm.state.t)
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         try:

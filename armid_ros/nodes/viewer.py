@@ -18,7 +18,6 @@ from armid_ros.robots import load_robot, Robot, robot_from_urdf
 from armid_ros.view.live import LiveLog
 from armid_ros.view.rerun_log import open_stream
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -63,8 +62,7 @@ class ViewerNode(ArmidNode):
             self.create_subscription(
                 JointState, f'online_identifier/{topic}', self._on_effort(kind), DEPTH
             )
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.joint_states.match, clock=steady)
+        self.look_every(_LOOK_PERIOD, self.joint_states.match)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say what is shown."""

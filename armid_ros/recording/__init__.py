@@ -19,7 +19,14 @@ from armid_ros.recording.mcap.recover import recover, RecoveryReport
 from armid_ros.recording.partner_motion import PartnerMotion
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
-from armid_ros.recording.recording import PositionRange, ReadReport, Recording, TimeGap
+from armid_ros.recording.recording import (
+    given_twice,
+    PositionRange,
+    ReadReport,
+    Recording,
+    require_once,
+    TimeGap,
+)
 from armid_ros.recording.settings import ReadSettings
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
@@ -30,7 +37,6 @@ from armid_ros.recording.trajectory import (
     read_waypoints,
     write_joint_trajectory,
 )
-from armid_ros.recording.twice import given_twice, require_once
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [

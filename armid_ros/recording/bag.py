@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import heapq
 import os
 from pathlib import Path
@@ -23,13 +23,11 @@ from typing import Self
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular, reading
 from armid_ros.recording.compression import message_content, unpacked, ZSTD
-from armid_ros.recording.damage import Damage
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.metadata import BagMetadata, FILE_NAME, read_metadata
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic
+from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Source, Topic
 from armid_ros.recording.sqlite_source import SqliteSource
-import numpy as np
 
 _STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
     '.mcap': McapSource,
@@ -196,20 +194,13 @@ class Bag:
             messages.append(message_content(block.message(at), self._settings.memory_limit))
             size += len(messages[-1])
             self._settings.require(size, 'a block of messages')
-        length = np.array([len(message) for message in messages], np.int64)
-        start = np.cumsum(length) - length
-        return MessageBlock(b''.join(messages), start, length, block.log_time, block.publish_time)
+        return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
-@dataclass(frozen=True)
-class _Part:
-    """Sorts BAG_2.mcap before BAG_10.mcap."""
-
-    file: Path
-
-    def key(self) -> tuple[tuple[int, str], ...]:
-        pieces = re.split(r'(\d+)', self.file.name)
-        return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
+def _by_number(file: Path) -> tuple[tuple[int, str], ...]:
+    """Return what sorts BAG_2.mcap before BAG_10.mcap."""
+    pieces = re.split(r'(\d+)', file.name)
+    return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
 
 
 def _storage_suffix(file: Path) -> str:
@@ -247,4 +238,4 @@ def _files_of(path: Path) -> BagMetadata:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
             f'bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-    return BagMetadata(tuple(sorted(found, key=lambda file: _Part(file).key())))
+    return BagMetadata(tuple(sorted(found, key=_by_number)))

@@ -64,7 +64,10 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
         if compression == 'zstd':
             content = _ZSTD.decompressor.decompress(stored, max_output_size=size)
         else:
-            content = _lz4(stored, size)
+            decompressor = lz4.frame.LZ4FrameDecompressor()
+            content = bytes(decompressor.decompress(stored, max_length=size))
+            if not decompressor.eof and decompressor.decompress(b'', max_length=1):
+                raise RecordingError(f'holds more than the {size} bytes stated')
     except CORRUPT as error:
         raise RecordingError(str(error) or 'it cannot be decompressed') from error
     if len(content) != size:
@@ -80,14 +83,6 @@ class _Zstd(threading.local):
 
 
 _ZSTD = _Zstd()
-
-
-def _lz4(stored: _Buffer, size: int) -> bytes:
-    decompressor = lz4.frame.LZ4FrameDecompressor()
-    content = bytes(decompressor.decompress(stored, max_length=size))
-    if not decompressor.eof and decompressor.decompress(b'', max_length=1):
-        raise RecordingError(f'holds more than the {size} bytes stated')
-    return content
 
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:

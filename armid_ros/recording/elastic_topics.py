@@ -1,16 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Topics and bags of arms that are measured on both sides of their transmissions."""
+"""Bags of arms that are measured on both sides of their transmissions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-import re
 from typing import TYPE_CHECKING
 
 from armid_ros.motion import ElasticRun
-from armid_ros.recording.imu import write_accelerations
+from armid_ros.recording.imu import imu_topic, LINK, MOTOR, REFERENCE, write_accelerations
 from armid_ros.recording.joint_state.encoder import write_joint_states
 from armid_ros.recording.message_types import STRING
 from armid_ros.recording.qos import LATCHED
@@ -23,15 +22,6 @@ if TYPE_CHECKING:
     from armid_ros.simulation.accelerometers import LinkAccelerometers
 
 _PAUSE_NS = 10**9
-
-#: Motors as seen at the joints, links, and what the loops are asked for.
-MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
-
-
-def imu_topic(link: str) -> str:
-    """Return the topic of the accelerometer on a link, whose name ROS may not take as it is."""
-    name = re.sub('[^A-Za-z0-9_]', '_', link)
-    return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'
 
 
 def write_runs(

@@ -1,25 +1,28 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Linear accelerations as sensor_msgs/Imu, to and from bags."""
+"""Arms that are measured on both sides: their topics, and accelerations as sensor_msgs/Imu."""
 
 from __future__ import annotations
 
 from pathlib import Path
+import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import BYTE_ORDERS
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter
 import numpy as np
 import numpy.typing as npt
 
+#: Motors as seen at the joints, links, and what the loops are asked for.
+MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
 #: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
 _NUMBERS = 37
 _ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
-_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 
 
 def write_accelerations(
@@ -90,7 +93,7 @@ def read_accelerations(
         messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
     if not messages:
         raise RecordingError(f'{path}: {topic} has no messages')
-    order = _ORDERS.get(messages[0][:2])
+    order = BYTE_ORDERS.get(messages[0][:2])
     if order is None or len(messages[0]) < 16:
         raise RecordingError(f'{path}: {topic} is not CDR')
     layout = _layout(int(np.frombuffer(messages[0], order + 'u4', 1, 12)[0]), order)
@@ -124,3 +127,9 @@ def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
             'itemsize': 4 + padded + 8 * _NUMBERS,
         }
     )
+
+
+def imu_topic(link: str) -> str:
+    """Return the topic of the accelerometer on a link, whose name ROS may not take as it is."""
+    name = re.sub('[^A-Za-z0-9_]', '_', link)
+    return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import struct
 from typing import Any
 
 from armid_ros.errors import RecordingError
@@ -26,6 +27,9 @@ from rosbags.typesys.store import Typestore
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 STRING = 'std_msgs/msg/String'
+#: Byte order of CDR, by what it begins with.
+BYTE_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
+_BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_from
 
 
 @dataclass(frozen=True)
@@ -130,3 +134,9 @@ def _installed(name: str, environment: Mapping[str, str]) -> str:
         f'type {name} is not known: give its definition, or source the workspace that has '
         f'{package} (looked below {", ".join(prefixes) or "an empty AMENT_PREFIX_PATH"})'
     )
+
+
+def header_stamp(data: bytes) -> int:
+    """Return the stamp of a serialised message that begins with a header [ns]; 0 if unset."""
+    seconds, nanoseconds = (_LITTLE if data[1] & 1 else _BIG)(data, 4)
+    return int(seconds) * 10**9 + int(nanoseconds)

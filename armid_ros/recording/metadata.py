@@ -125,7 +125,11 @@ def read_metadata(bag: Path) -> BagMetadata:
     try:
         with reading('', RecordingError):
             information = load_yaml(text)['rosbag2_bagfile_information']
-            names = _file_names(information['relative_file_paths'])
+            names = information['relative_file_paths']
+            if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+                raise ValueError('relative_file_paths is no list of names')
+            if len(set(names)) != len(names):
+                raise ValueError('relative_file_paths names a file twice')
             mode = str(information.get('compression_mode') or '').lower()
             counts = _counts(information.get('topics_with_message_count'))
     except RecordingError as error:
@@ -142,14 +146,6 @@ def read_metadata(bag: Path) -> BagMetadata:
             f'{path}: names {", ".join(missing)}, which the bag does not have; it has {present}'
         )
     return BagMetadata(files, '' if mode == 'none' else mode, counts)
-
-
-def _file_names(names: Any) -> list[str]:
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ValueError('relative_file_paths is no list of names')
-    if len(set(names)) != len(names):
-        raise ValueError('relative_file_paths names a file twice')
-    return names
 
 
 def _counts(entries: Any) -> dict[str, int]:

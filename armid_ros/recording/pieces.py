@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
@@ -18,7 +17,6 @@ from armid_ros.recording.recording import Recording
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 import numpy as np
-import numpy.typing as npt
 
 #: Returns the stamp [ns] from which on samples of a piece are to be in the next one as well.
 Keep = Callable[[Recording], int]
@@ -92,7 +90,7 @@ def _parts(bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int) -> Ite
         for block in joint_state_blocks(bag, topic):
             for states in decoder.decode(block):
                 for start in range(0, len(states), most):
-                    yield _part(states, slice(start, start + most))
+                    yield states.select(slice(start, start + most))
 
 
 def _from(held: Sequence[JointStates], stamp: int, clock: str) -> Iterator[JointStates]:
@@ -100,21 +98,4 @@ def _from(held: Sequence[JointStates], stamp: int, clock: str) -> Iterator[Joint
     for states in held:
         late = (states.header if clock == 'header' else states.receive) >= stamp
         if late.any():
-            yield _part(states, np.flatnonzero(late))
-
-
-def _part(states: JointStates, which: slice | npt.NDArray[np.intp]) -> JointStates:
-    """Return some of the messages."""
-    q, dq, tau = (
-        None if values is None else values[which]
-        for values in (states.position, states.velocity, states.effort)
-    )
-    return replace(
-        states,
-        number=states.number[which],
-        header=states.header[which],
-        receive=states.receive[which],
-        position=q,
-        velocity=dq,
-        effort=tau,
-    )
+            yield states.select(np.flatnonzero(late))

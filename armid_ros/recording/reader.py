@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.errors import nearest, RecordingError
@@ -17,7 +16,6 @@ from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.recording import (
-    Clock,
     PositionRange,
     ReadReport,
     Recording,
@@ -133,19 +131,27 @@ def assemble(
     gathered = gather(pieces)
     pieces.clear()
     clock, note = choose_clock(gathered)
-    if clock == 'receive':
-        _check_receive_clock(where, gathered, note)
+    for states in gathered if clock == 'receive' else ():
+        problem = clock_problem(states.receive, states.position)
+        if problem:
+            raise RecordingError(
+                f'{where} has no usable time: {note}, and receive times {problem}'
+            )
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
     q, dq, tau, absent = _measured_quantities(where, series)
     kept, culprits = _finite(where, joints, series.stamps, (q, dq, tau), counts)
     q, dq, tau, stamps = kept
     if len(stamps) < 2:
+        dropped = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
         raise RecordingError(
             f'{where}: {len(stamps)} samples are left of {decoder.messages} messages '
-            f'({_counted(counts) or "the bag is too short"})'
+            f'({", ".join(dropped) or "the bag is too short"})'
         )
     t = (stamps - stamps[0]) * 1e-9
     q, wrapped = unwrapped(q)
+    if damage:
+        read = f'{decoder.messages} messages over {t[-1]:.4g} s could be read'
+        damage = f'of a damaged bag {read}: {damage}'
     report = ReadReport(
         messages=decoder.messages,
         samples=len(stamps),
@@ -155,32 +161,9 @@ def assemble(
         absent=absent,
         unwrapped=tuple(joints[k] for k in wrapped),
         clock_note=note,
-        damage=_with_what_is_left(damage, decoder.messages, float(t[-1])),
+        damage=damage,
         **counts,
     )
-    recording = _recording(path, topic, joints, int(stamps[0]), t, (q, dq, tau), clock, report)
-    others = tuple(PositionRange(name, *ends) for name, ends in decoder.others.items())
-    return replace(recording, others=others)
-
-
-def _with_what_is_left(damage: str, messages: int, duration: float) -> str:
-    """Say of a damaged bag what could be read of it, before what is wrong with it."""
-    if not damage:
-        return ''
-    return f'of a damaged bag {messages} messages over {duration:.4g} s could be read: {damage}'
-
-
-def _recording(
-    path: str,
-    topic: str,
-    joints: tuple[str, ...],
-    start_ns: int,
-    t: FloatArray,
-    values: tuple[FloatArray, FloatArray | None, FloatArray | None],
-    clock: Clock,
-    report: ReadReport,
-) -> Recording:
-    q, dq, tau = values
     for array in (t, q, dq, tau):
         if array is not None:
             array.setflags(write=False)  # nobody else has it, so that it need not be copied
@@ -190,11 +173,12 @@ def _recording(
         q=q,
         dq=dq,
         tau=tau,
-        start_ns=start_ns,
+        start_ns=int(stamps[0]),
         source=path,
         topic=topic,
         clock=clock,
         report=report,
+        others=tuple(PositionRange(name, *ends) for name, ends in decoder.others.items()),
     )
 
 
@@ -268,32 +252,16 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
             f'{where}: none of {decoder.messages} messages names a joint; '
             f'{decoder.first_problem or "the names are empty"}'
         )
+    listed = ', '.join(f"'{name}'" for name in missing)
+    found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
+    hint = (
+        f"; if '{found}' is '{missing[0]}', say --rename {found}:{missing[0]}; if it is another "
+        'one, --joints names those to read'
+    )
     raise RecordingError(
-        f'{where} does not name {_joint_list(missing)}; '
-        f'its joints are {", ".join(decoder.names_seen)}'
-        f'{_renaming(missing[0], [name for name in decoder.names_seen if name not in joints])}'
+        f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
+        f'its joints are {", ".join(decoder.names_seen)}{hint if found else ""}'
     )
-
-
-def _renaming(joint: str, others: Sequence[str]) -> str:
-    """Say how a joint that is missing is read from another one whose name is like it."""
-    found = nearest(joint, others)
-    if not found:
-        return ''
-    return (
-        f"; if '{found}' is '{joint}', say --rename {found}:{joint}; if it is another one, "
-        f'--joints names those to read'
-    )
-
-
-def _check_receive_clock(where: str, gathered: Sequence[JointStates], note: str) -> None:
-    """Refuse a recording without a time."""
-    for states in gathered:
-        problem = clock_problem(states.receive, states.position)
-        if problem:
-            raise RecordingError(
-                f'{where} has no usable time: {note}, and receive times {problem}'
-            )
 
 
 def _measured_quantities(
@@ -340,14 +308,3 @@ def _finite(
     q, dq, tau = (None if array is None else array[~bad] for array in values)
     assert q is not None
     return (q, dq, tau, stamps[~bad]), culprits
-
-
-def _counted(counts: Counter[str]) -> str:
-    return ', '.join(
-        f'{count} {name.replace("_", " ")}' for name, count in counts.items() if count
-    )
-
-
-def _joint_list(names: Sequence[str]) -> str:
-    quoted = ', '.join(f"'{name}'" for name in names)
-    return f'joint {quoted}' if len(names) == 1 else f'joints {quoted}'

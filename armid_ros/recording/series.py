@@ -153,6 +153,11 @@ def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> JointSam
     if not stamped.all():
         counts['unstamped'] += int((~stamped).sum())
         series = series.select(stamped)
+    return longest_in_order(series, counts)
+
+
+def longest_in_order(series: JointSamples, counts: Counter[str]) -> JointSamples:
+    """Return the longest stretch between restarts of the clock, in order of time."""
     run = longest_run(series.stamps)
     if run is not None:
         counts['restarted'] += len(series) - (run.stop - run.start)
@@ -247,13 +252,7 @@ def _concatenated(joints: tuple[str, ...], parts: Sequence[JointStates]) -> Join
     )
     if (np.diff(number) > 0).all():
         return whole
-    order = np.argsort(number, kind='stable')
-    q, dq, tau = (
-        None if v is None else v[order] for v in (whole.position, whole.velocity, whole.effort)
-    )
-    return JointStates(
-        joints, number[order], whole.header[order], whole.receive[order], q, dq, tau
-    )
+    return whole.select(np.argsort(number, kind='stable'))
 
 
 def _stacked(

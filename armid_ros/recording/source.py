@@ -10,7 +10,7 @@ one in the order of time, for playing them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import mmap
 from typing import NamedTuple, Protocol
@@ -21,6 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 IntArray = npt.NDArray[np.int64]
+#: Problems said one by one; a file that is damaged all over is not described byte by byte.
+_SAID = 8
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,15 @@ class MessageBlock:
     log_time: IntArray
     publish_time: IntArray
 
+    @classmethod
+    def joined(
+        cls, messages: Sequence[bytes], log_time: IntArray, publish_time: IntArray
+    ) -> MessageBlock:
+        """Return messages in a buffer of their own."""
+        length = np.array([len(message) for message in messages], np.int64)
+        start = np.cumsum(length) - length
+        return cls(b''.join(messages), start, length, log_time, publish_time)
+
     def __len__(self) -> int:
         """Return the number of messages."""
         return len(self.start)
@@ -94,6 +105,27 @@ class RawMessage(NamedTuple):
     log_time_ns: int
     publish_time_ns: int
     cdr: bytes
+
+
+class Damage:
+    """A list of what is wrong; the same is said once."""
+
+    def __init__(self) -> None:
+        self._problems: dict[str, None] = {}
+
+    def __bool__(self) -> bool:
+        """Return whether something is wrong."""
+        return bool(self._problems)
+
+    def __str__(self) -> str:
+        """Return what is wrong; empty when nothing is."""
+        said = list(self._problems)[:_SAID]
+        more = len(self._problems) - len(said)
+        return '; '.join([*said, *([f'and {more} more'] if more else [])])
+
+    def add(self, problem: str) -> None:
+        """Note a problem."""
+        self._problems[problem] = None
 
 
 class Source(Protocol):

@@ -18,11 +18,10 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import is_file, open_regular
-from armid_ros.recording.damage import Damage
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import MessageBlock, RawMessage, Topic
+from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Topic
 import numpy as np
 
 _BLOCK_MESSAGES = 4096
@@ -119,9 +118,7 @@ class SqliteSource:
         )
         for rows in self._fetch(query, (topic,)):
             times = np.array([time for time, _ in rows], np.int64)
-            length = np.array([len(data) for _, data in rows], np.int64)
-            data = b''.join([data for _, data in rows])
-            yield MessageBlock(data, np.cumsum(length) - length, length, times, times)
+            yield MessageBlock.joined([data for _, data in rows], times, times)
 
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order they were logged."""
@@ -136,7 +133,7 @@ class SqliteSource:
     def _opened(self, settings: ReadSettings) -> dict[str, set[str]]:
         """Return the columns of the tables, once the file is known to be one of rosbag2."""
         database = self._database
-        database.text_factory = _lenient
+        database.text_factory = lambda text: text.decode('utf-8', 'replace')
         database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(settings.memory_limit, _LONGEST))
         with suppress(sqlite3.Error):  # not known to old versions
             database.execute('PRAGMA trusted_schema = OFF')
@@ -206,10 +203,6 @@ class SqliteSource:
             self._damage.add(f'the database is damaged: {error}')
         if rows:
             yield rows
-
-
-def _lenient(text: bytes) -> str:
-    return text.decode('utf-8', 'replace')
 
 
 def _text(value: object) -> str:

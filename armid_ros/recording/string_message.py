@@ -9,10 +9,8 @@ import struct
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import STRING
+from armid_ros.recording.message_types import BYTE_ORDERS, STRING
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-
-_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 
 
 def string_cdr(text: str) -> bytes:
@@ -23,7 +21,7 @@ def string_cdr(text: str) -> bytes:
 
 def parse_string(cdr: bytes) -> str | None:
     """Return the text of a std_msgs/String; None if the bytes are none."""
-    order = _ORDERS.get(cdr[:2])
+    order = BYTE_ORDERS.get(cdr[:2])
     if order is None or len(cdr) < 8:
         return None
     (length,) = struct.unpack_from(order + 'I', cdr, 4)

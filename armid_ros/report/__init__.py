@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Reports and figures: what was found, for a person to read and to believe.
+Reports: what was found, for a person to read.
 
 ``identification_report`` makes report.html. A `Page` of `Section`s is the frame of every report;
-`Chart` and `BarChart` draw in it. ``armid_ros.report.figures`` draws figures for documents.
+`Chart` and `BarChart` draw in it; ``armid_ros.report.figures`` has the style of figure files.
 
 """
 

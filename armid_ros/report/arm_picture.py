@@ -4,31 +4,31 @@
 An arm as sticks, from the side that shows most of it.
 
 A body is drawn from its joint to the joints that it carries; the last one to beyond its centre of
-mass. A joint that slides is drawn as the way from where it is fixed to where it is. Of some poses
-and directions the one is taken in which the arm covers the largest area.
+mass. A joint that slides is drawn from where it is fixed to where it is. Of some poses and
+directions the one is taken in which the arm covers the largest area. Names stand in a column at
+the right, with a line from each to its joint.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 
 from armid_ros.motion import FloatArray
 from armid_ros.report.strip import Camera
 from armid_ros.robots import Robot
+from armid_ros.robots.sticks import sticks
 import numpy as np
 import pinocchio as pin
 
 _HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
-#: Names are so far above their joints, a line is so high, a letter about so wide [px].
-_ABOVE, _LINE, _LETTER = 14.0, 14.0, 8.5
-#: Half of the width of a line [px], and points of it that are held against a name.
-_HALF, _SAMPLES = 4.5, 100
+#: Height of a line of text and width of a letter [px].
+_LINE, _LETTER = 16.0, 8.5
 _VIEWS = tuple(Camera(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
-#: Poses that are tried, and how far the last body is drawn beyond its centre of mass.
-_POSES, _BEYOND = 12, 2.0
+#: Poses that are tried.
+_POSES = 12
 #: Points nearer to each other than this are one [m].
 _SAME = 1e-4
 
@@ -62,15 +62,11 @@ class Dot:
     Attributes
     ----------
     x, y : float
-        Where [px].
+        Position [px].
     name : str
         The joint.
     marked : bool
         Whether it is to be pointed out.
-    label_x, label_y : float
-        Where its name is written [px].
-    anchor : str
-        What of the name is there: 'start', 'middle' or 'end'.
 
     """
 
@@ -78,9 +74,6 @@ class Dot:
     y: float
     name: str
     marked: bool
-    label_x: float
-    label_y: float
-    anchor: str
 
 
 @dataclass(frozen=True)
@@ -98,8 +91,8 @@ class ArmPicture:
         Joints, those to be pointed out last.
     base : tuple of float
         Where the arm is fixed [px].
-    above : float
-        How far names reach beyond the upper edge [px].
+    labels : tuple of (Dot, float, float)
+        Joints to be pointed out, and where the name of each begins [px].
 
     """
 
@@ -108,7 +101,7 @@ class ArmPicture:
     sticks: tuple[Stick, ...]
     dots: tuple[Dot, ...]
     base: tuple[float, float]
-    above: float = 0.0
+    labels: tuple[tuple[Dot, float, float], ...]
 
 
 def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -> ArmPicture:
@@ -141,31 +134,36 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         x, y = scale * (point - low)
         return round(left + float(x), 1), round(_EDGE + float(scale * size[1] - y), 1)
 
-    owners = [*_slides(robot), *(owner for owner, _, _ in _bodies(robot.model))]
+    owners = [*_slides(robot), *(owner for owner, _ in sticks(robot.model))]
     ways = [
         Stick(*place(line[0]), *place(line[1]), owner > 0 and robot.joints[owner - 1] in marked)
         for owner, line in zip(owners, lines, strict=True)
         if np.ptp(line, axis=0).max() > _SAME
     ]
     origins = {owner: line[0] for owner, line in zip(owners, lines, strict=True)}
-    dots = _apart(
-        [
-            _dot(place(origins[k + 1]), name, name in marked, width)
-            for k, name in enumerate(robot.joints)
-        ],
-        ways,
-        width,
-    )
+    dots = [
+        Dot(*place(origins[k + 1]), name, name in marked) for k, name in enumerate(robot.joints)
+    ]
+    height = float(scale * size[1]) + 2 * _EDGE
+    named = sorted((dot for dot in dots if dot.marked), key=lambda dot: dot.y)
+    lines_at = _spread([dot.y for dot in named])
+    letters = max((len(dot.name) for dot in named), default=0)
     return ArmPicture(
-        round(width, 1),
-        round(float(scale * size[1]) + 2 * _EDGE, 1),
+        round(width + _LETTER * letters, 1),
+        round(max([height, *(y + _LINE for y in lines_at)]), 1),
         tuple(sorted(ways, key=lambda way: way.marked)),
         tuple(sorted(dots, key=lambda dot: dot.marked)),
         place(origins[0]),
-        round(
-            max(0.0, _LINE - min((dot.label_y for dot in dots if dot.marked), default=_LINE)), 1
-        ),
+        tuple((dot, round(width, 1), y) for dot, y in zip(named, lines_at, strict=True)),
     )
+
+
+def _spread(heights: Sequence[float]) -> list[float]:
+    """Return heights in order, at least a line of text apart."""
+    apart: list[float] = []
+    for y in heights:
+        apart.append(max(y, apart[-1] + _LINE) if apart else y)
+    return apart
 
 
 def _middle(robot: Robot) -> FloatArray:
@@ -175,18 +173,6 @@ def _middle(robot: Robot) -> FloatArray:
     middle = np.zeros(len(lower))
     middle[ended] = (lower[ended] + upper[ended]) / 2.0
     return middle
-
-
-def _bodies(model: pin.Model) -> list[tuple[int, FloatArray, FloatArray]]:
-    """Return lines in the frames of the joints that carry them: joint, beginning and end."""
-    nothing, lines = np.zeros(3), []
-    for joint in range(model.njoints):
-        carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
-        ends = [np.array(model.jointPlacements[k].translation) for k in carried]
-        if joint and not ends:
-            ends = [_BEYOND * np.array(model.inertias[joint].lever)]
-        lines += [(joint, nothing, end) for end in ends]
-    return lines
 
 
 def _slides(robot: Robot) -> list[int]:
@@ -207,79 +193,11 @@ def _flat(robot: Robot, q: FloatArray, view: Camera) -> FloatArray:
         for k in _slides(robot)
     ]
     bodies = [
-        [data.oMi[joint].act(start), data.oMi[joint].act(end)]
-        for joint, start, end in _bodies(robot.model)
+        [data.oMi[joint].translation, data.oMi[joint].act(end)]
+        for joint, end in sticks(robot.model)
     ]
     return view.flat(np.array([*ways, *bodies]))
 
 
 def _area(lines: FloatArray) -> float:
     return float(np.prod(np.ptp(lines.reshape(-1, 2), axis=0) + 1e-3))
-
-
-def _dot(at: tuple[float, float], name: str, marked: bool, width: float) -> Dot:
-    """Return a joint with its name above it, inside the drawing."""
-    x, y = at
-    side = 'start' if x < width / 4.0 else 'end' if x > 3.0 * width / 4.0 else 'middle'
-    shift = {'start': -8.0, 'end': 8.0, 'middle': 0.0}[side]
-    return Dot(x, y, name, marked, round(x + shift, 1), round(y - _ABOVE, 1), side)
-
-
-def _apart(dots: Sequence[Dot], sticks: Sequence[Stick], width: float) -> list[Dot]:
-    """Return joints with names where nothing else is; else above each other."""
-    result: list[Dot] = []
-    for dot in dots:
-        free = next((one for one in _places(dot) if _free(one, result, sticks, width)), None)
-        if free is not None:
-            result.append(free)
-            continue
-        y = dot.label_y
-        near = [other for other in result if other.marked and _one_above_other(other, dot)]
-        while dot.marked and (over := [o.label_y for o in near if abs(o.label_y - y) < _LINE]):
-            y = min(over) - _LINE
-        result.append(replace(dot, label_y=round(y, 1)))
-    return result
-
-
-def _places(dot: Dot) -> Iterator[Dot]:
-    """Yield where the name of a joint that is pointed out may be: above, beside or below it."""
-    if not dot.marked:
-        return
-    yield dot
-    level, below = round(dot.y + _LINE / 3.0, 1), round(dot.y + _ABOVE + _LINE, 1)
-    yield replace(dot, label_x=round(dot.x + _ABOVE, 1), label_y=level, anchor='start')
-    yield replace(dot, label_x=round(dot.x - _ABOVE, 1), label_y=level, anchor='end')
-    yield replace(dot, label_y=below)
-
-
-def _free(dot: Dot, others: Sequence[Dot], sticks: Sequence[Stick], width: float) -> bool:
-    """Return whether a name is within the drawing, and over no line and no other name."""
-    start, end = _reach(dot)
-    if start < 0.0 or end > width:
-        return False
-    if any(
-        other.marked and _one_above_other(other, dot) and abs(other.label_y - dot.label_y) < _LINE
-        for other in others
-    ):
-        return False
-    share = np.linspace(0.0, 1.0, _SAMPLES)
-    for stick in sticks:
-        x = stick.x1 + share * (stick.x2 - stick.x1)
-        y = stick.y1 + share * (stick.y2 - stick.y1)
-        beside = (x > start - _HALF) & (x < end + _HALF)
-        if np.any(beside & (y > dot.label_y - _LINE) & (y < dot.label_y + 2.0 * _HALF)):
-            return False
-    return True
-
-
-def _one_above_other(one: Dot, other: Dot) -> bool:
-    """Return whether two names would be printed over one another on one line."""
-    (left, right), (start, end) = _reach(one), _reach(other)
-    return left < end and start < right
-
-
-def _reach(dot: Dot) -> tuple[float, float]:
-    """Return from where to where a name is written [px]."""
-    length = _LETTER * len(dot.name)
-    start = dot.label_x - {'start': 0.0, 'middle': length / 2.0, 'end': length}[dot.anchor]
-    return start, start + length

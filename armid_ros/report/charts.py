@@ -10,10 +10,13 @@ for dark and one for paper.
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 import json
+import struct
 from typing import Any, Literal
+import zlib
 
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.report.page import render
@@ -235,3 +238,34 @@ def script_json(data: dict[str, Any]) -> Markup:
     for character in '<>&\u2028\u2029':
         text = text.replace(character, f'\\u{ord(character):04x}')
     return Markup(text)
+
+
+def image_data(colour: FloatArray, strength: FloatArray) -> str:
+    """
+    Return a PNG image as a data URL.
+
+    Parameters
+    ----------
+    colour : ndarray, shape (H, W, 3)
+        Red, green and blue, 0 to 1.
+    strength : ndarray, shape (H, W)
+        Opacity, clipped to 0 to 1.
+
+    """
+    pixels = np.concatenate([colour, np.clip(np.abs(strength), 0.0, 1.0)[..., None]], axis=-1)
+    height, width = strength.shape
+    rows = np.rint(255.0 * pixels).astype(np.uint8).reshape(height, -1)
+    no_filter = np.zeros((height, 1), dtype=np.uint8)
+    chunks = {
+        b'IHDR': struct.pack('>IIBBBBB', width, height, 8, 6, 0, 0, 0),
+        b'IDAT': zlib.compress(np.hstack([no_filter, rows]).tobytes()),
+        b'IEND': b'',
+    }
+    png = b'\x89PNG\r\n\x1a\n' + b''.join(
+        struct.pack('>I', len(content))
+        + kind
+        + content
+        + struct.pack('>I', zlib.crc32(kind + content))
+        for kind, content in chunks.items()
+    )
+    return f'data:image/png;base64,{b64encode(png).decode()}'

@@ -96,9 +96,9 @@ def _sum(comparison: Comparison) -> str:
     if not changed and not comparison.changed_together:
         but = ''
         if comparison.unusable:
-            but = ', which is no evidence beside an unusable model'
+            but = ', but an unusable model is no evidence'
         elif comparison.changed_residuals:
-            but = ', but what the models leave of the torque did'
+            but = ', but the residuals did'
         return (
             f'None of {counted(count, "parameter")}{both} changed beyond its uncertainty'
             f'{but}{also}.'
@@ -122,13 +122,13 @@ def _details(comparison: Comparison) -> Sequence[str]:
     apart = [c for c in changed if comparison.load is None or not c.parameter.rigid]
     told += [_sentence(change) for change in apart[:_TOLD]]
     if len(apart) > _TOLD:
-        told.append(f'The table has {len(apart) - _TOLD} more.')
+        told.append(f'{len(apart) - _TOLD} more are in the table.')
     rigid = [c for c in changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
         last = rigid[0].parameter.joint
         told.append(
-            f'Mostly inertial parameters changed, {last} the surest: a tool or load was added or '
-            'taken away, or the gravity or mounting is another.'
+            f'Mostly inertial parameters changed, most clearly at {last}: a tool or load was '
+            'added or removed, or gravity or mounting differ.'
         )
     return told
 
@@ -137,7 +137,7 @@ def _unusable(one: ParameterFile) -> str:
     assert one.fit is not None
     reason = one.fit.reason.rstrip('.')
     reason = reason[:1].lower() + reason[1:]
-    return f'{one.source} is unusable, and armid diagnose finds what the model lacks: {reason}.'
+    return f'{one.source} is unusable: {reason}. Run armid diagnose to find what the model lacks.'
 
 
 def _residual(change: ResidualChange, comparison: Comparison) -> str:
@@ -148,15 +148,15 @@ def _residual(change: ResidualChange, comparison: Comparison) -> str:
     if errors[0] is not None and errors[1] is not None:
         said = f' ({errors[0]:.2g} % of it before, {errors[1]:.2g} % after)'
     return (
-        f'Of the torque of {change.joint} the {ranks[0]} model leaves {times:.2g} times as much '
-        f'as the {ranks[1]}{said}: {_why_left(comparison)}.'
+        f'{change.joint}: the residual of the {ranks[0]} model is {times:.2g} times that of the '
+        f'{ranks[1]}{said}; {_why_left(comparison)}.'
     )
 
 
 def _why_left(comparison: Comparison) -> str:
     """Say what a residual that differs may come from."""
     if any(one.why == 'effect' for one in comparison.not_compared):
-        return 'the models have other effects, which may be why'
+        return 'the models have different effects, which may be the reason'
     ask = '' if comparison.unusable else '; armid diagnose finds what does'
     return f'no parameter of either explains that{ask}'
 
@@ -169,16 +169,16 @@ def _load(comparison: Comparison) -> str:
         f'the link of {joints[number]}' if number in joints else f'link {number}'
         for number in (load.link, *load.rivals)
     ]
-    verb = 'was added to' if load.mass > 0.0 else 'was taken off'
+    verb = 'was added to' if load.mass > 0.0 else 'was removed from'
     where = ''
     if load.center is not None:
         where = f', its centre at ({", ".join(f"{x:z.3f}" for x in load.center)}) m of its joint'
     rivals = ''
     if load.rivals:
-        rivals = f'; on {" or ".join(named[1:])} it would do so as well'
+        rivals = f'; it may as well be on {" or ".join(named[1:])}'
     return (
         f'A load of {" ± ".join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))} kg {verb} '
-        f'{named[0]}{where}: that explains every change of the inertial parameters{rivals}.'
+        f'{named[0]}{where}. It explains every change of the inertial parameters{rivals}.'
     )
 
 
@@ -188,10 +188,10 @@ def _number(name: ParameterName) -> int:
 
 
 def _together(group: GroupChange) -> str:
-    what = f'What acts at {group.joint}' if group.joint else 'The rigid body'
+    what = f'Effects at {group.joint}' if group.joint else 'The rigid body'
     return (
-        f'{what} changed as a whole (p = {group.p_value:.1g}), though no single one of its '
-        f'{len(group.parameters)} parameters is beyond doubt.'
+        f'{what} changed as a group (p = {group.p_value:.1g}), though none of its '
+        f'{len(group.parameters)} parameters alone is significant.'
     )
 
 
@@ -218,11 +218,11 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
     known = [c for c in worn if excludes_zero(c.before, c.before_std)]
     if not known:
-        return 'Nothing is known of how large a change would have been seen.'
+        return 'The smallest detectable change is unknown.'
     shares = sorted(3.5 * c.std / abs(c.before) for c in known)
     return (
-        f'A change of {100.0 * shares[0]:.2g} % of the best known and of '
-        f'{100.0 * shares[len(shares) // 2]:.2g} % of a typical one would have been seen.'
+        f'Smallest detectable change: {100.0 * shares[0]:.2g} % for the best-determined '
+        f'parameter, {100.0 * shares[len(shares) // 2]:.2g} % for the median one.'
     )
 
 
@@ -230,23 +230,22 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
     lines = []
     for given in (comparison.before, comparison.after):
         if given.fit is None:
-            lines.append(f'{given.source} does not say how well its model fits.')
+            lines.append(f'{given.source} has no fit error.')
         if given.covariance is None:
             lines.append(
-                f'{given.source} has deviations without covariance: parameters are compared one '
-                'by one alone, and changes that only show in several of them go unseen.'
+                f'{given.source} has standard deviations without covariance. Parameters are '
+                'compared one by one, so joint changes of several are missed.'
             )
     fits = comparison.before.fit, comparison.after.fit
     if all(fits) and not comparison.residuals:
         lines.append(
-            'What the two models leave of the torque is not compared: the files have it of other '
-            'rows, or not by joint.'
+            'Residuals are not compared: the files have them of other rows, or not by joint.'
         )
     known = comparison.before.kinematics and comparison.after.kinematics  # one robot, then
     if not known and comparison.before.robot != comparison.after.robot:
         lines.append(
             f'The robots have different names, {comparison.before.robot} and '
-            f'{comparison.after.robot}, and nothing shows that they are one.'
+            f'{comparison.after.robot}; they may not be the same.'
         )
     return tuple(lines)
 

@@ -189,8 +189,8 @@ def _verdict(
     notes = [with_names(note, names) for note in diagnosis.notes]
     if worse:
         notes.append(
-            f'Driven by the recorded torques, the patched model is farther off than the model '
-            f'before in {", ".join(worse)}: see forward validation.'
+            f'Driven by the recorded torques, the patched model has larger position errors than '
+            f'before in {", ".join(worse)}; see Forward validation.'
         )
     summary = _printed(with_names(diagnosis.summary, names))
     return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
@@ -249,10 +249,10 @@ def _of_maps(residual: Residual | None) -> list[str]:
     steps = []
     for one in () if residual is None else residual.joints:
         if one.law is None:
-            steps.append(f'Look at {one.joint} where its map is strong: gear, cables, stops.')
+            steps.append(f'Inspect gear, cables and stops of {one.joint} where its map is strong.')
         else:
             steps.append(
-                f'If {one.law.text} makes sense for {one.joint}, write it as an effect of your '
+                f'If {one.law.text} is plausible for {one.joint}, write it as an effect of your '
                 'own and diagnose again.'
             )
     return steps

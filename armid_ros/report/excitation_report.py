@@ -26,6 +26,7 @@ from armid_ros.excitation import (
 from armid_ros.excitation.fitness import FIT, UNFIT
 from armid_ros.motion import FloatArray
 from armid_ros.report.families import effects_in_words, full_label
+from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -158,60 +159,70 @@ def _verdict(
         full_label(name, links) for name, s in zip(names, std, strict=True) if not np.isfinite(s)
     ]
     seen = len(names) - len(unseen)
-    sentences = [f'The run tells {seen} of {len(names)} parameters apart.']
+    sentences = [f'{seen} of {len(names)} parameters can be identified.']
     if not unseen:
         sentences = [
-            f'The run tells all {len(names)} parameters apart; the condition number of the '
-            f'weighted regressor is {information.condition:.3g}.'
+            f'All {len(names)} parameters can be identified (condition number '
+            f'{information.condition:.3g}: {_conditioning(information.condition)}).'
         ]
         worst = int(np.argmax(std / information.scale))
         sentences.append(
-            f'Known worst will be {full_label(names[worst], links)}: '
+            f'The least accurate will be {full_label(names[worst], links)}: '
             f'± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
     sentences.insert(0, _kept(shares, design.limits, checked))
     beware = []
     if unseen:
-        beware.append(f'Not seen at all: {", ".join(unseen)}.')
+        beware.append(f'Not identifiable from this run: {", ".join(unseen)}.')
     if design.stopped:
         beware.append(
-            f'The search was stopped early ({design.stopped}): this is the best so far, and the '
-            'same seed need not give it again.'
+            f'The search was stopped early ({design.stopped}). This is the best result so far; '
+            'the same seed may give another one.'
         )
     if settings.acceleration is None and settings.limits is None:
         beware.append(
-            'A URDF has no acceleration limits; each joint was taken to reach its top speed in '
-            '0.25 s.'
+            'Acceleration limits are assumed, as a URDF has none: each joint reaches its top '
+            'speed in 0.25 s.'
         )
     if settings.noise is None:
         beware.append(
-            'The deviations are for a torque noise of 1 % of the torque limits, which nobody has '
-            'measured.'
+            'The standard deviations assume a torque noise of 1 % of the torque limits; it was '
+            'not measured.'
         )
     if notes:
-        beware.append('Not all bodies were looked at; see Clearance.')
+        beware.append('Not all bodies were checked for collision; see Clearance.')
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
     return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware)
+
+
+def _conditioning(condition: float) -> str:
+    """Return a condition number in words, with the limit of the usual advice."""
+    word = 'good' if condition < GOOD_CONDITION else 'weak'
+    if GOOD_CONDITION <= condition < WEAK_CONDITION:
+        word = 'fair'
+    return word if word == 'good' else f'{word}; below {GOOD_CONDITION:g} is good'
 
 
 def _kept(shares: Mapping[str, FloatArray], limits: Limits, checked: Fitness) -> str:
     """Say that limits and clearance are kept, where it is tightest, and what was not checked."""
     name, share = max(shares.items(), key=lambda item: float(item[1].max()))
     joint = limits.joints[int(share.argmax())]
-    text = f'It keeps every limit, nearest is the {name} of {joint} at {100.0 * share.max():.0f} %'
+    text = (
+        f'All limits are kept; the closest is the {name} of {joint} at {100.0 * share.max():.0f} %'
+    )
     nearest = checked.nearest
     if nearest is not None:
         text += (
-            f'; nothing comes closer than {nearest.first} and {nearest.second}, '
-            f'{100.0 * nearest.distance:.1f} cm apart at {nearest.time:.1f} s'
+            f'. The smallest clearance is {100.0 * nearest.distance:.1f} cm, between '
+            f'{nearest.first} and {nearest.second} at {nearest.time:.1f} s'
         )
     if checked.lowest.link:
         text += f'; {checked.height()} at {checked.lowest.time:.1f} s'
     if checked.unchecked:
         missing = '; '.join(checked.unchecked)
-        text += f'; it is fit to run only if this is right, which was not checked: {missing}'
+        text += f'. Not checked, confirm before running: {missing}'
     return f'{text}.'
 
 
@@ -225,26 +236,25 @@ def _asked(
 ) -> list[tuple[str, str]]:
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
-    focus = f'; above all {", ".join(settings.focus)}' if settings.focus else ''
+    focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
     start = 'the trajectory itself' if run.start is None else _numbers(run.start)
     if whole is not None:
         start = (
-            f'{_numbers(whole.approach.q[0])}, from where it takes '
-            f'{whole.approach.duration:.1f} s to get to it'
+            f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
         )
     return [
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),
         ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
         ('Effects', effects_in_words(arm.effects)),
-        ('To be seen', f'{TARGETS[settings.target]}{focus}'),
+        ('Target', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
         ('Speed', _speed(settings)),
         (
             'Run',
             f'{run.n_periods} periods of {run.trajectory.period:.4g} s, '
-            f'{counted(run.trajectory.harmonics, "harmonic")}, {run.run_in:.3g} s to get in and '
-            f'as long to get out; from {start}',
+            f'{counted(run.trajectory.harmonics, "harmonic")}, {run.run_in:.3g} s of '
+            f'fade-in and of fade-out; from {start}',
         ),
         ('Torque noise', f'{_noise(design, arm)} at {settings.rate:g} Hz'),
         ('Clearance', f'{100.0 * settings.clearance:g} cm'),

@@ -35,14 +35,6 @@ def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str]
     return families
 
 
-def short_label(name: ParameterName) -> str:
-    """Return a label that fits an axis: the leading symbol of a grouping, or the joint."""
-    if not name.rigid:
-        return name.joint or name.name
-    leader = name.name.split(' ')[0]
-    return leader if leader == name.name else f'{leader} *'
-
-
 def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     """
     Return what a parameter is and of which link or joint, in words.

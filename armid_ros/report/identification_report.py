@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from armid_ros.arm import ArmModel
 from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
-from armid_ros.identification.estimators.names import IN_WORDS
-from armid_ros.identification.estimators.side_by_side import MethodScore
+from armid_ros.identification.fitting.least_squares import IN_WORDS
 from armid_ros.recording import Recording
 from armid_ros.report.families import effects_in_words
 from armid_ros.report.judgement import judge
@@ -20,7 +19,6 @@ from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.assessment import (
     EncoderNoise,
-    Methods,
     PhysicalSection,
     WhitenessSection,
 )
@@ -49,17 +47,20 @@ class Assessment:
         Test for encoder noise, and simulations.
     grade : Grade or None
         What it is good for; found out where it is not given.
-    methods : sequence of MethodScore
-        Estimators that were compared on the same data.
     exports : mapping of str to sequence of str
         Files for other programs, and what each has no place for.
+    reference : str
+        What parameters are compared with: the 'description', or in a simulation the 'truth'.
+    sections : sequence of Section
+        Further sections, shown before the next steps.
 
     """
 
     verification: Verification | None = None
     grade: Grade | None = None
-    methods: Sequence[MethodScore] = ()
     exports: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    reference: str = 'description'
+    sections: Sequence[Section] = ()
 
 
 def identification_report(
@@ -133,13 +134,14 @@ def identification_report(
             result.base.values(description.theta),
             result.unidentified,
             arm.robot.links,
+            assessment.reference,
         ),
         *_physical(result, assessment.exports),
         Correlations(result.estimate, arm.robot.links),
         _excitation(result),
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
-        *([Methods(assessment.methods)] if assessment.methods else []),
+        *assessment.sections,
         NextSteps(judgement.next_steps),
         Origin(provenance or Provenance()),
     ]

@@ -19,9 +19,9 @@ import numpy as np
 
 #: Ratio of the held-out to the training error from which the model is fitted to the noise.
 _OVERFIT = 1.3
-#: Condition number from which an excitation is weak; below 100 is the usual advice (Presse and
-#: Gautier 1993), for regressors scaled by a person.
-_WEAK_EXCITATION = 1000.0
+#: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
+#: 1993), and from which on it is weak.
+GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 #: Parameters that a sentence names.
 _NAMED = 8
 #: Share of a joint's residual that one variable explains, from which there is something to find.
@@ -92,7 +92,7 @@ def judge(
     ]
     steps = [finding.step for finding in findings if finding.step]
     if held_out is not None and not steps:
-        steps = ['Nothing stands in the way of using this model in the range it was tested in.']
+        steps = ['The model can be used within the range of the held-out data.']
     return Judgement(
         sentences=(
             *_sentences(result, training, held_out, len(validation)),
@@ -132,14 +132,13 @@ def _sentences(
     )
     if held_out is None:
         return what, (
-            f'On the data it was fitted to, the predicted torque is off by '
-            f'{digits(training.relative_error_percent)} %; how well it predicts other motions '
-            'is not known, for no data were held out.'
+            f'The torque error is {digits(training.relative_error_percent)} % on the training '
+            'data. No data were held out, so the error on other motions is unknown.'
         )
     return what, (
-        f'On {counted(n_held_out, "held-out recording")} the predicted torque is off by '
-        f'{digits(held_out.relative_error_percent)} % '
-        f'({digits(training.relative_error_percent)} % on the data it was fitted to).'
+        f'The torque error is {digits(held_out.relative_error_percent)} % on '
+        f'{counted(n_held_out, "held-out recording")} '
+        f'({digits(training.relative_error_percent)} % on the training data).'
     )
 
 
@@ -149,7 +148,8 @@ def _simulated(verification: Verification | None) -> list[str]:
     worst = max(verification.forward, key=lambda pair: float(pair.after.position_error.max()))
     before = '' if worst.before is None else f'; before, {worst.before.worst}'
     return [
-        f'Driven by the recorded torques, it is off by at most {worst.after.worst} rms{before}.'
+        f'Driven by the recorded torques, its position error is at most {worst.after.worst} rms'
+        f'{before}.'
     ]
 
 
@@ -172,9 +172,8 @@ def _error_findings(
         if ratio > _OVERFIT:
             findings.append(
                 Caution(
-                    f'The error on held-out data is {digits(ratio)} times that on the training '
-                    'data: the model is fitted to what does not repeat, or the held-out motion '
-                    'goes where the training did not.',
+                    f'The held-out error is {digits(ratio)} times the training error: the model '
+                    'overfits, or the held-out motion leaves the range of the training data.',
                     'Train on more recordings, and on the range of poses and speeds that matters.',
                 )
             )
@@ -185,16 +184,16 @@ def _error_findings(
         findings.append(
             Caution(
                 'Poorly predicted: ' + ', '.join(f'{j} ({digits(e)} %)' for j, e in bad) + '.',
-                f'Compare the residual of {", ".join(joint for joint, _ in bad)} with the noise '
-                'of the torque there, and diagnose what the model lacks.',
+                f'Compare the residual of {", ".join(joint for joint, _ in bad)} with its torque '
+                'noise, and run armid diagnose.',
             )
         )
     return findings
 
 
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> dict[str, str]:
-    """Say what the residual of joints goes with, by joint; nothing of one that goes with none."""
-    said = {}
+    """Return a sentence for each joint whose residual depends on speed, position or load."""
+    sentences = {}
     for joint, name in enumerate(joints):
         shares = explained_shares(fits, joint)
         telling = [
@@ -202,8 +201,10 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> dict[str, str
         ]
         if telling:
             parts = ', '.join(f'{key} ({100.0 * shares[key]:.0f} %)' for key in telling)
-            said[name] = f'The residual of {name} goes with {parts}.'
-    return said
+            sentences[name] = (
+                f'{name}: the residual depends on {parts}; the model lacks an effect.'
+            )
+    return sentences
 
 
 def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
@@ -215,8 +216,7 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caut
             findings.append(
                 Caution(
                     trends[name],
-                    'Diagnose what the residual that follows a variable is due to, and add it to '
-                    'the effects.',
+                    'Run armid diagnose to find the missing effect, and add it with --effects.',
                 )
             )
         if Whiteness.of(fits, joint).outside > COLOURED_SHARE:
@@ -224,9 +224,8 @@ def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caut
     if coloured:
         findings.append(
             Caution(
-                f'The residual of {", ".join(coloured)} is far from white: the model lacks '
-                'something there. The intervals allow for the correlation in time, not for the '
-                'bias.'
+                f'The residual of {", ".join(coloured)} is far from white: the model lacks an '
+                'effect. The intervals account for autocorrelation, not for bias.'
             )
         )
     return findings
@@ -244,16 +243,16 @@ def _excitation_findings(result: Identification) -> list[Caution]:
                 f'{len(lost)} of {len(estimate.parameters)} parameters have '
                 f'intervals that include zero: {", ".join(lost[:_NAMED])}'
                 + (f' and {len(lost) - _NAMED} more' if len(lost) > _NAMED else '')
-                + '. Use the model for torques, not these values one by one.'
+                + '. Use the model for torques, not for these single values.'
             )
         )
-    if result.condition_number > _WEAK_EXCITATION:
+    if result.condition_number > WEAK_CONDITION:
         findings.append(
             Caution(
-                f'The excitation is weak: condition number {result.condition_number:.3g}. Other '
-                'motions may be predicted badly.',
-                'Design an excitation for this robot and record that. With these recordings, '
-                '--physical keeps links near their description where the motion does not tell.',
+                f'The excitation is weak (condition number {result.condition_number:.3g}). '
+                'Errors on other motions may be large.',
+                'Design an excitation with armid excite and record it. With these recordings, '
+                '--physical keeps undetermined links near their description.',
             )
         )
     return findings
@@ -267,17 +266,17 @@ def _verification_findings(verification: Verification | None) -> list[Caution]:
     if worse:
         findings.append(
             Caution(
-                'Driven by the recorded torques, the identified arm is farther off than the '
-                f'description in {worse}.',
-                f'Look at the residual of {worse} before the model is used to simulate.',
+                'Driven by the recorded torques, the identified arm has larger position errors '
+                f'than the description in {worse}.',
+                f'Check the residual of {worse} before you simulate with the model.',
             )
         )
     if verification.noise is not None and not verification.noise.harmless:
         size = float(np.max(np.abs(verification.noise.relative_bias)))
         findings.append(
             Caution(
-                'Noise of the encoders biases parameters, by up to '
-                f'{digits(size)} standard deviations: their intervals are off by that.',
+                'Encoder noise biases parameters by up to '
+                f'{digits(size)} standard deviations, which the intervals do not include.',
                 'Lower the cut-off of the position filter (--cutoff), or move faster.',
             )
         )
@@ -291,9 +290,9 @@ def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
     if len(residual) < 20:
         return {}
     axes = {
-        'its speed': [fit.motion.dq[:, joint] for fit in fits],
-        'its position': [fit.motion.q[:, joint] for fit in fits],
-        'its load': [fit.predicted[:, joint] for fit in fits],
+        'speed': [fit.motion.dq[:, joint] for fit in fits],
+        'position': [fit.motion.q[:, joint] for fit in fits],
+        'load': [fit.predicted[:, joint] for fit in fits],
     }
     return {
         name: Trend.of(np.concatenate(parts)[used], residual).share for name, parts in axes.items()

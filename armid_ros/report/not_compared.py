@@ -28,10 +28,10 @@ def tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
         files = ' and '.join(
             one.source for one in (comparison.before, comparison.after) if one.without_std
         )
-        verb, sure = ('has', 'it is') if len(comparison.left_out) == 1 else ('have', 'they are')
+        verb = 'has' if len(comparison.left_out) == 1 else 'have'
         lines.append(
-            f'{_count(comparison.left_out)} {verb} no standard deviation in {files}: the '
-            f'identification.json that was beside it says how sure {sure}.'
+            f'{_count(comparison.left_out)} {verb} no standard deviation in {files}; '
+            'identification.json of that run has it.'
         )
     sides = ('first', 'second', comparison.only_before), ('second', 'first', comparison.only_after)
     for side, other, found in sides:

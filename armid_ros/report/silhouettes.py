@@ -11,6 +11,7 @@ from armid_ros.excitation.geometry.capsules import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.strip import CORNER, Strip, svg_points
 from armid_ros.robots import CollisionModel
+from armid_ros.robots.sticks import sticks
 import coal
 import numpy as np
 import pinocchio as pin
@@ -135,7 +136,8 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
             solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
     if any(solid.joint > 0 for solid in solids):
         return solids
-    return solids + _bars(collision.robot.model)
+    bars = sticks(collision.robot.model)
+    return solids + [_Solid(k, True, np.stack([np.zeros(3), end]), _BAR) for k, end in bars]
 
 
 def _surface(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
@@ -146,16 +148,6 @@ def _surface(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
         up = np.array([0.0, 0.0, shape.halfLength])
         return np.concatenate([rim + up, rim - up]), 0.0
     return outline(shape)
-
-
-def _bars(model: pin.Model) -> list[_Solid]:
-    """Return bars from every joint to those that it carries, and to its centre of mass."""
-    bars = []
-    for joint in range(1, model.njoints):
-        placement, mass = model.jointPlacements[joint], model.inertias[joint].lever
-        for carrier, end in ((int(model.parents[joint]), placement.translation), (joint, mass)):
-            bars.append(_Solid(carrier, True, np.stack([np.zeros(3), np.array(end)]), _BAR))
-    return bars
 
 
 def _frames(collision: CollisionModel, poses: FloatArray) -> list[list[pin.SE3]]:

@@ -80,7 +80,9 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
     """Compile a file without textures, and without the meshes that are not there."""
     spec = mujoco.MjSpec.from_file(str(path))
     folder = Path(spec.modelfiledir) / spec.meshdir
-    missing = {mesh.name: mesh for mesh in spec.meshes if not _is_there(folder, mesh)}
+    missing = {
+        mesh.name: mesh for mesh in spec.meshes if mesh.file and not (folder / mesh.file).is_file()
+    }
     for geom in list(spec.geoms):
         geom.material = ''
         if geom.meshname in missing:
@@ -95,10 +97,6 @@ def _compiled(mujoco: ModuleType, path: Path, notes: list[str]) -> Any:
     for element in (*spec.materials, *spec.textures, *missing.values()):
         spec.delete(element)
     return spec.compile()
-
-
-def _is_there(folder: Path, mesh: Any) -> bool:
-    return not mesh.file or (folder / mesh.file).is_file()
 
 
 class _Writer:

@@ -7,11 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import Any
 
 from armid_ros.errors import RobotError
+from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.robots.robot import Robot
-import yaml
 
 #: Of the file beside NAME.urdf or NAME.urdf.xacro.
 SUFFIX = '.mounting.yaml'
@@ -51,10 +50,8 @@ def read_mounting(robot: Robot) -> Mounting | None:
     path = robot.path.with_name(stem + SUFFIX)
     if not path.is_file():
         return None
-    try:
-        content: Any = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RobotError(f'{path}: {error}') from error
+    with reading(path, RobotError):
+        content = load_yaml(read_text(path, RobotError))
     floor = content.get('floor') if isinstance(content, dict) else None
     if floor == 'none':
         return Mounting(None, path)

@@ -85,39 +85,33 @@ def driven_joints(
 
 def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str, ...]:
     """Return a note where the driven joints are those of several arms; none where of one."""
-    before = {joint.name: _carriers(description, [joint]) for joint in driven}
-    after = {
-        joint.name: [other for other in driven if joint.name in before[other.name]]
-        for joint in driven
-    }
-    # An arm begins where a joint is not carried by another driven one, or beside others.
-    firsts = [
-        joint
-        for joint in driven
-        if not any(joint in after[other.name] for other in driven)
-        or any(_beside(joint, other, after) for other in driven)
-    ]
-    arms = [
-        joint
-        for joint in firsts
-        if len(after[joint.name]) + 1 >= SHORTEST_ARM
-        and not any(other in after[joint.name] for other in firsts)
-    ]
+    arms = _arms(description, [joint.name for joint in driven])
     if len(arms) < 2:
         return ()
-    begins = ', '.join(f"'{joint.name}' ({len(after[joint.name]) + 1} joints)" for joint in arms)
+    begins = ', '.join(f"'{arm[0]}' ({len(arm)} joints)" for arm in arms)
     return (f'{len(arms)} arms are driven, beginning with {begins}; --joints A,B,... takes one',)
 
 
-def _beside(joint: Joint, other: Joint, after: dict[str, list[Joint]]) -> bool:
-    """Whether two joints are the first ones of branches that part after one driven joint."""
-    if joint is other or other in after[joint.name] or joint in after[other.name]:
-        return False
-    return _driven_before(joint, after) == _driven_before(other, after)
+def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
+    """
+    Return the arms among driven joints, each from its first joint to its tip.
 
+    A limb is a chain of driven joints up to a tip, after the last fork. Limbs of fewer than
+    `SHORTEST_ARM` joints are no arms, nor are joints that carry several arms.
 
-def _driven_before(joint: Joint, after: dict[str, list[Joint]]) -> set[str]:
-    return {name for name, beyond in after.items() if joint in beyond}
+    """
+    carriers = {name: _carriers(description, [description.by_name[name]]) for name in joints}
+    kept = list(joints)
+    while kept:
+        beyond = {j: {k for k in kept if j in carriers[k]} for j in kept}
+        tips = {j for j in kept if not beyond[j]}
+        limbs = {tip: [j for j in kept if (beyond[j] | {j}) & tips == {tip}] for tip in tips}
+        short = {j for limb in limbs.values() if len(limb) < SHORTEST_ARM for j in limb}
+        if not short:
+            arms = [sorted(limb, key=lambda j: len(carriers[j])) for limb in limbs.values()]
+            return sorted(arms, key=lambda arm: joints.index(arm[0]))
+        kept = [j for j in kept if j not in short]
+    return []
 
 
 def driven_in_words(robot: Robot) -> tuple[str, ...]:
@@ -157,24 +151,11 @@ def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
     """
     Return the driven joints that belong to no arm: wheels, a head, a torso that carries arms.
 
-    A limb is a chain of driven joints up to a tip, after the last fork. Limbs of fewer than
-    `SHORTEST_ARM` joints are no arms, nor are joints that carry several arms. Nothing is
-    returned for a robot without any arm.
+    Nothing is returned for a robot without any arm.
 
     """
-    description = robot.description
-    carriers = {n: _carriers(description, [description.by_name[n]]) for n in robot.joints}
-    kept = set(robot.joints)
-    while kept:
-        beyond = {j: {k for k in kept if j in carriers[k]} for j in kept}
-        tips = {j for j in kept if not beyond[j]}
-        limbs = {tip: {j for j in kept if (beyond[j] | {j}) & tips == {tip}} for tip in tips}
-        short = {j for limb in limbs.values() if len(limb) < SHORTEST_ARM for j in limb}
-        if not short:
-            arms = set().union(*limbs.values())
-            return tuple(j for j in robot.joints if j not in arms)
-        kept -= short
-    return ()
+    of_arms = {joint for arm in _arms(robot.description, robot.joints) for joint in arm}
+    return tuple(joint for joint in robot.joints if joint not in of_arms) if of_arms else ()
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:
@@ -237,8 +218,11 @@ def _by_name(description: Description, names: Sequence[str], source: str) -> tup
 def _by_default(description: Description) -> tuple[Joint, ...]:
     free = [joint for joint in description.movable() if not joint.mimic]
     led = {joint.mimic.joint for joint in description.joints if joint.mimic}
-    gripper = {joint.name for joint in free if joint.name in led or _says_gripper(joint)}
-
+    gripper = {
+        joint.name
+        for joint in free
+        if joint.name in led or any(word in joint.name.lower() for word in GRIPPER_WORDS)
+    }
     carriers = _carriers(description, [joint for joint in free if joint.name not in gripper])
     driven = tuple(j for j in free if j.name not in gripper or j.name in carriers)
     return driven or tuple(joint for joint in free if joint.name not in led)
@@ -254,7 +238,3 @@ def _carriers(description: Description, joints: Sequence[Joint]) -> set[str]:
             found.add(carrier.name)
             carrier = by_child.get(carrier.parent)
     return found
-
-
-def _says_gripper(joint: Joint) -> bool:
-    return any(word in joint.name.lower() for word in GRIPPER_WORDS)

@@ -13,6 +13,7 @@ a bag is never expanded.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 import json
 from pathlib import Path
 import signal
@@ -89,17 +90,10 @@ def expand_xacro(
             f'{path}: xacro: not expanded within {time_limit:g} s of processor time and '
             f'{MEMORY_LIMIT >> 20} MiB'
         )
-    answer = _answer(done.stdout)
+    answer: dict[str, Any] = {}
+    with suppress(ValueError):  # it died before it gave an answer
+        answer = json.loads(done.stdout)
     if 'text' not in answer:
         reason = answer.get('error') or f'not expanded within {MEMORY_LIMIT >> 20} MiB'
         raise RobotError(f'{path}: xacro: {reason}')
     return str(answer['text'])
-
-
-def _answer(text: str) -> dict[str, Any]:
-    """Return the answer of the process; nothing if it died before it gave one."""
-    try:
-        answer: dict[str, Any] = json.loads(text)
-    except ValueError:
-        return {}
-    return answer

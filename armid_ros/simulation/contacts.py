@@ -65,7 +65,8 @@ class Contacts:
     def of(cls, friction: DryFriction) -> Contacts:
         """Return the contacts of friction elements."""
         directions = friction.directions
-        axes = tuple(_axis(direction) for direction in directions)
+        joints = [np.flatnonzero(direction).tolist() for direction in directions]
+        axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
         law = BoxLaw(friction.lower, friction.upper)
         loaded = None if friction.load_share is None else friction
         own = loaded is None and np.array_equal(directions, np.eye(directions.shape[1]))
@@ -135,9 +136,3 @@ def split_constant(friction: DryFriction | None, n_joints: int) -> tuple[DryFric
         None if friction.load_share is None else share[able],
     )
     return sticking, np.asarray(friction.lower[constant] @ friction.directions[constant])
-
-
-def _axis(direction: FloatArray) -> int:
-    """Return the joint that an element acts on alone, -1 if it acts on several."""
-    joints = np.flatnonzero(direction)
-    return int(joints[0]) if len(joints) == 1 else -1

@@ -20,7 +20,6 @@ from armid_ros.simulation.box_complementarity import Modes, solve_box_complement
 from armid_ros.simulation.contacts import Contacts
 from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.spring_integrator import spring_substep
-from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
@@ -46,7 +45,11 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
 
     """
     if plant.springs is not None and state.rotors is not None:
-        return _on_springs(plant, plant.springs, state, torque)
+        steps = state.steps + 1
+        for _ in range(plant.springs.substeps):
+            assert state.rotors is not None
+            state = spring_substep(plant, plant.springs, state.rotors, state, torque)
+        return State(steps, steps * plant.dt, *state[2:])
     half = plant.spans[1]
     model, data, dq = plant.robot.model, plant.data, state.dq
     q_middle = state.q + half * dq
@@ -73,15 +76,6 @@ def step(plant: Plant, state: State, torque: FloatArray) -> State:
         memory = slipping.advance(memory, q_next - state.q)
     steps = state.steps + 1
     return State(steps, steps * plant.dt, q_next, dq_next, ddq, modes, memory)
-
-
-def _on_springs(plant: Plant, springs: ElasticJoints, state: State, torque: FloatArray) -> State:
-    """Integrate one step, in parts, where joints give way."""
-    steps = state.steps + 1
-    for _ in range(springs.substeps):
-        assert state.rotors is not None
-        state = spring_substep(plant, springs, state.rotors, state, torque)
-    return State(steps, steps * plant.dt, *state[2:])
 
 
 def _end_velocity(

@@ -163,7 +163,13 @@ class Plant:
         friction, constant = split_constant(action.dry_friction, n)
         data = robot.model.createData()
         mass = np.array(pin.crba(robot.model, data, middle_position(robot)))
-        _require_inertia(robot, np.diag(mass + inertia))
+        moved = np.abs(np.diag(mass + inertia))
+        still = int(np.argmin(moved))
+        if moved[still] < 1e-15:
+            raise ModelError(
+                f"{robot.name}: joint '{robot.joints[still]}' moves no mass and no inertia, so "
+                f"its acceleration is infinite; give link '{robot.links[still]}' an <inertial>"
+            )
         weight = _damping_weight(robot, mass + inertia, damping, self.dt)
         added = inertia + weight * self.dt * damping
         coupling = added - np.diag(np.diag(added))
@@ -297,15 +303,6 @@ def limit_slack(robot: Robot) -> FloatArray:
     """Return how far beyond a position limit is rounding [rad or m], shape (n,)."""
     span = robot.upper - robot.lower
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
-
-
-def _require_inertia(robot: Robot, moved: FloatArray) -> None:
-    still = int(np.argmin(np.abs(moved)))
-    if abs(moved[still]) < 1e-15:
-        raise ModelError(
-            f"{robot.name}: joint '{robot.joints[still]}' moves no mass and no inertia, so "
-            f"its acceleration is infinite; give link '{robot.links[still]}' an <inertial>"
-        )
 
 
 def middle_position(robot: Robot) -> FloatArray:

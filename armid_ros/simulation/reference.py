@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion, read_only
@@ -165,11 +166,7 @@ class Reference:
         if self.joints == robot.joints:
             return self
         order = [self.joints.index(joint) for joint in robot.joints]
-        dq, ddq, tau = (
-            None if values is None else values[:, order]
-            for values in (self.dq, self.ddq, self.tau)
-        )
-        return Reference(robot.joints, self.t, self.q[:, order], dq, ddq, tau)
+        return self._waypoints(robot.joints, self.t, (slice(None), order))
 
     def remaining(self, late: float) -> Reference:
         """
@@ -187,10 +184,13 @@ class Reference:
         left = self.t > 2.0 * late
         if late <= 0.0 or not left.any():
             return self
-        dq, ddq, tau = (
-            None if values is None else values[left] for values in (self.dq, self.ddq, self.tau)
-        )
-        return Reference(self.joints, self.t[left] - late, self.q[left], dq, ddq, tau)
+        return self._waypoints(self.joints, self.t[left] - late, left)
+
+    def _waypoints(self, joints: tuple[str, ...], t: FloatArray, chosen: Any) -> Reference:
+        values = (self.q, self.dq, self.ddq, self.tau)
+        q, *rest = (None if one is None else one[chosen] for one in values)
+        assert q is not None
+        return Reference(joints, t, q, *rest)
 
     def after(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Reference:
         """

@@ -118,7 +118,10 @@ class SimulatedArm:
         start: npt.ArrayLike | None = None,
     ) -> None:
         self.plant = arm if isinstance(arm, Plant) else Plant(arm)
-        self.controller = controller or _suitable(self.plant)
+        if controller is None:
+            rigid = self.plant.springs is None
+            controller = ComputedTorque(self.plant.arm) if rigid else MotorControl.of(self.plant)
+        self.controller = controller
         self.sensors = sensors or Sensors()
         self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
         self._rng = rng
@@ -307,8 +310,3 @@ class SimulatedArm:
     def _new_past(self) -> RecentPast:
         """Return what the sensors know of an arm that begins here."""
         return RecentPast(self.plant, self._state, self._torque, self.sensors.torque_delay)
-
-
-def _suitable(plant: Plant) -> Controller:
-    """Return what makes an arm follow, that knows it."""
-    return ComputedTorque(plant.arm) if plant.springs is None else MotorControl.of(plant)

@@ -131,6 +131,7 @@ class ElasticJoints:
             to_motors.T @ (none if x is None else x) @ to_motors
             for x in (action.inertia, action.damping)
         )
+        free, rate = 1.0 / np.diag(np.linalg.inv(mass)), _STOP * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
         return cls(
             joints=joints,
@@ -144,7 +145,7 @@ class ElasticJoints:
             rotors=rotors,
             damping=damping + to_links.T @ rub @ to_links,
             friction=np.ascontiguousarray(directions @ to_motors),
-            stops=_stops(mass, _STOP * elasticity.substeps / dt),
+            stops=(read_only(free * rate**2), read_only(1.4 * free * rate)),
             sensing=_sensing(arm),
         )
 
@@ -192,12 +193,6 @@ def _required(robot: Robot, action: Action) -> Transmission:
             'joint_elasticity to the joints with backlash'
         )
     return springs
-
-
-def _stops(mass: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return stiffness and damping of stops with a natural frequency [rad/s], each (n,)."""
-    free = 1.0 / np.diag(np.linalg.inv(mass))
-    return read_only(free * rate**2), read_only(1.4 * free * rate)
 
 
 def _sensing(arm: ArmModel) -> Action:

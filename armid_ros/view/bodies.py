@@ -19,6 +19,7 @@ from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
 from armid_ros.robots.description import parse_xml
 from armid_ros.robots.meshes import find_mesh
+from armid_ros.robots.sticks import sticks
 import coal
 import numpy as np
 import pinocchio as pin
@@ -115,16 +116,11 @@ def _mesh(path: Path, scale: FloatArray) -> FloatArray:
 
 def _bars(robot: Robot) -> tuple[Body, ...]:
     """Return a bar from each joint to those that it carries, and to the centre of the last."""
-    model, found = robot.model, []
-    for joint in range(model.njoints):
-        carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
-        ends = [np.array(model.jointPlacements[k].translation) for k in carried]
-        if joint and not ends:
-            ends = [2.0 * np.array(model.inertias[joint].lever)]
-        link = robot.links[joint - 1] if joint else 'base'
-        ball = _BAR * _sphere()
-        found += [Body(link, joint - 1, _hull(np.concatenate([ball, end + ball]))) for end in ends]
-    return tuple(found)
+    ball, names = _BAR * _sphere(), ('base', *robot.links)
+    return tuple(
+        Body(names[joint], joint - 1, _hull(np.concatenate([ball, end + ball])))
+        for joint, end in sticks(robot.model)
+    )
 
 
 def _hull(points: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ def test_no_recording_is_said(arm, ask, recordings, said):
 
 
 def test_an_unknown_method_is_answered_with_those_there_are(arm, run):
-    with pytest.raises(ar.ArmidError, match="no method 'foo'; there are ols, wls"):
+    with pytest.raises(ar.ArmidError, match="no method 'foo'; use one of ols"):
         ar.identify(arm, run, method='foo')
 
 

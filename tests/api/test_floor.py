@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plan of Python keeps clear of the same floor and surroundings as one of the command."""
 
+from dataclasses import replace
+
 import armid_ros as ar
 from armid_ros.errors import TrajectoryError
+import numpy as np
 import pytest
 
 QUICK = {'duration': 6.0, 'starts': 1, 'iterations': 1, 'candidates': 5}
@@ -23,3 +26,26 @@ def test_a_plan_is_checked_against_floor_and_environment(tmp_path):
 def test_a_floor_that_cannot_be_is_refused(floor):
     with pytest.raises(TrajectoryError, match='floor'):
         ar.design_excitation('humanoid_arm', floor=floor, **QUICK)
+
+
+def test_velocity_limits_of_python_hold_and_missing_ones_are_named():
+    shipped = ar.load_robot('humanoid_arm')
+    robot = replace(shipped, velocity_limit=np.r_[0.0, shipped.velocity_limit[1:]])
+    plan = ar.design_excitation(robot, speed='fast', **QUICK)
+    assert f'velocity of {robot.joints[0]}' in plan.summary().text()
+    limits = {robot.joints[0]: 0.3}
+    plan = ar.design_excitation(robot, speed='fast', joint_limits=limits, **QUICK)
+    assert np.abs(plan.motion().dq[:, 0]).max() <= 0.3
+    assert 'velocity' not in '\n'.join(plan.summary().lines)
+
+
+def test_wheels_are_not_driven_by_a_script(tmp_path):
+    path = tmp_path / 'rover.urdf'
+    text = ar.load_robot('humanoid_arm').urdf
+    wheel = (
+        '<link name="tyre"/><joint name="wheel" type="continuous"><parent link="torso"/>'
+        '<child link="tyre"/><axis xyz="0 1 0"/><limit velocity="2" effort="9"/></joint></robot>'
+    )
+    path.write_text(text.replace('</robot>', wheel))
+    with pytest.raises(TrajectoryError, match=r'wheel belong.*joints=\['):
+        ar.design_excitation(path, **QUICK)

@@ -148,14 +148,14 @@ def test_a_diagnosis_and_a_comparison_find_the_load(model, loaded, tmp_path):
 def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_path):
     found = ar.inspect(runs[0], 'humanoid_arm')
     assert short(found)
-    assert 'armid identify takes it' in ' '.join(repr(found).split())
+    assert 'Ready for `armid identify`' in ' '.join(repr(found).split())
     assert found.report(tmp_path / 'page.html').is_file()
     saved = found.save(tmp_path / 'inspection')
     assert json.loads((saved / 'inspection.json').read_text())['verdict'] == found.core.verdict
     assert short(excitation)
     assert (excitation.save(tmp_path / 'plan') / 'trajectory').is_dir()
     again = ar.simulate('humanoid_arm', tmp_path / 'plan' / 'trajectory', rate=100.0)
-    assert again.duration == pytest.approx(excitation.duration, abs=0.05)
+    assert again.duration == pytest.approx(excitation.run.duration, abs=0.05)
 
 
 def test_models_and_recordings_print_in_a_few_lines(model, runs):

@@ -12,8 +12,9 @@ import pytest
 
 from benchmarks.hidden_effects import table
 from benchmarks.lived import judge, known_arm, select, true_shares
-from benchmarks.lived_scoring import breakdown, gravity_of, LivedJudged, LivedTruth, score
+from benchmarks.lived_scoring import breakdown, gravity_of, LivedJudged, score
 from benchmarks.two_days import Answer, answer_of, identification_of, Named
+from tests.benchmarks.truths import EARTH, truth
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.cases import lived_case
@@ -23,24 +24,7 @@ from tests.hidden.lived.motions import draw_path, tracked
 from tests.hidden.lived.plant import LivedArm
 from tests.hidden.lived.wear import Wear
 
-EARTH = np.array([0.0, 0.0, -9.81])
-
-COULOMB = LivedTruth(
-    key='development/1',
-    cause='coulomb',
-    size='clear',
-    style='dwells',
-    arm='ur5',
-    name='coulomb_friction',
-    joints=('elbow',),
-    parameters=(('coulomb_torque', 'elbow', 2.0),),
-    in_catalogue=True,
-    gap=5.0,
-    share_of_power=0.7,
-    share_of_excess=0.8,
-    gravity=EARTH,
-    described=EARTH,
-)
+COULOMB = truth()
 
 
 def said(*headline, verdict='named'):
@@ -185,8 +169,8 @@ def test_gravity_is_read_from_any_of_its_names():
     moon = Named('gravity_magnitude', (), (), (('gravity_difference', '', 1.62 - 9.81, 0.0),))
     np.testing.assert_allclose(gravity_of([wall], EARTH), [9.81, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(gravity_of([wall, moon], EARTH), [1.62, 0.0, 0.0], atol=1e-9)
-    truth = replace(COULOMB, name='gravity', gravity=np.array([9.81, 0.0, 0.1]))
-    angle, size = LivedJudged(truth, said(wall)).gravity_error()
+    mounted = truth(name='gravity', gravity=np.array([9.81, 0.0, 0.1]))
+    angle, size = LivedJudged(mounted, said(wall)).gravity_error()
     assert angle == pytest.approx(np.degrees(np.arctan(0.1 / 9.81)))
     assert abs(size) < 1e-3
 

@@ -6,33 +6,23 @@ import numpy as np
 import pytest
 
 from benchmarks.lived_questions import exact, is_consistent, mass_is_right, pairs
-from benchmarks.lived_scoring import felt_directions, LivedJudged, LivedTruth
+from benchmarks.lived_scoring import felt_directions, LivedJudged
 from benchmarks.two_days import Answer, Named
+from tests.benchmarks.truths import truth
 from tests.hidden.lived.arms import load_arm
 from tests.hidden.lived.chain import Chain
 
-EARTH = np.array([0.0, 0.0, -9.81])
+
+def loaded(key, **changes):
+    """Return what is true of a case with a payload of 2 kg."""
+    facts = {'cause': 'payload', 'name': 'payload', 'joints': ('wrist',)}
+    return truth(key=key, parameters=(('payload_m', 'wrist', 2.0),), **facts, **changes)
 
 
-def truth(key, name='payload', friction='unknown'):
-    """Return what is true of a case."""
-    return LivedTruth(
-        key=key,
-        cause='payload' if name else 'none',
-        size='natural',
-        style='sines',
-        arm='ur5',
-        name=name,
-        joints=('wrist',) if name else (),
-        parameters=(('payload_m', 'wrist', 2.0),) if name else (),
-        in_catalogue=bool(name),
-        gap=5.0,
-        share_of_power=1.0,
-        share_of_excess=1.0,
-        gravity=EARTH,
-        described=EARTH,
-        friction=friction,
-    )
+def free(key, **changes):
+    """Return what is true of a case in which nothing happened."""
+    facts = {'cause': 'none', 'name': '', 'joints': (), 'parameters': ()}
+    return truth(key=key, in_catalogue=False, **facts, **changes)
 
 
 def payload(mass):
@@ -51,7 +41,7 @@ def values(metrics):
 
 def test_point_to_point_is_held_against_what_periodic_data_give():
     answers = (payload(2.0), payload(2.0), payload(2.0), NOTHING, NOTHING, payload(2.0))
-    judged = [LivedJudged(truth(f'development/pairs/{k}'), one) for k, one in enumerate(answers)]
+    judged = [LivedJudged(loaded(f'development/pairs/{k}'), one) for k, one in enumerate(answers)]
     periodic, dwells, ratio = pairs(judged)
     assert (periodic.value, dwells.value) == (pytest.approx(2 / 3), pytest.approx(2 / 3))
     assert ratio.value == 1.0
@@ -61,29 +51,29 @@ def test_point_to_point_is_held_against_what_periodic_data_give():
 
 
 def test_half_a_pair_is_left_out():
-    judged = [LivedJudged(truth('development/pairs/0'), payload(2.0))]
+    judged = [LivedJudged(loaded('development/pairs/0'), payload(2.0))]
     assert [metric.count for metric in pairs(judged)] == [0, 0, 0]
 
 
 @pytest.mark.parametrize(('mass', 'right'), [(2.09, True), (1.91, True), (2.11, False)])
 def test_a_mass_is_right_within_five_per_cent(mass, right):
-    judged = LivedJudged(truth('development/exact/0'), payload(mass))
+    judged = LivedJudged(loaded('development/exact/0'), payload(mass))
     assert mass_is_right(judged) is right
-    assert not mass_is_right(LivedJudged(truth('development/exact/0'), NOTHING))
+    assert not mass_is_right(LivedJudged(loaded('development/exact/0'), NOTHING))
 
 
 def test_silence_without_the_word_is_not_consistent():
-    free = truth('development/exact/2', name='')
-    assert is_consistent(LivedJudged(free, NOTHING))
-    assert not is_consistent(LivedJudged(free, Answer('unknown')))
+    silent = free('development/exact/2')
+    assert is_consistent(LivedJudged(silent, NOTHING))
+    assert not is_consistent(LivedJudged(silent, Answer('unknown')))
 
 
 def test_exact_arms_are_counted_by_what_is_known_of_friction():
     judged = [
-        LivedJudged(truth('development/exact/0', friction='values'), payload(2.0)),
-        LivedJudged(truth('development/exact/1', friction='names'), payload(3.0)),
-        LivedJudged(truth('development/exact/2', name='', friction='values'), NOTHING),
-        LivedJudged(truth('development/exact/4', name='', friction='names'), Answer('unknown')),
+        LivedJudged(loaded('development/exact/0', friction='values'), payload(2.0)),
+        LivedJudged(loaded('development/exact/1', friction='names'), payload(3.0)),
+        LivedJudged(free('development/exact/2', friction='values'), NOTHING),
+        LivedJudged(free('development/exact/4', friction='names'), Answer('unknown')),
     ]
     assert values(exact(judged)) == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
 

@@ -1,12 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Looks at locked sets are recorded, and made with committed code only."""
+"""Runs on locked sets are recorded, and made with committed code only."""
 
+import json
 import subprocess
 
 import pytest
 
-from benchmarks.looks import clean_commit, look
+from benchmarks.looks import clean_commit, look, results_of
+from tests.hidden.scoring import Metric
 
 
 @pytest.fixture
@@ -24,19 +26,30 @@ def log(tmp_path):
     (tmp_path / 'code.py').write_text('pass\n')
     git('add', '-A')
     git('commit', '-m', 'code')
-    return tmp_path / 'looks.md'
+    return tmp_path / 'looks.jsonl'
 
 
-def test_a_look_leaves_commit_date_and_table(log):
+def entries(log):
+    return [json.loads(line) for line in log.read_text().splitlines()]
+
+
+def test_a_look_leaves_commit_date_and_results(log):
     commit = clean_commit(log)
-    for table in ('first 0.9', 'first 0.8'):
-        with look('lived, locked, 96 cases', log) as record:
-            assert log.read_text().rstrip().endswith('UTC')  # it is there from the beginning
-            record.table = table
-    text = log.read_text()
-    assert text.count(f'commit {commit}, clean, 20') == 2
-    assert text.index('first 0.9') < text.index('first 0.8')
-    assert text.startswith('# Looks')
+    for value in (0.9, 0.8):
+        with look('lived, locked, 96 cases', log) as entry:
+            assert 'results' not in entries(log)[-1]  # it is there from the beginning
+            entry['results'] = results_of([Metric('first', value, 0.7, 0.95, 20, '', None)])
+    assert [one['commit'] for one in entries(log)] == [commit, commit]
+    assert [one['results']['first']['value'] for one in entries(log)] == [0.9, 0.8]
+    assert entries(log)[0]['results']['first']['interval'] == [0.7, 0.95]
+
+
+def test_a_metric_without_a_number_is_null_and_a_part_has_its_whole_before_it():
+    nan = float('nan')
+    rows = results_of(
+        [Metric('a', nan, nan, nan, 0, '', None), Metric('  b', 1, nan, nan, 2, '', None)]
+    )
+    assert rows == {'a': {'value': None, 'cases': 0}, 'a: b': {'value': 1.0, 'cases': 2}}
 
 
 def test_a_look_that_is_broken_off_is_recorded(log):
@@ -54,4 +67,4 @@ def test_code_that_is_in_no_commit_does_not_look(log):
 
 def test_a_folder_that_is_no_git_tree_does_not_look(tmp_path):
     with pytest.raises(SystemExit, match='git tree'):
-        clean_commit(tmp_path / 'looks.md')
+        clean_commit(tmp_path / 'looks.jsonl')

@@ -8,7 +8,7 @@ import re
 import shutil
 
 from armid_ros.arm import load_misfit, load_model, Misfit, save_model
-from armid_ros.cli.signatures.diagnose import Percent
+from armid_ros.cli.diagnose.command import Percent
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics
@@ -143,8 +143,8 @@ def test_an_extra_that_fails_costs_no_result(files, tmp_path, monkeypatch):
         }
         raise ZeroDivisionError('no motion at all')
 
-    monkeypatch.setattr('armid_ros.cli.diagnose.files.next_run', broken)
-    monkeypatch.setattr('armid_ros.cli.diagnose.files.simulate_held_out', broken)
+    monkeypatch.setattr('armid_ros.api.diagnosis.next_run', broken)
+    monkeypatch.setattr('armid_ros.api.diagnosis.simulate_held_out', broken)
     asked = ('--robot', urdf, '--model', model, '--validate', bags[-1])
     result = armid('diagnose', *bags[:-1], *asked, '--out', out)
     assert result.output.count('no motion at all') == 2
@@ -247,7 +247,7 @@ def test_a_script_learns_from_the_code_whether_to_go_on(
     said = Diagnosis(
         verdict, 'Said.', (), (), (), (), None, None, load_model(model), (), (), (), False, (), ''
     )
-    monkeypatch.setattr('armid_ros.cli.diagnose.command.diagnose_beside', lambda *_, **__: said)
+    monkeypatch.setattr('armid_ros.api.diagnosis.run', lambda *_, **__: said)
     asked = ('diagnose', *bags, '--robot', urdf, '--model', model, '--no-baseline')
     for more, expected in (((), code), (('--strict',), strict_code), (('--json',), code)):
         armid(*asked, '--out', tmp_path / 'out', *more, code=expected)

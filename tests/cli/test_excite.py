@@ -6,13 +6,13 @@ from importlib.metadata import files
 import json
 import shutil
 
+import armid_ros.api.excitation as excitation_files
 from armid_ros.arm import ArmModel
-import armid_ros.cli.excite.files as excitation_files
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     check_limits,
     ClearanceModel,
-    design_speeds,
+    design,
     Limits,
     load_excitation,
 )
@@ -139,7 +139,7 @@ def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise ZeroDivisionError('no picture')
 
-    monkeypatch.setattr(excitation_files, 'excitation_report', fail)
+    monkeypatch.setattr('armid_ros.report.excitation_report.excitation_report', fail)
     result = excite(ROBOT, tmp_path / 'plan')
     assert 'report.html: not written: ZeroDivisionError: no picture' in result.stderr
     for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'trajectory'):
@@ -154,9 +154,9 @@ def test_a_design_that_fails_does_not_cost_the_one_before_it(tmp_path, monkeypat
         made.append(arguments)
         if len(made) > 1:
             raise TrajectoryError('nothing moves')
-        return design_speeds(*arguments, **settings)
+        return design(*arguments, **settings)
 
-    monkeypatch.setattr('armid_ros.cli.excite.command.design_speeds', design_once)
+    monkeypatch.setattr('armid_ros.api.excitation.design', design_once)
     arguments = ('--robot', ROBOT, *QUICK, '--speed', 'slow,fast', '--out', tmp_path / 'plan')
     armid('excite', *arguments, code=2)
     assert plan_of(ROBOT, tmp_path / 'plan' / 'slow').t[0] == 0.0

@@ -23,7 +23,9 @@ def motion():
     return Bench().motion(1.6, 4.0, 0)
 
 
-@pytest.mark.parametrize('name', [name for name, kind in CATALOGUE.items() if kind.familiar])
+@pytest.mark.parametrize(
+    'name', [name for name, kind in CATALOGUE.items() if kind.traits.familiar]
+)
 def test_what_is_hidden_shows_in_the_torque_and_is_possible(arm, motion, name):
     hidden = draw_hidden(arm, motion, np.random.default_rng(0), f'{name}@elbow')
     lower, upper = hidden.effect.bounds()

@@ -84,14 +84,12 @@ def test_who_leans_on_an_arm_now_and_then_is_seen(bench):
     found = since(bench, leaning, lacking)
     assert found.verdict == 'unknown', found.summary
     assert 'elbow' in found.summary
-    assert ' in the second at ' in found.summary
     assert since(bench, lambda motion, tau: 0.0, lacking).verdict == 'consistent'
 
 
 def test_a_model_that_leaves_more_than_it_may_is_doubted(bench):
     assert doubt_as_it_is(np.array([0.9, 1.0]), bench.robot, 'noise') == ''
     said = doubt_as_it_is(np.array([0.9, 4.0]), bench.robot, 'noise')
-    fit = 'Without a fit of its rigid body and friction, '
-    assert said == f'{fit}the error of elbow is 2.0 times as large as noise can be.'
+    assert 'elbow' in said and '2.0 times' in said and 'shoulder' not in said
     said = doubt_as_it_is(np.array([1.1, 4.0]), bench.robot, 'noise')
-    assert said.endswith('noise can be, and that of shoulder is too large as well.')
+    assert 'elbow' in said and 'shoulder' in said

@@ -2,12 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says of arms in which something is hidden, or nothing."""
 
-from dataclasses import dataclass, replace
-import json
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
-from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
+from armid_ros.diagnosis import diagnose, diagnosis_document
 from armid_ros.model import inverse_dynamics
 from armid_ros.model.pseudo_inertia import pseudo_inertia
 import numpy as np
@@ -71,23 +69,16 @@ def test_a_link_that_is_too_heavy_is_named_instead_of_all_values(bench):
     assert there['link_inertia'] == there['payload'] == ['elbow']
 
 
-def test_drag_is_named_with_its_coefficient_and_joint(bench):
-    hidden = bench.recordings(lambda m, tau: on_elbow(0.08 * m.dq[:, 1] * np.abs(m.dq[:, 1])))
-    found = look(bench, hidden)
-    (finding,) = found.findings
-    assert (finding.name, finding.joints) == ('quadratic_friction', ('elbow',))
-    assert finding.values[0] == pytest.approx(0.08, abs=4 * finding.std[0])
-    assert found.gap.closed > 0.9
-
-
 def test_parameters_of_a_name_are_in_the_order_of_the_joints(bench):
     """The elbow lacks more and is found first."""
     hidden = bench.recordings(lambda m, tau: [0.02, 0.1] * m.dq * np.abs(m.dq))
-    (finding,) = look(bench, hidden).findings
+    found = look(bench, hidden)
+    (finding,) = found.findings
     assert finding.name == 'quadratic_friction'
     assert finding.joints == tuple(p.joint for p in finding.parameters) == ('shoulder', 'elbow')
     errors = np.abs(np.array(finding.values) - [0.02, 0.1])
     assert np.all(errors < 4 * np.array(finding.std))
+    assert found.gap.closed > 0.9
 
 
 def test_all_friction_is_named_of_an_arm_of_which_only_bodies_are_known(bench):
@@ -118,20 +109,12 @@ def test_a_name_that_does_not_hold_where_the_motion_is_new_is_provisional(bench)
     assert look(bench, learned, validate=same).verdict == 'named'
     found = look(bench, learned, validate=other)
     assert found.verdict == 'partial'
-    assert 'the error of elbow' in found.summary
-    assert 'in recordings that were not used' in found.summary
+    assert 'elbow' in found.summary and 'not used' in found.summary
 
 
 def test_an_effect_that_lives_in_the_fast_motion_only_is_found(bench):
     found = look(bench, bench.recordings(lambda m, tau: on_elbow(0.02 * m.ddq[:, 1])))
     assert 'rotor_inertia' in {n for f in found.findings for n in (f.name, *f.ambiguous_with)}
-
-
-def test_without_the_true_effect_in_the_library_no_name_is_sure(bench):
-    hidden = bench.recordings(lambda m, tau: on_elbow(0.4 * np.sin(9.0 * m.q[:, 1])))
-    library = tuple(name for name in CATALOGUE if name != 'torque_ripple')
-    found = look(bench, hidden, settings=DiagnosisSettings(library=library))
-    assert found.verdict in ('unknown', 'partial')
 
 
 @pytest.mark.xfail(strict=True, reason=A_PAYLOAD)
@@ -160,6 +143,7 @@ def test_what_happens_in_one_period_only_is_not_repeatable(bench):
     [
         (lambda tau: tau * [1.0, -1.0], 'opposite sign'),
         (lambda tau: tau * 1000.0, 'N mm'),
+        (lambda tau: tau * 57.2958, 'degrees'),
         (lambda tau: tau[:, ::-1], 'exchanged'),
     ],
 )
@@ -171,62 +155,6 @@ def test_faults_of_the_data_are_named_before_physics(bench, fault, word):
     assert found.verdict == 'bad_data'
     assert word in found.summary
     assert not found.findings
-
-
-def test_the_document_has_what_the_schema_says(bench):
-    hidden = bench.recordings(lambda m, tau: on_elbow(np.full(len(m), 0.3)))
-    document = json.loads(json.dumps(diagnosis_document(look(bench, hidden)), allow_nan=False))
-    assert document['schema'] == 'armid/diagnosis/1'
-    assert [effect['name'] for effect in document['effects']] == ['torque_offset']
-    assert set(document['gap']['before']) == {'shoulder', 'elbow'}
-    assert document['gap']['after']['elbow'] < 0.5 * document['gap']['before']['elbow']
-    assert document['where'][0]['joint'] == 'elbow'
-    assert document['candidates'][0]['visible_fraction'] <= 1.0
-    assert set(document) == {
-        'schema',
-        'verdict',
-        'summary',
-        'effects',
-        'minor',
-        'suspected',
-        'baseline',
-        'where',
-        'gap',
-        'filters',
-        'candidates',
-        'not_visible',
-        'detectable',
-        'model',
-    }
-
-
-@dataclass(frozen=True)
-class CubicSpring(Effect):
-    """A spring that hardens, tau = k q^3: an effect of one's own."""
-
-    name = 'cubic_spring'
-    summary = 'a spring that hardens'
-    quantities = (Quantity('cubic_stiffness', 'N m/rad^3'),)
-
-    def columns(self, motion, arm):
-        """Return q^3."""
-        columns = np.zeros((len(motion), motion.n_joints, len(self.joints)))
-        for position, joint in enumerate(self.indices(motion.joints)):
-            columns[:, joint, position] = motion.q[:, joint] ** 3
-        return columns
-
-    def action(self, values, arm):
-        """Return the torque of the springs."""
-        stiffness = np.zeros(arm.robot.n_joints)
-        stiffness[self.indices(arm.robot.joints)] = values
-        return Action(torque=lambda t, q, dq: stiffness * q**3)
-
-
-def test_an_effect_of_ones_own_is_one_class(bench):
-    hidden = bench.recordings(lambda m, tau: on_elbow(0.4 * m.q[:, 1] ** 3))
-    found = look(bench, hidden, settings=DiagnosisSettings(own=(CubicSpring,)))
-    assert [finding.name for finding in found.findings] == ['cubic_spring']
-    assert found.findings[0].values[0] == pytest.approx(0.4, rel=0.05)
 
 
 @pytest.mark.slow

@@ -46,11 +46,14 @@ def test_the_headline_has_its_share_with_an_interval(document):
 def test_every_field_of_the_schema_is_there(document):
     assert document['schema'] == 'armid/diagnosis/1'
     assert document['verdict'] == 'named'
-    assert set(document) >= {
-        *('summary', 'minor', 'baseline', 'where', 'gap', 'candidates', 'not_visible'),
-        *('detectable', 'model'),
+    assert set(document) == {
+        *('schema', 'verdict', 'summary', 'effects', 'minor', 'suspected', 'baseline', 'where'),
+        *('gap', 'filters', 'candidates', 'not_visible', 'detectable', 'model'),
     }
     assert document['baseline'] == 'noise'
+    assert set(document['gap']['before']) == {'shoulder', 'elbow'}
+    assert document['where'][0]['joint'] == 'elbow'
+    assert document['candidates'][0]['visible_fraction'] <= 1.0
     for one in document['minor']:
         assert set(one) >= {'name', 'joints', 'parameters', 'share', 'share_interval', 'p'}
     gap = document['gap']

@@ -66,7 +66,7 @@ def test_a_payload_that_was_put_down_is_less_than_nothing(request, arm):
     assert (payload.name, payload.joints) == ('payload', ('elbow',))
     values = dict(zip([p.name for p in payload.parameters], payload.values, strict=True))
     assert values['payload_mz'] == pytest.approx(-MASS * HEIGHT, rel=0.05)
-    assert 'was put down' in found.summary
+    assert 'put down' in found.summary
 
 
 def test_a_light_load_of_a_heavy_arm_is_predicted_no_worse_than_a_link(upright):
@@ -112,10 +112,3 @@ def test_a_heavy_load_is_no_fault_of_the_data(bench, mass, side):
     assert found.verdict != 'bad_data', found.summary
     assert found.findings[0].name == 'payload'
     assert found.findings[0].values[0] == pytest.approx(mass, rel=0.05)
-
-
-def test_torques_in_other_units_are_one(bench):
-    recordings = [replace(r, tau=57.2958 * r.tau) for r in bench.recordings()]
-    found = diagnose(bench.arm, recordings, rng=np.random.default_rng(0))
-    assert found.verdict == 'bad_data'
-    assert 'degrees against radians' in found.summary

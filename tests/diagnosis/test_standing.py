@@ -68,8 +68,7 @@ def test_more_than_friction_holds_is_said(bench, baseline, part):
         rng=np.random.default_rng(0),
     )
     assert found.verdict == 'unknown', found.summary
-    assert 'the error of elbow' in found.summary
-    assert 'a stop, a brake or a contact' in found.summary
+    assert 'elbow' in found.summary and 'a brake' in found.summary
     assert found.where[0].joint == 'elbow'
 
 
@@ -126,10 +125,11 @@ def test_a_joint_that_never_moves_is_said_not_to_be_checked(bench, baseline):
     found = diagnose(bench.arm, list(without_elbow(0)), baseline=before, rng=rng)
     assert found.verdict == 'consistent', found.summary
     assert found.at_rest == ('elbow',)
-    assert found.summary.endswith('Not checked: elbow did not move.')
-    assert 'In elbow' not in found.summary
-    assert 'Move elbow as well, and record again.' in next_steps(found)
-    assert not any('simulation and control' in step for step in next_steps(found))
+    *_, unchecked = found.summary.split('. ')
+    assert 'Not checked' in unchecked and found.summary.count('elbow') == 1
+    steps = next_steps(found)
+    assert any(step.startswith('Move elbow') for step in steps)
+    assert not any(step.startswith('Use') for step in steps)
     moved = replace(found, data=())
     doubted, harmful = replace(moved, doubt='It is poor.'), replace(moved, harmful=True)
     tones = [tone_of(one) for one in (found, moved, doubted, harmful)]

@@ -244,7 +244,7 @@ def test_a_change_that_few_recordings_hardly_tell_is_suspected_and_not_named(ben
     (suspected,) = found.suspected
     assert (suspected.name, suspected.joints) == ('coulomb_friction', ('elbow',))
     assert suspicion([suspected]) in found.summary
-    assert any('three more motions' in step for step in next_steps(found))
+    assert any('three more' in step for step in next_steps(found))
     assert tone_of(found) == 'fair'
 
 

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.search.explain import without_later
-from armid_ros.diagnosis.search.explanation import NOISE
 from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
@@ -35,83 +34,179 @@ from armid_ros.report.sections.diagnosed import NamedParameters
 import numpy as np
 import pytest
 
-FLOOR = 'the misfit that the model had before'
+NOTHING = Unnamed()
+#: The floor of a gap, which a summary repeats.
+FLOOR = 'old misfit'
 
 
-def said(arm, as_it_is):
-    closed = Excess(np.full(arm.robot.n_joints, 0.9), 'in the recordings')
-    return decide((), (), [closed], arm, FLOOR, as_it_is)
+def excess(bench, ratio, more=''):
+    """Return losses over their limits: one ratio in all joints, or one each."""
+    return Excess(np.ones(bench.robot.n_joints) * ratio, 'in the recordings', more)
 
 
-def test_a_model_that_explains_as_it_is_needs_no_fit(bench):
-    closed = Excess(np.full(bench.robot.n_joints, 0.8), 'in the recordings')
-    for as_it_is in (None, closed):
-        verdict = said(bench.arm, as_it_is)
-        assert verdict.word == 'consistent'
-        assert (
-            verdict.summary
-            == f'The model explains the recordings: what is left is no more than {FLOOR}.'
-        )
+def verdict(bench, *findings, left=0.5, as_it_is=None, unnamed=NOTHING, hides=None):
+    """Decide between a closed gap, by default, and an open one."""
+    as_it_is = None if as_it_is is None else excess(bench, as_it_is)
+    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, as_it_is, unnamed, hides)
 
 
-@pytest.mark.parametrize('floor', [NOISE, FLOOR])
-def test_what_is_there_and_too_small_to_matter_is_said(bench, floor):
-    """A Stribeck torque of a hundredth of a joint's torque is no gap, and no noise either."""
-    closed = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
-    small = Finding('stribeck_friction', ('elbow',), (), (), (), 0.45, (0.4, 0.5), 0.0)
-    summary = decide((), (), [closed], bench.arm, floor, None, Unnamed([small])).summary
-    text = 'too small to matter. A stribeck friction in elbow explains 45 % of what is left.'
-    assert text in summary
-    nothing = replace(small, share=0.001)
-    assert (
-        'stribeck'
-        not in decide((), (), [closed], bench.arm, floor, None, Unnamed([nothing])).summary
-    )
+def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elbow',), **more):
+    """Return a cause in the elbow that takes a share of the gap."""
+    effect = CATALOGUE[name].on(bench.robot, joints or None)
+    parameters = effect.parameters(bench.robot)[: len(values)]
+    numbers = parameters, values, (0.01,) * len(values), share, (0.2, 0.4), 0.0
+    return Finding(name, joints, *numbers, sign=effect.sign, **more)
 
 
-def test_a_model_that_is_far_off_in_a_joint_says_how_much_can_hide_there(bench):
-    closed = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
+@pytest.mark.parametrize(('as_it_is', 'fitted'), [(None, False), (0.8, False), ([0.8, 4.0], True)])
+def test_a_body_that_has_to_be_fitted_is_stated(bench, as_it_is, fitted):
+    for named, word in (((), 'consistent'), ((finding(bench),), 'named')):
+        found = verdict(bench, *named, as_it_is=as_it_is)
+        assert found.word == word and FLOOR in found.summary
+        assert ('fitted' in found.summary) == fitted
+
+
+@pytest.mark.parametrize('as_it_is', [None, 4.0])
+@pytest.mark.parametrize(('share', 'mentioned'), [(0.45, True), (0.001, False)])
+def test_small_print_of_no_size_is_not_read_out(bench, as_it_is, share, mentioned):
+    small = Unnamed([finding(bench, share)])
+    text = verdict(bench, as_it_is=as_it_is, unnamed=small).summary
+    assert ('encoder offset' in text) == ('45 %' in text) == mentioned
+
+
+@pytest.mark.parametrize('joints', [(), ('elbow',), ('shoulder',)])
+def test_a_joint_far_off_has_the_size_of_what_can_hide_there(bench, joints):
     hides = Hiding(np.array([0.01, 0.13]), np.array([0.014, 0.18]))
-    small = small_finding(bench, 0.3)
+    minor = [finding(bench, joints=joints)] if joints else []
+    *_, hidden = verdict(bench, unnamed=Unnamed(minor), hides=hides).summary.split('. ')
+    assert all(fact in hidden for fact in ('elbow', '13 %', '18 %'))
+    assert ('encoder offset' in hidden) == (joints == ('elbow',))
 
-    def text(minor):
-        return decide((), (), [closed], bench.arm, FLOOR, None, Unnamed(minor), hides).summary
 
-    hidden = (
-        'In elbow that misfit is 13 % of the torque: a change of up to 18 % of it can hide there'
+def test_what_is_not_explained_has_the_cause_that_explains_most_of_it(bench):
+    plain = verdict(bench, left=4.0)
+    assert plain.word == 'unknown' and '2.0 times' in plain.summary
+    nothing = Unnamed([finding(bench, 0.001)])
+    assert verdict(bench, left=4.0, unnamed=nothing) == plain
+    text = verdict(bench, left=4.0, unnamed=Unnamed([finding(bench)])).summary
+    assert all(fact in text for fact in ('elbow', '0.100 +- 0.020 rad', '5.7 degrees', '30 %'))
+
+
+def test_what_is_unproven_or_suspected_is_stated_once_for_all_of_its_names(bench):
+    joints = tuple(f'joint_{k}' for k in range(5))
+    viscous = replace(finding(bench, 0.7), name='viscous_friction', joints=joints)
+    both = (
+        replace(viscous, together=('coulomb_friction',)),
+        replace(viscous, name='coulomb_friction', together=('viscous_friction',)),
     )
-    assert text(()).endswith(f'is no more than {FLOOR}. {hidden}.')
-    assert text([small]).endswith(f'{hidden}, such as the encoder offset of the small print.')
-    assert text([replace(small, joints=('shoulder',))]).endswith(f'. {hidden}.')
+    for kind, left in (('suspected', 0.5), ('unproven', 4.0)):
+        text = verdict(bench, left=left, unnamed=Unnamed(**{kind: both})).summary
+        assert text.count('70 %') == text.count('5 joints') == 1
+        assert text.lower().index('viscous friction') < text.index('coulomb friction')
 
 
-def test_a_share_is_the_same_text_wherever_it_is_said(bench):
-    small = small_finding(bench, 0.3)
-    assert share_in_words(small) == '30 % of the gap'
-    assert share_in_words(small, interval=True) == '30 % of the gap (20 % to 40 %)'
-    beside = replace(small, share=0.001, of_joint=('elbow', 0.94))
-    assert share_in_words(beside) == '0.1 % of the gap, and most of what the others leave in elbow'
+def test_a_share_has_two_digits_and_the_joint_that_needs_it(bench):
+    small = finding(bench)
+    assert share_in_words(small).split(' of ')[0] == '30 %'
+    assert '20 % to 40 %' in share_in_words(small, interval=True)
+    beside = share_in_words(replace(small, share=0.001, of_joint=('elbow', 0.94)))
+    assert beside.startswith('0.1 %') and beside.endswith('elbow')
     assert [percent(x) for x in (0.957, 0.004, 0.0, -1e-5)] == ['96 %', '0.4 %', '0 %', '0 %']
 
 
-def test_no_value_is_less_than_nothing_by_rounding(bench):
-    small = replace(small_finding(bench, 0.3), values=(-1e-6,), std=(0.0007,))
-    assert 'encoder offset 0.0000 +- 0.0014 rad' in sentence(small)
+@pytest.mark.parametrize(
+    ('name', 'values', 'std', 'shown'),
+    [
+        ('encoder_offset', (-1e-6,), (0.0007,), '0.0000 +- 0.0014 rad'),
+        ('base_tilt', (0.03517, 0.0006), (0.00017, 0.00015), '0.034 degrees'),
+    ],
+)
+def test_no_value_is_lost_by_rounding(bench, name, values, std, shown):
+    joints = ('elbow',) if name == 'encoder_offset' else ()
+    found = finding(bench, name=name, values=values, joints=joints)
+    assert shown in sentence(replace(found, std=std))
 
 
-def test_a_model_that_has_to_be_fitted_says_so(bench):
-    excess = np.full(bench.robot.n_joints, 0.8)
-    excess[-1] = 4.0
-    verdict = said(bench.arm, Excess(excess, 'in the recordings'))
-    assert verdict.word == 'consistent'
-    assert 'once its rigid body and friction are fitted' in verdict.summary
+def test_a_parameter_of_several_joints_is_called_by_its_name_once(bench):
+    joints = ('shoulder', 'elbow')
+    text = sentence(finding(bench, name='viscous_friction', values=(0.3, 0.2), joints=joints))
+    assert text.count('viscous coefficient') == 1
+    assert text.index('0.300 +- 0.020') < text.index('0.200 +- 0.020')
+
+
+def test_names_that_are_one_cause_have_one_share(bench):
+    tilt, size, delay = (
+        finding(bench, share, name, (0.3,), (), together=together)
+        for name, share, together in (
+            ('base_tilt', 0.9, ('gravity_magnitude',)),
+            ('gravity_magnitude', 0.9, ('base_tilt',)),
+            ('time_delay', 0.001, ()),
+        )
+    )
+    text = verdict(bench, tilt, size, delay).summary
+    assert text.count('90 %') == text.count('0.1 %') == 1
+    for fact in ('17.2 degrees', '0.300 +- 0.020 m/s^2', '0.300 +- 0.020 s', FLOOR):
+        assert fact in text
+
+
+def test_friction_of_many_joints_is_stated_by_how_much_of_it_has_changed(bench):
+    joints = tuple(f'joint_{k}' for k in range(5))
+    both = {'viscous_friction': 'viscous_coefficient', 'coulomb_friction': 'coulomb_torque'}
+    had = np.arange(1.0, 6.0)
+
+    def changed(name, shares):
+        parameters = tuple(ParameterName(both[name], joint, 'N m') for joint in joints)
+        numbers = parameters, tuple(shares * had), tuple(0.005 * had)
+        other = tuple(one for one in both if one != name)
+        share = 0.97, (0.9, 1.0), 0.0
+        return Finding(name, joints, *numbers, *share, together=other, added_to=tuple(had))
+
+    for low, high, shown in ((-0.3, -0.2, '-30 to -20 %'), (-0.072, -0.068, '-7 %')):
+        shares = np.linspace(low, high, 5)
+        text = verdict(bench, *(changed(one, shares) for one in both)).summary
+        assert text.count('97 %') == 1 and shown in text and '5 joints' in text
+    group = [changed(one, np.ones(5)) for one in both]
+    assert names_and_places(group).endswith(', '.join(joints))
+    assert names_and_places([replace(group[0], joints=())]).endswith('whole arm')
+
+
+@pytest.mark.parametrize(
+    ('rivals', 'stated'),
+    [
+        ((('link_inertia', 'elbow'),), 'link inertia'),
+        ((('link_inertia', 'shoulder'),), 'inertia of shoulder'),
+        ((('link_inertia', 'elbow'), ('payload', 'shoulder')), 'elbow or payload'),
+        ((('torque_offset', 'shoulder'),), 'one of shoulder'),
+    ],
+)
+def test_a_rival_in_another_joint_is_stated_with_it(bench, rivals, stated):
+    others = tuple(Rival(name, (joint,)) for name, joint in rivals)
+    found = verdict(bench, finding(bench, 0.9, 'torque_offset', rivals=others))
+    assert found.word == 'ambiguous' and stated in found.summary
+
+
+@pytest.mark.parametrize(('ratio', 'word'), [(0.5, 'ambiguous'), (4.0, 'partial')])
+def test_rivals_of_every_name_are_stated_whatever_is_left(bench, ratio, word):
+    first = finding(bench, 0.6, rivals=(Rival('payload', ('shoulder',)),))
+    second = replace(first, name='torque_offset', rivals=(Rival('torque_gain', ('elbow',)),))
+    found = verdict(bench, first, second, left=ratio)
+    assert found.word == word
+    assert 'payload of shoulder' in found.summary and 'torque gain' in found.summary
+    assert ('2.0 times' in found.summary) == (word == 'partial')
+
+
+def test_an_experiment_names_the_joints_of_both():
+    same = _separating('payload', ['elbow'], Rival('link_inertia', ('elbow',)))
+    assert 'link inertia' in same and 'elbow' in same
+    other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
+    assert 'offset of elbow' in other and 'inertia of wrist' in other
 
 
 def test_what_does_not_repeat_has_to_matter(bench):
     joints = bench.robot.n_joints
     one = np.ones(joints)
     floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), 0.1 * one, one)
-    closed = Excess(0.5 * one, 'in the recordings')
+    closed = excess(bench, 0.5)
 
     def word(least):
         strange = not_repeating([floor] * 3, bench.arm, Thresholds(), least * one)
@@ -120,174 +215,6 @@ def test_what_does_not_repeat_has_to_matter(bench):
     assert word(0.1).word == 'not_repeatable'
     assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary
     assert word(0.3).word == 'consistent'
-
-
-def small_finding(bench, share):
-    """Return an encoder offset that takes a share of the gap."""
-    effect = CATALOGUE['encoder_offset'].on(bench.robot, ('elbow',))
-    names = effect.parameters(bench.robot)
-    return Finding(
-        'encoder_offset',
-        ('elbow',),
-        names,
-        (0.1,),
-        (0.01,),
-        share,
-        (0.2, 0.4),
-        0.0,
-        sign=effect.sign,
-    )
-
-
-def test_what_is_not_explained_is_said_with_what_explains_most_of_it(bench):
-    gap = Excess(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
-    small = small_finding(bench, 0.3)
-
-    def text(minor):
-        return decide((), (), [gap], bench.arm, FLOOR, None, Unnamed(minor)).summary
-
-    assert text(()).endswith('Nothing in the catalogue explains it.')
-    assert text([replace(small, share=0.001)]) == text(())
-    assert text([small]).endswith(
-        'Nothing in the catalogue closes it. An encoder offset in elbow (encoder offset 0.100 '
-        '+- 0.020 rad, 5.7 degrees: the joint is at its reading plus that) explains 30 % of the '
-        'gap.'
-    )
-
-
-def test_a_small_angle_is_no_zero_in_degrees(bench):
-    effect = CATALOGUE['base_tilt'].on(bench.robot)
-    numbers = (effect.parameters(bench.robot), (0.03517, 0.0006), (0.00017, 0.00015))
-    tilt = Finding('base_tilt', (), *numbers, 0.9, (0.8, 1.0), 0.0)
-    assert 'tilt y 0.00060 +- 0.00029 rad, 0.034 degrees)' in sentence(tilt)
-
-
-def test_names_that_are_one_cause_are_one_sentence(bench):
-    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
-
-    def found(name, share, together=()):
-        effect = CATALOGUE[name].on(bench.robot)
-        parameters = effect.parameters(bench.robot)[:1]
-        shares = share, (share - 0.01, share + 0.01)
-        return Finding(name, (), parameters, (0.3,), (0.01,), *shares, 0.0, together=together)
-
-    tilt = found('base_tilt', 0.9, ('gravity_magnitude',))
-    size = found('gravity_magnitude', 0.9, ('base_tilt',))
-    delay = found('time_delay', 0.001)
-    said = decide([tilt, size, delay], (), [closed], bench.arm, FLOOR).summary
-    assert said == (
-        'A base tilt (tilt x 0.300 +- 0.020 rad, 17.2 degrees) and a gravity magnitude (gravity '
-        'difference 0.300 +- 0.020 m/s^2) together explain 90 % of the gap. A time delay (delay '
-        '0.300 +- 0.020 s) explains 0.1 % of the gap. The rest is '
-        'the misfit that the model had before.'
-    )
-
-
-def test_friction_of_many_joints_is_said_with_how_much_of_it_has_changed(bench):
-    joints = tuple(f'joint_{k}' for k in range(5))
-    both = {'viscous_friction': 'viscous_coefficient', 'coulomb_friction': 'coulomb_torque'}
-    had = np.arange(1.0, 6.0)
-    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
-
-    def finding(name, shares):
-        parameters = tuple(ParameterName(both[name], joint, 'N m') for joint in joints)
-        numbers = parameters, tuple(shares * had), tuple(0.005 * had)
-        other = tuple(one for one in both if one != name)
-        share = 0.97, (0.9, 1.0), 0.0
-        return Finding(name, joints, *numbers, *share, together=other, added_to=tuple(had))
-
-    def said(shares):
-        return decide([finding(one, shares) for one in both], (), [closed], bench.arm, FLOOR)
-
-    assert said(np.linspace(-0.3, -0.2, 5)).summary.startswith(
-        'Viscous friction and coulomb friction in 5 joints (by -30 to -20 % of what it was) '
-        'together explain 97 % of the gap.'
-    )
-    assert '(by -7 % of what it was)' in said(np.linspace(-0.072, -0.068, 5)).summary
-    group = [finding(one, np.ones(5)) for one in both]
-    where = 'joint_0, joint_1, joint_2, joint_3, joint_4'
-    assert names_and_places(group) == f'viscous friction and coulomb friction of {where}'
-    assert names_and_places([replace(group[0], joints=())]) == 'viscous friction of the whole arm'
-
-
-@pytest.mark.parametrize(('share', 'mentioned'), [(0.3, True), (0.001, False)])
-def test_small_print_of_no_size_is_not_read_out(bench, share, mentioned):
-    off = Excess(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
-    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
-    minor = (small_finding(bench, share),)
-    summary = decide((), (), [closed], bench.arm, FLOOR, off, Unnamed(minor)).summary
-    assert ('encoder offset' in summary) == mentioned
-
-
-@pytest.mark.parametrize(
-    ('rivals', 'said'),
-    [
-        ((Rival('link_inertia', ('elbow',)),), 'it from link inertia.'),
-        ((Rival('link_inertia', ('shoulder',)),), 'it from link inertia of shoulder.'),
-        (
-            (Rival('link_inertia', ('elbow',)), Rival('payload', ('shoulder',))),
-            'it from link inertia of elbow or payload of shoulder.',
-        ),
-        ((Rival('torque_offset', ('shoulder',)),), 'it from one of shoulder.'),
-    ],
-)
-def test_what_could_stand_in_another_joint_is_said_with_it(bench, rivals, said):
-    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
-    effect = CATALOGUE['torque_offset'].on(bench.robot, ('elbow',))
-    numbers = (effect.parameters(bench.robot), (1.0,), (0.1,), 0.9, (0.8, 0.95), 0.0)
-    found = Finding('torque_offset', ('elbow',), *numbers, rivals=rivals)
-    assert f'cannot tell {said}' in decide([found], (), [closed], bench.arm, FLOOR).summary
-
-
-def test_rivals_of_every_name_are_said_whatever_is_left(bench):
-    rival = (Rival('payload', ('shoulder',)),)
-    first = replace(small_finding(bench, 0.6), rivals=rival)
-    second = replace(first, name='torque_offset', rivals=(Rival('torque_gain', ('elbow',)),))
-    tied = (
-        ' These data cannot tell the encoder offset from payload of shoulder, nor the torque '
-        'offset from torque gain.'
-    )
-    for ratio, word in ((0.5, 'ambiguous'), (4.0, 'partial')):
-        left = Excess(np.full(bench.robot.n_joints, ratio), 'in the recordings', ', all day')
-        said = decide([first, second], (), [left], bench.arm, FLOOR)
-        assert said.word == word and tied in said.summary
-    assert said.summary.endswith(
-        ' There is more: the error of shoulder in the recordings is 2.0 times as large as '
-        f'{FLOOR} can be, all day.'
-    )
-
-
-def test_names_that_need_a_body_fitted_beside_them_say_so(bench):
-    closed, off = (Excess(np.full(bench.robot.n_joints, x), '') for x in (0.5, 2.0))
-    for as_it_is, once in (
-        (closed, ''),
-        (off, ', once its rigid body and friction are fitted as'),
-    ):
-        said = decide([small_finding(bench, 0.9)], (), [closed], bench.arm, FLOOR, as_it_is)
-        assert said.word == 'named' and f'The rest is {FLOOR}{once}' in said.summary
-
-
-def test_a_cause_that_may_have_been_there_before_is_said_though_it_is_not_named(bench):
-    gap = Excess(4.0 * np.ones(bench.robot.n_joints), 'in the recordings')
-    stop = replace(small_finding(bench, 0.5), name='soft_limit')
-    unnamed = Unnamed(unproven=[stop])
-    assert decide((), (), [gap], bench.arm, FLOOR, None, unnamed).summary.endswith(
-        'is at its reading plus that) would explain 50 % of the gap, and is not named, as the '
-        'recordings from before do not tell whether it was there then.'
-    )
-
-
-def test_what_is_suspected_is_said_once_for_all_of_its_names(bench):
-    closed = Excess(0.5 * np.ones(bench.robot.n_joints), 'in the recordings')
-    joints = tuple(f'joint_{k}' for k in range(5))
-    viscous = replace(small_finding(bench, 0.7), name='viscous_friction', joints=joints)
-    both = (
-        replace(viscous, together=('coulomb_friction',)),
-        replace(viscous, name='coulomb_friction', together=('viscous_friction',)),
-    )
-    said = decide((), (), [closed], bench.arm, FLOOR, None, Unnamed(suspected=both)).summary
-    assert said.count('would explain') == 1
-    assert 'Viscous friction and coulomb friction in 5 joints would explain 70 % of what' in said
 
 
 def test_a_factor_of_all_friction_is_suspected_with_the_names_of_its_parts(bench):
@@ -307,14 +234,6 @@ def test_a_factor_of_all_friction_is_suspected_with_the_names_of_its_parts(bench
         (names[1], 0.5, names[0]),
     ]
     assert _as_looked_at(None, SimpleNamespace(total=6.0, tried=1), bench.arm) == ()
-
-
-def test_an_experiment_names_the_joints_of_both():
-    same = _separating('payload', ['elbow'], Rival('link_inertia', ('elbow',)))
-    assert same.startswith('To separate payload from link inertia of elbow: ')
-    assert same.endswith('elbow: the same motion with and without the tool.')
-    other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
-    assert other.startswith('To separate torque offset of elbow from link inertia of wrist: ')
 
 
 @pytest.mark.parametrize(('value', 'shown'), [(-0.06, 0), (-0.01, 1), (0.06, 1)])
@@ -356,37 +275,15 @@ def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():
     assert later.rivals == (link,)
 
 
-def test_a_parameter_of_several_joints_is_called_by_its_name_once(bench):
-    effect = CATALOGUE['viscous_friction'].on(bench.robot, ('shoulder', 'elbow'))
-    found = Finding(
-        'viscous_friction',
-        effect.joints,
-        effect.parameters(bench.robot),
-        (0.3, 0.2),
-        (0.01, 0.01),
-        0.9,
-        (0.8, 1.0),
-        0.0,
-    )
-    values = '(viscous coefficient 0.300 +- 0.020 N m s/rad, 0.200 +- 0.020 N m s/rad)'
-    assert sentence(found) == (
-        f'A viscous friction in shoulder, elbow {values} explains 90 % of the gap.'
-    )
-
-
 @pytest.mark.parametrize(('time', 'std', 'told'), [(206.0, 12908.0, False), (206.0, 20.0, True)])
-def test_a_shape_that_the_data_do_not_determine_is_said_so_with_what_shows_it(
-    bench, time, std, told
-):
+def test_a_shape_that_the_data_do_not_determine_has_no_value(bench, time, std, told):
     effect = CATALOGUE['thermal_friction'].on(bench.robot, ('elbow',))
     names = (*effect.parameters(bench.robot), *effect.shape_parameters(bench.robot))
     numbers = (names, (0.4, time), (0.05, std), 0.9, (0.8, 1.0), 0.0)
     found = Finding('thermal_friction', ('elbow',), *numbers)
-    open_gap = Excess(np.full(bench.robot.n_joints, 0.9), 'in the recordings')
-    summary = decide((found,), (), [open_gap], bench.arm, FLOOR).summary
-    assert ('warm up time 206' in summary) is told
-    way = f'do not determine its warm up time; what shows it is {effect.shown_by}.'
-    assert (way in summary) is not told
+    summary = verdict(bench, found).summary
+    assert ('206' in summary) is told
+    assert (effect.shown_by in summary) is not told
     rows = NamedParameters((found,)).rows
     assert ('not determined' in [row[-1] for row in rows]) is not told
     assert '0.4' in rows[0][-1]

@@ -11,14 +11,6 @@ import pinocchio as pin
 import pytest
 
 
-@pytest.mark.parametrize('name', ['viscous_friction', 'coulomb_friction'])
-def test_friction_takes_energy_whatever_the_direction(robot, motion, with_values, name):
-    tau = with_values(name, 0.3).torque(motion)
-    friction = tau - inverse_dynamics(robot, motion)
-    assert np.all(friction * motion.dq >= 0.0)
-    assert np.all(np.sum(friction * motion.dq, axis=1) > 0.0)
-
-
 def test_asymmetric_friction_gives_each_direction_its_own_law(robot, motion):
     """Fc+ = 0.5, Fc- = 0.2, Fv+ = 0.3, Fv- = 0.1 as means and half differences."""
     arm = (

@@ -32,8 +32,11 @@ def test_stribeck_friction_is_a_hump_with_a_falling_flank(robot, added):
     assert np.all(hump[dq > 0.3] < 0.4 * np.exp(-8.9))
 
 
-@pytest.mark.parametrize('name', ['stribeck_friction', 'load_dependent_friction'])
-def test_dry_friction_always_takes_energy(motion, added, name):
+@pytest.mark.parametrize(
+    'name',
+    ['viscous_friction', 'coulomb_friction', 'stribeck_friction', 'load_dependent_friction'],
+)
+def test_friction_always_takes_energy(motion, added, name):
     power = added(motion, name, 0.3) * motion.dq
     assert np.all(power >= 0.0)
     assert power.max() > 0.01

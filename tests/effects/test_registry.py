@@ -102,7 +102,7 @@ def test_the_diagnosis_looks_for_it(hose):
 
 
 def test_it_is_gone_with_its_registration(tmp_path):
-    with pytest.raises(ar.ArmidError, match="no effect 'hose'; the catalogue has viscous"):
+    with pytest.raises(ar.ArmidError, match=r"'hose'.*viscous_friction"):
         ar.make_effect('hose', ar.load_robot('two_link_elastic'))
     CATALOGUE.remove('viscous_friction')
     assert 'viscous_friction' in CATALOGUE
@@ -140,7 +140,7 @@ def test_what_cannot_go_to_other_processes_is_named():
     class Inner(Hose):
         """A hose that only this test knows."""
 
-    with pytest.raises(AssertionError, match='goes to other processes'):
+    with pytest.raises(AssertionError, match='other processes'):
         check_effect(Inner)
 
 
@@ -167,9 +167,9 @@ def test_a_class_without_its_methods_is_refused():
     kind = type(
         'Bare', (ar.Effect,), {'name': 'bare', 'summary': 'no', 'quantities': Hose.quantities}
     )
-    with pytest.raises(ar.ArmidError, match='has no action and no columns'):
+    with pytest.raises(ar.ArmidError, match=r'action.*columns'):
         ar.register(kind)
-    with pytest.raises(ar.ArmidError, match='no class of effects'):
+    with pytest.raises(ar.ArmidError, match='no class'):
         ar.register(Hose(('joint1',)))
 
 

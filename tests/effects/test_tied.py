@@ -90,10 +90,10 @@ def test_a_motion_without_the_partner_is_refused_by_name(pair, motions) -> None:
 
 
 def test_two_ties_on_a_joint_and_joints_without_any_are_refused(pair) -> None:
-    with pytest.raises(ModelError, match='two ties on exo_swing_knee'):
+    with pytest.raises(ModelError, match='exo_swing_knee'):
         twice = (pair.ties[0], replace(pair.ties[0], name='again'))
         Partner(pair.other, twice).interaction.on(pair.robot)
-    with pytest.raises(ModelError, match="no tie on joint 'exo_stance_hip'"):
+    with pytest.raises(ModelError, match="'exo_stance_hip'"):
         Partner(pair.other, pair.ties).slack.on(pair.robot, ('exo_stance_hip',))
 
 

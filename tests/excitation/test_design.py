@@ -27,7 +27,7 @@ import pytest
 
 
 def test_a_run_of_more_than_a_day_is_refused_before_it_is_searched_for():
-    with pytest.raises(TrajectoryError, match=r'last 1e\+09 s; a day is the most'):
+    with pytest.raises(TrajectoryError, match=r'1e\+09 s.*a day'):
         DesignSettings(period=5e8)
 
 
@@ -159,7 +159,7 @@ def test_error_in_a_process_of_its_own_is_raised_here(two_link_arm, quick):
     )
     task = Task(replace(problem, limits=weak), None, None)
     rngs = np.random.default_rng(0).spawn(2)
-    with pytest.raises(TrajectoryError, match='joint shoulder: torque limit 2 N m'):
+    with pytest.raises(TrajectoryError, match=r'shoulder.*2 N m'):
         search_all(task, rngs, lambda done, found: None)
 
 
@@ -254,7 +254,7 @@ def test_impossible_start_pose_is_refused(humanoid, with_effects, quick, start, 
 def test_start_pose_in_a_wall_is_refused_with_the_wall(two_link_arm, quick):
     settings = replace(quick, start=np.zeros(2), starts=1, iterations=1)
     wall = Obstacle('wall', 'sphere', (0.3,), (0.3, 0.0, 1.0))
-    with pytest.raises(TrajectoryError, match=r'start pose: .* wall are -'):
+    with pytest.raises(TrajectoryError, match=r'start pose.* wall'):
         design(
             two_link_arm,
             settings,

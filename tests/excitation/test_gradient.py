@@ -73,11 +73,16 @@ EFFECTS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('effects', EFFECTS.values(), ids=EFFECTS.keys())
-@pytest.mark.parametrize('criterion', ['D', 'A', 'E', 'condition'])
-def test_gradient_of_each_criterion(tree, with_effects, criterion, effects):
+@pytest.mark.parametrize(
+    ('criterion', 'effects'),
+    [*(('D', effects) for effects in EFFECTS), *((name, 'state') for name in 'AE'),
+     ('condition', 'state')],
+)  # fmt: skip
+def test_gradient_of_each_criterion_and_of_each_kind_of_effect(
+    tree, with_effects, criterion, effects
+):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40, criterion=criterion)
-    arm = with_effects(tree, *effects)
+    arm = with_effects(tree, *EFFECTS[effects])
     problem = DesignProblem.of(arm, settings, np.random.default_rng(3))
     assert_gradient(Objective.of(problem), problem)
 

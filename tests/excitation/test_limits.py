@@ -85,7 +85,7 @@ def test_peak_between_the_samples_is_found(limits, swing, two_link):
 
 def test_joints_of_another_robot_are_refused(limits, swing):
     other = replace(swing.one_period(10), joints=('elbow', 'shoulder'))
-    with pytest.raises(TrajectoryError, match='joints elbow, shoulder'):
+    with pytest.raises(TrajectoryError, match='elbow, shoulder'):
         check_limits(limits, other)
 
 
@@ -107,9 +107,9 @@ def test_unknown_speed_is_refused(two_link, speed, message):
 
 
 def test_limits_without_room_are_refused_with_the_joint(limits):
-    with pytest.raises(TrajectoryError, match='joint elbow: no room between'):
+    with pytest.raises(TrajectoryError, match=r'elbow.*no room'):
         replace(limits, lower=np.array([-1.0, 1.0]), upper=np.array([1.0, 1.0]))
-    with pytest.raises(TrajectoryError, match='joint shoulder: its velocity limit is 0'):
+    with pytest.raises(TrajectoryError, match=r'shoulder.*velocity limit'):
         replace(limits, velocity=np.array([0.0, 1.0]))
 
 

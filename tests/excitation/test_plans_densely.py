@@ -21,11 +21,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-QUICK = ()
-SLOW = (
-    'ur5_robot',
-    'ur3_robot', 'ur10_robot', 'ur3e_robot', 'ur5e_robot', 'ur10e_robot', 'panda', 'fr3',
-    'kinova', 'gen3_robotiq_2f_85', 'iiwa14', 'z1',
+ARMS = (
+    'ur3_robot', 'ur5_robot', 'ur10_robot', 'ur3_joint_limited_robot', 'ur5_joint_limited_robot',
+    'ur10_joint_limited_robot', 'panda', 'z1', 'xarm7', 'so100', 'so101', 'talos_left_arm',
 )  # fmt: skip
 #: Height at which the floor itself is, without the clearance that plans keep [m].
 FLOOR = 0.0
@@ -107,9 +105,8 @@ def violations(path, robot, run):
     return found
 
 
-@pytest.mark.parametrize(
-    'name', [*QUICK, *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize('name', ARMS)
 def test_a_plan_keeps_everything_at_a_kilohertz(name):
     path = shipped(name)
     robot, run = planned(path)

@@ -50,7 +50,8 @@ def test_ten_times_the_torque_is_a_surprise(arm, run):
 
 
 def test_without_joint_states_it_is_said(arm, run):
-    assert Rehearsal(run, arm).report().surprises == ('no joint state came during the rehearsal',)
+    (surprise,) = Rehearsal(run, arm).report().surprises
+    assert 'no joint state' in surprise
 
 
 @pytest.mark.slow

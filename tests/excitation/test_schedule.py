@@ -99,7 +99,7 @@ def test_run_from_a_pose_stays_between_pose_and_orbit(trajectory):
 
 
 def test_rate_that_does_not_fit_the_period_is_refused_with_one_that_does(trajectory):
-    with pytest.raises(TrajectoryError, match=r'10 s is 3.3 samples .* take 0.3 Hz'):
+    with pytest.raises(TrajectoryError, match=r'3.3 samples.*0.3 Hz'):
         Excitation(trajectory).motion(0.33)
 
 
@@ -143,7 +143,7 @@ def test_bad_file_is_refused_with_its_name(name, text, message, tmp_path):
 
 
 def test_coefficients_that_are_no_numbers_are_refused_with_the_joint():
-    with pytest.raises(TrajectoryError, match='a of joint elbow'):
+    with pytest.raises(TrajectoryError, match='elbow'):
         FourierTrajectory(('elbow',), 1.0, np.zeros(1), np.full((1, 2), np.nan), np.zeros((1, 2)))
 
 

@@ -3,10 +3,9 @@
 """A result of several files is that of one run, whatever ends the next one."""
 
 import errno
-import itertools
-import os
+import json
 from pathlib import Path
-import signal
+import subprocess
 import sys
 
 from armid_ros.errors import OutputError
@@ -62,48 +61,16 @@ def test_a_result_that_is_kept_replaces_the_earlier_one(out):
     assert not (out / STAGING).exists()
 
 
-@pytest.fixture
-def killed_at():
-    """Kill a process of its own at its n-th call of the system; return whether it came so far."""
-
-    def run(number, work):
-        child = os.fork()
-        if child == 0:
-            calls = itertools.count(1)
-
-            def kill(event, _):
-                if event.startswith(('os.', 'shutil.', 'ctypes.', 'open')) and (
-                    next(calls) == number
-                ):
-                    os.kill(os.getpid(), signal.SIGKILL)
-
-            sys.addaudithook(kill)
-            work()
-            os._exit(0)
-        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
-
-    return run
-
-
-@pytest.mark.filterwarnings('ignore:.*fork:DeprecationWarning')
-def test_a_run_that_is_killed_leaves_all_of_one_result(out, killed_at):
+def test_a_run_that_is_killed_leaves_all_of_one_result(out):
     """The kill comes before every call of the system, one after the other."""
-
-    def replace(content):
-        with staged(out, ('*.json', 'model.yaml', 'identified.urdf')) as result:
-            for name in ('identification.json', 'model.yaml', 'report.html'):
-                write_file(result.folder / name, content)
-            (result.folder / 'trajectory').mkdir()
-            write_file(result.folder / 'trajectory' / 'a.mcap', content)
-            result.keep()
-
-    replace('0')
+    command = [sys.executable, Path(__file__).with_name('killed.py'), out]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     seen = set()
-    for number in itertools.count(1):
-        killed = killed_at(number, lambda content=str(number): replace(content))
+    for number, line in enumerate(done.stdout.splitlines()):
+        left = json.loads(line)
         results = {
             path: text
-            for path, text in contents(out).items()
+            for path, text in left.items()
             if not path.startswith((STAGING, 'notes', 'recording'))
         }
         assert sorted(results) == [
@@ -113,10 +80,8 @@ def test_a_run_that_is_killed_leaves_all_of_one_result(out, killed_at):
             'trajectory/a.mcap',
         ]
         assert len(set(results.values())) == 1, number
-        assert contents(out)['notes.txt'] == contents(out)['recording/a.mcap'] == 'monday'
+        assert left['notes.txt'] == left['recording/a.mcap'] == 'monday'
         seen |= set(results.values())
-        if not killed:
-            break
     assert len(seen) > 2  # killed after the exchange as well
     assert [path.name for path in out.parent.iterdir() if path.name.startswith('.')] == []
 

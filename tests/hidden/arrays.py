@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -63,3 +64,25 @@ class Parameter:
     joint: str
     value: float
     unit: str
+
+
+class Sized:
+    """What has true parameters and grows by one of its attributes; a base of dataclasses."""
+
+    #: The attribute that is larger where the gap is to be.
+    sized_by: ClassVar[str] = 'value'
+    #: Name in the catalogue, attribute and unit of every true parameter.
+    stated: ClassVar[tuple[tuple[str, str, str], ...]] = ()
+
+    def scaled(self, factor: float) -> Self:
+        """Return it larger by a factor, or its like of which the gap grows with the factor."""
+        return replace(self, **{self.sized_by: getattr(self, self.sized_by) * factor})
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return the true parameters, as the catalogue names them."""
+        joint = getattr(self, 'joint', '')
+        return tuple(
+            Parameter(name, joint, getattr(self, attribute), unit)
+            for name, attribute, unit in self.stated
+        )

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from tests.hidden.arrays import FloatArray, Parameter, Signals
+from tests.hidden.arrays import FloatArray, Signals, Sized
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Live:
         return self.data.qvel[self.dofs]
 
 
-class HiddenEffect(ABC):
+class HiddenEffect(Sized, ABC):
     """One hidden effect with its true parameters."""
 
     #: Name in the catalogue, or of something the catalogue does not have.
@@ -150,22 +150,13 @@ class HiddenEffect(ABC):
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         """Draw one of ordinary size in a joint, a pair or the whole arm."""
 
-    @abstractmethod
-    def scaled(self, factor: float) -> Self:
-        """Return it larger by a factor, or its like of which the gap grows with the factor."""
-
-    @property
-    @abstractmethod
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Return the true parameters."""
-
-    def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:  # noqa: B027
+    def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         """Change the description of the arm."""
 
-    def prepare(self, live: Live) -> None:  # noqa: B027
+    def prepare(self, live: Live) -> None:
         """Change the compiled model."""
 
-    def act(self, live: Live) -> None:  # noqa: B027
+    def act(self, live: Live) -> None:
         """Add torque or friction in this step."""
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
@@ -173,6 +164,41 @@ class HiddenEffect(ABC):
         return signals
 
 
+@dataclass(frozen=True)
+class InJoint(HiddenEffect):
+    """An effect in one joint."""
+
+    joint: str
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return (self.joint,)
+
+
+@dataclass(frozen=True)
+class OneJoint(InJoint):
+    """An effect in one joint with one value that the gap goes by."""
+
+    index: int
+    value: float
+
+
+@dataclass(frozen=True)
+class InPair(HiddenEffect):
+    """An effect in a pair of joints."""
+
+    pair: tuple[str, str]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.pair
+
+
 def pick(setting: Setting, rng: np.random.Generator, *, first: int = 0) -> int:
     """Pick a joint, none before the one given."""
     return int(rng.integers(first, setting.robot.n_joints))
+
+
+def pick_loaded(setting: Setting, rng: np.random.Generator, share: float = 0.05) -> int:
+    """Pick a joint that carries more than a share of the largest torque."""
+    return int(rng.choice(np.flatnonzero(setting.torque > share * setting.torque.max())))

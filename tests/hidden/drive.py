@@ -11,16 +11,16 @@ from armid_ros.robots import Robot
 import numpy as np
 
 from tests.hidden.arrays import Parameter, Signals
-from tests.hidden.base import HiddenEffect, Live, pick, Setting
+from tests.hidden.base import InJoint, Live, pick, pick_loaded, Setting
 
 
 @dataclass(frozen=True)
-class TorqueRipple(HiddenEffect):
+class TorqueRipple(InJoint):
     """Cogging: a torque that repeats several times per turn."""
 
     name = 'torque_ripple'
+    sized_by = 'amplitude'
     acts = True
-    joint: str
     index: int
     amplitude: float
     phase: float
@@ -41,13 +41,6 @@ class TorqueRipple(HiddenEffect):
         )
 
     @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, amplitude=self.amplitude * factor)
-
-    @property
     def parameters(self) -> tuple[Parameter, ...]:
         return (
             Parameter('ripple_sine', self.joint, self.amplitude * np.cos(self.phase), 'N m'),
@@ -61,33 +54,25 @@ class TorqueRipple(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class ActuatorSaturation(HiddenEffect):
+class ActuatorSaturation(InJoint):
     """A drive that gives no more than a limit, and reports what it was asked for."""
 
     name = 'actuator_saturation'
+    sized_by = 'excess'
     largest_factor = 10.0
-    joint: str
     index: int
     peak: float
     excess: float = 0.1
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
-        j = int(rng.choice(loaded))
+        j = pick_loaded(setting, rng)
         return cls(setting.robot.joints[j], j, float(setting.peak[j]))
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
 
     @property
     def limit(self) -> float:
         """Largest torque [N m]."""
         return self.peak / (1.0 + self.excess)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, excess=self.excess * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -12,29 +12,14 @@ import mujoco
 import numpy as np
 
 from tests.hidden.arrays import Parameter
-from tests.hidden.base import HiddenEffect, Live, pick, Setting
+from tests.hidden.base import InPair, Live, OneJoint, pick, pick_loaded, Setting
 
 
-@dataclass(frozen=True)
-class _JointFriction(HiddenEffect):
-    """Friction of one joint with one coefficient that the gap goes by."""
-
-    joint: str
-    index: int
-    value: float
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-
-class ViscousFriction(_JointFriction):
+class ViscousFriction(OneJoint):
     """The arm supplies value * dq: native damping."""
 
     name = 'viscous_friction'
+    stated = (('viscous_coefficient', 'value', 'N m s/rad'),)
     replaces = ('viscous_friction',)
     limit_of = ('thermal_friction',)
 
@@ -44,18 +29,15 @@ class ViscousFriction(_JointFriction):
         value = 0.05 * setting.drive[j] / setting.speed[j]
         return cls(setting.robot.joints[j], j, value)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('viscous_coefficient', self.joint, self.value, 'N m s/rad'),)
-
     def prepare(self, live: Live) -> None:
         live.model.dof_damping[live.dofs[self.index]] += self.value
 
 
-class CoulombFriction(_JointFriction):
+class CoulombFriction(OneJoint):
     """The arm supplies value * sign(dq), and holds at rest: native dry friction."""
 
     name = 'coulomb_friction'
+    stated = (('coulomb_torque', 'value', 'N m'),)
     replaces = ('coulomb_friction',)
     limit_of = ('stribeck_friction', 'presliding_hysteresis')
 
@@ -64,19 +46,19 @@ class CoulombFriction(_JointFriction):
         j = pick(setting, rng)
         return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j])
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('coulomb_torque', self.joint, self.value, 'N m'),)
-
     def prepare(self, live: Live) -> None:
         live.model.dof_frictionloss[live.dofs[self.index]] += self.value
 
 
 @dataclass(frozen=True)
-class StribeckFriction(_JointFriction):
+class StribeckFriction(OneJoint):
     """Dry friction that is higher by value * exp(-(dq / velocity)^2) at low speed."""
 
     name = 'stribeck_friction'
+    stated = (
+        ('stribeck_torque', 'value', 'N m'),
+        ('stribeck_velocity', 'velocity', 'rad/s'),
+    )
     needs = ('coulomb_friction',)
     acts = True
     velocity: float = 0.1
@@ -87,20 +69,13 @@ class StribeckFriction(_JointFriction):
         velocity = setting.speed[j] * rng.uniform(0.04, 0.12)
         return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j], velocity)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('stribeck_torque', self.joint, self.value, 'N m'),
-            Parameter('stribeck_velocity', self.joint, self.velocity, 'rad/s'),
-        )
-
     def act(self, live: Live) -> None:
         speed = live.data.qvel[live.dofs[self.index]]
         live.friction[self.index] += self.value * np.exp(-((speed / self.velocity) ** 2))
 
 
 @dataclass(frozen=True)
-class AsymmetricFriction(_JointFriction):
+class AsymmetricFriction(OneJoint):
     """Coulomb and viscous friction that differ between the directions."""
 
     name = 'asymmetric_friction'
@@ -126,10 +101,11 @@ class AsymmetricFriction(_JointFriction):
         live.applied[self.index] -= self.value * (self.coulomb_share + speed)
 
 
-class QuadraticFriction(_JointFriction):
+class QuadraticFriction(OneJoint):
     """Drag that grows with the square of the speed."""
 
     name = 'quadratic_friction'
+    stated = (('quadratic_coefficient', 'value', 'N m s^2/rad^2'),)
     acts = True
 
     @classmethod
@@ -137,41 +113,37 @@ class QuadraticFriction(_JointFriction):
         j = pick(setting, rng)
         return cls(setting.robot.joints[j], j, 0.05 * setting.drive[j] / setting.speed[j] ** 2)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('quadratic_coefficient', self.joint, self.value, 'N m s^2/rad^2'),)
-
     def act(self, live: Live) -> None:
         speed = live.data.qvel[live.dofs[self.index]]
         live.applied[self.index] -= self.value * speed * abs(speed)
 
 
-class LoadDependentFriction(_JointFriction):
+class LoadDependentFriction(OneJoint):
     """Dry friction that is higher by a share of the torque the rigid arm takes."""
 
     name = 'load_dependent_friction'
+    stated = (('load_coefficient', 'value', ''),)
     acts = True
     largest_factor = 8.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
-        j = int(rng.choice(loaded))
+        j = pick_loaded(setting, rng)
         return cls(setting.robot.joints[j], j, 0.08)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('load_coefficient', self.joint, self.value, ''),)
 
     def act(self, live: Live) -> None:
         live.friction[self.index] += self.value * abs(live.load[self.index])
 
 
 @dataclass(frozen=True)
-class PreslidingHysteresis(_JointFriction):
+class PreslidingHysteresis(OneJoint):
     """Dahl friction: a spring that slips, with its state integrated exactly over each step."""
 
     name = 'presliding_hysteresis'
+    stated = (
+        ('presliding_torque', 'value', 'N m'),
+        ('breakaway_distance', 'distance', 'rad'),
+    )
     acts = True
     distance: float = 0.01
 
@@ -180,13 +152,6 @@ class PreslidingHysteresis(_JointFriction):
         j = pick(setting, rng)
         distance = (setting.high[j] - setting.low[j]) * rng.uniform(0.02, 0.06)
         return cls(setting.robot.joints[j], j, 0.03 * setting.drive[j], distance)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('presliding_torque', self.joint, self.value, 'N m'),
-            Parameter('breakaway_distance', self.joint, self.distance, 'rad'),
-        )
 
     def act(self, live: Live) -> None:
         state = live.memory.setdefault(id(self), np.zeros(1))
@@ -197,10 +162,14 @@ class PreslidingHysteresis(_JointFriction):
 
 
 @dataclass(frozen=True)
-class ThermalFriction(_JointFriction):
+class ThermalFriction(OneJoint):
     """Viscous friction that gets less as the joint warms up."""
 
     name = 'thermal_friction'
+    stated = (
+        ('viscous_change', 'value', 'N m s/rad'),
+        ('warm_up_time', 'time_constant', 's'),
+    )
     needs = ('viscous_friction',)
     acts = True
     repeats = False
@@ -212,13 +181,6 @@ class ThermalFriction(_JointFriction):
         value = -0.02 * setting.drive[j] / setting.speed[j]
         return cls(setting.robot.joints[j], j, value, rng.uniform(6.0, 15.0))
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('viscous_change', self.joint, self.value, 'N m s/rad'),
-            Parameter('warm_up_time', self.joint, self.time_constant, 's'),
-        )
-
     def act(self, live: Live) -> None:
         warmth = 1.0 - np.exp(-live.t / self.time_constant)
         speed = live.data.qvel[live.dofs[self.index]]
@@ -226,7 +188,7 @@ class ThermalFriction(_JointFriction):
 
 
 @dataclass(frozen=True)
-class CoupledJointFriction(HiddenEffect):
+class CoupledJointFriction(InPair):
     """
     A shaft that turns with the sum of the last two joints: a tendon with friction and damping.
 
@@ -236,7 +198,6 @@ class CoupledJointFriction(HiddenEffect):
 
     name = 'coupled_joint_friction'
     needs = ('viscous_friction',)
-    pair: tuple[str, str]
     viscous: float
     coulomb: float
     most_viscous: float
@@ -246,10 +207,6 @@ class CoupledJointFriction(HiddenEffect):
         drive = float(setting.drive[-2:].min())
         viscous = 0.005 * drive / float(setting.robot.velocity_limit[-2:].max())
         return cls(setting.robot.joints[-2:], viscous, 0.02 * drive, 1.6 * viscous)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return self.pair
 
     def scaled(self, factor: float) -> Self:
         viscous = min(self.viscous * factor, self.most_viscous)  # less than the joint's own

@@ -13,19 +13,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.hidden.arrays import FloatArray, Parameter
-from tests.hidden.base import HiddenEffect, Live, pick, Setting
+from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, pick, Setting
 
 _NAMES = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 _UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
 @dataclass(frozen=True)
-class Payload(HiddenEffect):
+class Payload(InJoint):
     """A solid ball welded to the last link."""
 
     name = 'payload'
+    sized_by = 'mass'
     rigid = True
-    joint: str
     mass: float
     centre: tuple[float, float, float]
     radius: float = 0.03
@@ -37,13 +37,6 @@ class Payload(HiddenEffect):
         direction = rng.normal(size=3)
         centre = 0.1 * direction / np.linalg.norm(direction)
         return cls(joint, mass, tuple(centre.tolist()))
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, mass=self.mass * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -62,12 +55,12 @@ class Payload(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class LinkInertia(HiddenEffect):
+class LinkInertia(InJoint):
     """One link heavier, its centre of mass elsewhere, than the description says."""
 
     name = 'link_inertia'
+    sized_by = 'mass'
     rigid = True
-    joint: str
     index: int
     mass: float
     centre: tuple[float, float, float]
@@ -80,13 +73,6 @@ class LinkInertia(HiddenEffect):
         direction = rng.normal(size=3)
         centre = 0.1 * direction / np.linalg.norm(direction)
         return cls(setting.robot.joints[j], j, mass, tuple(centre.tolist()))
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, mass=self.mass * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -109,19 +95,14 @@ class GravityMagnitude(HiddenEffect):
     """Gravity stronger or weaker than the model has it."""
 
     name = 'gravity_magnitude'
+    sized_by = 'difference'
+    stated = (('gravity_difference', 'difference', 'm/s^2'),)
     rigid = True
     difference: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         return cls(float(rng.choice([-0.1, 0.1])))
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, difference=self.difference * factor)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('gravity_difference', '', self.difference, 'm/s^2'),)
 
     def prepare(self, live: Live) -> None:
         gravity = live.model.opt.gravity
@@ -157,30 +138,17 @@ class BaseTilt(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class RotorInertia(HiddenEffect):
+class RotorInertia(OneJoint):
     """Inertia of the rotor: native armature."""
 
     name = 'rotor_inertia'
+    stated = (('rotor_inertia', 'value', 'kg m^2'),)
     replaces = ('rotor_inertia',)
-    joint: str
-    index: int
-    value: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         j = pick(setting, rng, first=1)
         return cls(setting.robot.joints[j], j, 1e-3 * float(setting.drive[j]))
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('rotor_inertia', self.joint, self.value, 'kg m^2'),)
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         spec.joint(self.joint).armature += self.value

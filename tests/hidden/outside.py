@@ -5,33 +5,19 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import Parameter
-from tests.hidden.base import HiddenEffect, Live, pick, Setting
+from tests.hidden.base import HiddenEffect, Live, OneJoint, pick, Setting
 
 
 @dataclass(frozen=True)
-class _Outside(HiddenEffect):
-    joint: str
-    index: int
-    value: float
+class _Outside(OneJoint):
     acts = True
+    stated = (('torque', 'value', 'N m'),)
     in_catalogue = False
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('torque', self.joint, self.value, 'N m'),)
 
     def act(self, live: Live) -> None:
         live.applied[self.index] += self.value * self.shape(

@@ -13,26 +13,10 @@ import numpy as np
 from scipy.signal import lfilter
 
 from tests.hidden.arrays import FloatArray, Parameter, Signals
-from tests.hidden.base import HiddenEffect, pick, Setting
+from tests.hidden.base import HiddenEffect, InPair, OneJoint, pick, pick_loaded, Setting
 
 
-@dataclass(frozen=True)
-class _OneJoint(HiddenEffect):
-    """A fault of one torque reading or encoder."""
-
-    joint: str
-    index: int
-    value: float
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-
-class _Reading(_OneJoint):
+class _Reading(OneJoint):
     """A fault of one torque reading."""
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
@@ -49,16 +33,13 @@ class TorqueOffset(_Reading):
     """The reading is too high by a constant."""
 
     name = 'torque_offset'
+    stated = (('torque_offset', 'value', 'N m'),)
     limit_of = ('torque_drift', 'joint_spring', 'asymmetric_friction')
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         j = pick(setting, rng)
         return cls(setting.robot.joints[j], j, rng.choice([-1.0, 1.0]) * 0.02 * setting.drive[j])
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('torque_offset', self.joint, self.value, 'N m'),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self.value
@@ -69,6 +50,10 @@ class TorqueDrift(_Reading):
     """The reading creeps towards a new zero while the sensor warms up."""
 
     name = 'torque_drift'
+    stated = (
+        ('drift', 'value', 'N m'),
+        ('drift_time', 'time_constant', 's'),
+    )
     repeats = False
     time_constant: float = 10.0
 
@@ -78,13 +63,6 @@ class TorqueDrift(_Reading):
         value = rng.choice([-1.0, 1.0]) * 0.02 * setting.drive[j]
         return cls(setting.robot.joints[j], j, value, rng.uniform(6.0, 15.0))
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('drift', self.joint, self.value, 'N m'),
-            Parameter('drift_time', self.joint, self.time_constant, 's'),
-        )
-
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self.value * (1.0 - np.exp(-t / self.time_constant))
 
@@ -93,28 +71,24 @@ class TorqueGain(_Reading):
     """The reading is too large by a share."""
 
     name = 'torque_gain'
+    stated = (('gain_error', 'value', ''),)
     largest_factor = 6.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
-        j = int(rng.choice(loaded))
+        j = pick_loaded(setting, rng)
         return cls(setting.robot.joints[j], j, 0.05)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('gain_error', self.joint, self.value, ''),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return (1.0 + self.value) * tau
 
 
 @dataclass(frozen=True)
-class TorqueCrosstalk(HiddenEffect):
+class TorqueCrosstalk(InPair):
     """The reading of one joint contains a share of another's torque."""
 
     name = 'torque_crosstalk'
-    pair: tuple[str, str]
+    sized_by = 'share'
     share: float
     largest_factor = 15.0
 
@@ -125,13 +99,6 @@ class TorqueCrosstalk(HiddenEffect):
         quiet = int(rng.choice([j for j in range(len(order)) if j != loud]))
         share = rng.choice([-1.0, 1.0]) * 0.02
         return cls((setting.robot.joints[quiet], setting.robot.joints[loud]), share)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return self.pair
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, share=self.share * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -145,28 +112,17 @@ class TorqueCrosstalk(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class _WholeArm(HiddenEffect):
-    """A timing fault of all torque readings."""
-
-    value: float
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-
-class TimeDelay(_WholeArm):
+class TimeDelay(HiddenEffect):
     """Torque readings are older than the positions they come with: interpolated back."""
 
     name = 'time_delay'
+    stated = (('delay', 'value', 's'),)
     largest_factor = 5.0
+    value: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         return cls(0.004)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('delay', '', self.value, 's'),)
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         past = signals.t - self.value
@@ -178,17 +134,13 @@ class TorqueLag(_Reading):
     """The reading is low-passed, first order, exact for a torque linear between the steps."""
 
     name = 'torque_lag'
+    stated = (('lag', 'value', 's'),)
     largest_factor = 3.0
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        loaded = np.flatnonzero(setting.torque > 0.05 * setting.torque.max())
-        j = int(rng.choice(loaded))
+        j = pick_loaded(setting, rng)
         return cls(setting.robot.joints[j], j, 0.01)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('lag', self.joint, self.value, 's'),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         ratio = (t[1] - t[0]) / self.value
@@ -199,10 +151,11 @@ class TorqueLag(_Reading):
         return lfilter(numerator, [1.0, -decay], tau, zi=start)[0]
 
 
-class EncoderOffset(_OneJoint):
+class EncoderOffset(OneJoint):
     """The encoder reads too little by a constant."""
 
     name = 'encoder_offset'
+    stated = (('encoder_offset', 'value', 'rad'),)
     rigid = True
     largest_factor = 5.0
 
@@ -210,10 +163,6 @@ class EncoderOffset(_OneJoint):
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
         j = pick(setting, rng, first=1)
         return cls(setting.robot.joints[j], j, rng.choice([-1.0, 1.0]) * 0.02)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('encoder_offset', self.joint, self.value, 'rad'),)
 
     def distort(self, signals: Signals, robot: Robot) -> Signals:
         q = signals.q.copy()

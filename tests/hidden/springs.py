@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 from armid_ros.robots import Robot
@@ -13,25 +13,11 @@ import mujoco
 import numpy as np
 
 from tests.hidden.arrays import FloatArray, Parameter
-from tests.hidden.base import HiddenEffect, Live, pick, Setting
+from tests.hidden.base import InJoint, InPair, Live, OneJoint, pick, pick_loaded, Setting
 
 
 @dataclass(frozen=True)
-class _JointSpring(HiddenEffect):
-    joint: str
-    index: int
-    value: float
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-
-@dataclass(frozen=True)
-class JointSpring(_JointSpring):
+class JointSpring(OneJoint):
     """A native spring across a joint, at rest at some position."""
 
     name = 'joint_spring'
@@ -57,10 +43,14 @@ class JointSpring(_JointSpring):
 
 
 @dataclass(frozen=True)
-class SoftLimit(_JointSpring):
+class SoftLimit(OneJoint):
     """A bumper that pushes back beyond a position near the upper end of the motion."""
 
     name = 'soft_limit'
+    stated = (
+        ('upper_stiffness', 'value', 'N m/rad'),
+        ('upper_position', 'position', 'rad'),
+    )
     acts = True
     position: float = 0.0
 
@@ -72,13 +62,6 @@ class SoftLimit(_JointSpring):
         value = 0.1 * setting.drive[j] / (high - position)
         return cls(setting.robot.joints[j], j, value, position)
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('upper_stiffness', self.joint, self.value, 'N m/rad'),
-            Parameter('upper_position', self.joint, self.position, 'rad'),
-        )
-
     def act(self, live: Live) -> None:
         beyond = live.data.qpos[live.dofs[self.index]] - self.position
         if beyond > 0.0:
@@ -86,12 +69,12 @@ class SoftLimit(_JointSpring):
 
 
 @dataclass(frozen=True)
-class JointCoupling(HiddenEffect):
+class JointCoupling(InPair):
     """A cable between two neighbouring joints: each feels the other's position."""
 
     name = 'joint_coupling'
+    sized_by = 'stiffness'
     acts = True
-    pair: tuple[str, str]
     first: int
     stiffness: float
 
@@ -101,13 +84,6 @@ class JointCoupling(HiddenEffect):
         reach = max(setting.high[i + 1] - setting.low[i + 1], setting.high[i] - setting.low[i])
         stiffness = 0.05 * float(setting.drive[i : i + 2].min()) / reach
         return cls(setting.robot.joints[i : i + 2], i, stiffness)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return self.pair
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, stiffness=self.stiffness * factor)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -120,34 +96,23 @@ class JointCoupling(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class JointElasticity(HiddenEffect):
+class JointElasticity(InJoint):
     """A second hinge behind the motor's, with a native spring and a little damping."""
 
     name = 'joint_elasticity'
+    sized_by = 'compliance'
+    stated = (('compliance', 'compliance', 'rad/(N m)'),)
     needs = ('rotor_inertia',)
     largest_factor = 10.0
     dt = 2.5e-4
-    joint: str
     index: int
     compliance: float
     retardation: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        loaded = np.flatnonzero(setting.torque > 0.1 * setting.torque.max())
-        j = int(rng.choice(loaded))
+        j = pick_loaded(setting, rng, 0.1)
         return cls(setting.robot.joints[j], j, 0.002 / float(setting.torque[j]), 4e-4)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, compliance=self.compliance * factor)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('compliance', self.joint, self.compliance, 'rad/(N m)'),)
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         twist = add_twist(spec, self.joint)
@@ -156,36 +121,25 @@ class JointElasticity(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class Backlash(HiddenEffect):
+class Backlash(InJoint):
     """A second hinge behind the motor's, free between two stops."""
 
     name = 'backlash'
+    sized_by = 'width'
+    stated = (
+        ('backlash', 'width', 'rad'),
+        ('crossing_width', 'width', 'rad'),
+    )
     needs = ('rotor_inertia',)
     largest_factor = 8.0
     dt = 2.5e-4
-    joint: str
     index: int
     width: float
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        loaded = np.flatnonzero(setting.torque > 0.1 * setting.torque.max())
-        j = int(rng.choice(loaded))
+        j = pick_loaded(setting, rng, 0.1)
         return cls(setting.robot.joints[j], j, 0.004)
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, width=self.width * factor)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('backlash', self.joint, self.width, 'rad'),
-            Parameter('crossing_width', self.joint, self.width, 'rad'),
-        )
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         twist = add_twist(spec, self.joint)
@@ -197,21 +151,14 @@ class Backlash(HiddenEffect):
 
 
 @dataclass(frozen=True)
-class _Strap(HiddenEffect):
+class _Strap(InJoint):
     """Something between a point of a link and a fixed point of the world."""
 
-    joint: str
     attachment: tuple[float, float, float]
     anchor: tuple[float, float, float]
     stiffness: float
     acts = True
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, stiffness=self.stiffness * factor)
+    sized_by = 'stiffness'
 
     def act(self, live: Live) -> None:
         mujoco.mj_kinematics(live.model, live.data)

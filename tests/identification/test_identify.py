@@ -90,56 +90,38 @@ def test_progress_ends_at_one(structure, recording):
     assert shares[-1] > 0.9
 
 
-class TestRefusals:
-    """Data that cannot identify anything are refused with the reason and the remedy."""
+@pytest.mark.parametrize(
+    ('change', 'message'),
+    [
+        (lambda run: run.select(slice(0, 300)), 'too short; record'),
+        (lambda run: replace(run, q=0.0 * run.q), 'no motion'),
+        (lambda run: replace(run, tau=None), 'no effort'),
+        (lambda run: replace(run, tau=0.0 * run.tau), 'constant'),
+        (lambda run: replace(run, tau=-run.tau), 'opposite sign.*negate'),
+        (lambda run: replace(run, tau=1e3 * run.tau), 'N mm'),
+        (lambda run: replace(run, q=np.rad2deg(run.q)), 'degrees'),
+    ],
+    ids=['short', 'still', 'no torque', 'constant', 'sign', 'N mm', 'degrees'],
+)
+def test_data_that_identify_nothing_are_refused(structure, recording, change, message):
+    with pytest.raises(IdentificationError, match=message) as caught:
+        run(structure, change(recording))
+    assert 'bag' in str(caught.value)
 
-    def refused(self, structure, recording, message):
-        with pytest.raises(IdentificationError, match=message) as caught:
-            run(structure, recording)
-        assert 'bag' in str(caught.value)
 
-    def test_too_short(self, structure, recording):
-        part = slice(0, 300)
-        short = replace(
-            recording, t=recording.t[part], q=recording.q[part], tau=recording.tau[part]
-        )
-        self.refused(structure, short, 'too short; record')
+def test_wrong_sign_of_an_arm_that_the_description_does_not_know(arm, recording):
+    """A description without masses says nothing of the sign; the dissipated energy does."""
+    masses = 1e-9 * arm.robot.rigid_parameters
+    light = ArmModel(arm.robot.with_inertias(masses), arm.effects)
+    with pytest.raises(IdentificationError, match='sign'):
+        run(light, replace(recording, tau=-recording.tau))
 
-    def test_a_decimation_that_leaves_nothing_is_answered_with_one_that_works(
-        self, structure, recording
-    ):
-        settings = IdentificationSettings(signals=SignalSettings(decimation=100_000))
-        with pytest.raises(IdentificationError, match='--decimation 100000 leaves 0') as caught:
-            identify(structure, [recording], settings, rng=np.random.default_rng(0))
-        (largest,) = re.findall(r'--decimation (\d+) is the largest', str(caught.value))
-        works = IdentificationSettings(signals=SignalSettings(decimation=int(largest)))
-        identify(structure, [recording], works, rng=np.random.default_rng(0))
 
-    def test_no_motion(self, structure, recording):
-        self.refused(structure, replace(recording, q=0.0 * recording.q), 'no motion')
-
-    def test_no_torque(self, structure, recording):
-        self.refused(structure, replace(recording, tau=None), 'no effort')
-
-    def test_constant_torque(self, structure, recording):
-        self.refused(structure, replace(recording, tau=0.0 * recording.tau), 'constant')
-
-    def test_wrong_sign(self, structure, recording):
-        self.refused(structure, replace(recording, tau=-recording.tau), 'opposite sign.*negate')
-
-    def test_wrong_sign_of_an_arm_that_the_description_does_not_know(self, arm, recording):
-        """A description without masses says nothing of the sign; the dissipated energy does."""
-        masses = 1e-9 * arm.robot.rigid_parameters
-        light = ArmModel(arm.robot.with_inertias(masses), arm.effects)
-        lossy = replace(recording, tau=-(recording.tau - 0.0))
-        with pytest.raises(IdentificationError, match='sign'):
-            run(light, lossy)
-
-    def test_newton_millimetres(self, structure, recording):
-        self.refused(structure, replace(recording, tau=1e3 * recording.tau), 'N mm')
-
-    def test_degrees(self, structure, recording):
-        self.refused(structure, replace(recording, q=np.rad2deg(recording.q)), 'degrees')
+def test_a_decimation_that_leaves_nothing_is_answered_with_one_that_works(structure, recording):
+    with pytest.raises(IdentificationError, match='--decimation 100000 leaves 0') as caught:
+        run(structure, recording, decimation=100_000)
+    (largest,) = re.findall(r'--decimation (\d+) is the largest', str(caught.value))
+    run(structure, recording, decimation=int(largest))
 
 
 def test_a_position_beyond_its_limit_is_said_and_not_refused(structure, recording):

@@ -52,7 +52,7 @@ def test_of_a_clean_recording_nothing_is_said(clean, robot):
     assert found.remarks == ()
     assert found.trial.rank == found.trial.theory
     assert found.trial.relative_error_percent < 3.0
-    assert found.verdict.startswith('armid identify takes it')
+    assert 'parameters are distinguishable' in found.verdict
     assert found.sampling.period == pytest.approx(PERIOD, abs=0.1)
     assert found.sampling.periods == pytest.approx(2.0, abs=0.02)
     for joint in found.joints:
@@ -136,8 +136,8 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
 @pytest.mark.parametrize(
     ('factor', 'said'),
     [
-        (1e3, 'bad: identify refuses it: run: torques of'),
-        (-1.0, 'bad: identify refuses it: run: torques of'),
+        (1e3, 'bad: refused by `armid identify`: run: torques of'),
+        (-1.0, 'bad: refused by `armid identify`: run: torques of'),
         (12.0, 'seem to be in kgf cm instead of N m'),
         (4.0, 'times the torque in N m (currents?): convert them'),
     ],
@@ -201,7 +201,7 @@ def test_joints_that_are_exchanged_are_named_as_identify_does(clean, robot):
     (fault,) = found.trial.faults
     assert 'exchanged' in fault
     assert ('bad', fault) in [(one.weight, one.text) for one in found.remarks]
-    assert 'takes it' not in found.verdict
+    assert 'Ready' not in found.verdict
 
 
 @pytest.mark.slow
@@ -217,7 +217,7 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     found = inspect(other, robot, rng=np.random.default_rng(0))
     assert graded.word != 'good'
     assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
-    said = f'armid identify calls what it makes of it {graded.word}: {graded.reasons[0]}'
+    said = f'`armid identify` grades this recording {graded.word}: {graded.reasons[0]}'
     assert found.verdict == said
 
 

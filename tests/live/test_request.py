@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.live import DiagnosisRequest
-from armid_ros.live.request import answer, Healthy, since, WAITING
+from armid_ros.live.request import answer, Healthy, WAITING
 from armid_ros.motion import Motion
 import numpy as np
 
@@ -39,12 +39,7 @@ def test_a_gap_is_told_from_the_misfit_that_was_learned(known_arm, healthy, chan
 
 
 def test_too_little_motion_since_a_change_waits_for_more(known_arm, changed):
-    early = since(changed, 0.0)
-    kept = early.t < 13.0
-    early = type(early)(
-        joints=early.joints, t=early.t[kept], q=early.q[kept], dq=early.dq[kept],
-        tau=early.tau[kept], source='early',
-    )  # fmt: skip
+    early = changed.select(changed.t < 13.0)
     said, diagnosis = answer(DiagnosisRequest(known_arm, early, shortest=8.0))
     assert (said.verdict, diagnosis) == (WAITING, None)
 

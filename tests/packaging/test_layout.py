@@ -107,19 +107,6 @@ def test_interface_show_finds_the_definition(prefix, root):
     assert installed == (root / 'msg_schemas' / 'msg' / 'ParameterEstimate.msg').read_text()
 
 
-def test_data_of_the_package_is_installed(root, distribution):
-    """What is not Python in the package's tree, robots and templates, travels with it."""
-    installed = {str(path) for path in distribution.files}
-    package = root / 'armid_ros'
-    wanted = {
-        str(path.relative_to(root))
-        for path in package.rglob('*')
-        if path.is_file() and path.suffix != '.pyc'
-    }
-    assert wanted <= installed
-    assert f'{package.name}/py.typed' in wanted
-
-
 def test_launch_and_config_files_are_in_share(prefix, root):
     """Where `ros2 launch armid_ros` and the launch files themselves look."""
     share = prefix / 'share' / 'armid_ros'
@@ -177,7 +164,7 @@ def test_documents_start_nodes_by_executables_that_the_environment_has():
         for block in blocks(path):
             programs = {line.split()[0] for line in block.text.splitlines() if line.strip()}
             if block.language == 'bash' and 'ros2' in programs:
-                assert 'no command ros2' in block.excuse, f'{path.name}:{block.line}'
+                assert 'no command' in block.excuse, f'{path.name}:{block.line}'
             started |= programs & NODES
     assert {'excitation_publisher', 'online_identifier', 'recorder'} <= started
     for node in started:

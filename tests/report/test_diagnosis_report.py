@@ -90,7 +90,7 @@ def test_the_story_comes_first_and_what_was_looked_at_last(html):
             '>What explains the gap<',
             '>Gap</h2>',
             '>Measured and modelled<',
-            '>Where it lives<',
+            '>Where it shows<',
             '>What to do next<',
             '>Candidates<',
             '>Patch</h2>',
@@ -104,7 +104,7 @@ def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet
     drawing = html[html.index('<svg class="arm"') : html.index('</svg>')]
     assert re.findall('font-weight="600"[^>]*>([^<]*)<', drawing) == ['elbow']
     assert drawing.count('<circle') == 2
-    assert drawing.count('<line') == 3  # from the ground to the shoulder, and two links
+    assert drawing.count('<line') == 4  # to the shoulder, two links, and one to the name
     plain = quiet[quiet.index('<svg class="arm"') : quiet.index('</svg>')]
     assert 'var(--predicted)' not in plain
 
@@ -137,7 +137,7 @@ def test_causes_that_are_one_have_one_bar(found):
     rows = Shares(both).bars.rows
     assert [label for label, _ in rows] == [
         'quadratic friction and base tilt, elbow',
-        'the rest, the floor in it',
+        'unexplained (noise included)',
     ]
     assert sum(bar.value for _, bars in rows for bar in bars) == pytest.approx(1.0)
 
@@ -153,16 +153,16 @@ def test_a_gap_of_the_fitted_data_alone_is_said_to_be_one(found):
     assert not any('that were fitted' in line for line in Story(found).rows[0][1])
     quiet_there = replace(found.gap, chi2_before=0.9 * np.ones(2), predicted=True)
     (_, lines), *_ = Story(replace(found, gap=quiet_there)).rows
-    assert lines[0].startswith('In the recordings that were fitted; in those that were not elbow')
+    assert lines[0].startswith('In the fitted recordings only') and 'elbow' in lines[0]
 
 
 def test_what_was_added_to_the_model_is_said(found, recordings, html):
     assert 'model.yaml is the model with quadratic friction' in html
-    assert 'The model stays as it was given.' not in html
+    assert 'The model is unchanged.' not in html
     worse = replace(found, harmful=True)
     page = diagnosis_report(worse, DiagnosedRecordings(recordings), robot='two_links')
-    assert 'The model stays as it was given.' in page
-    assert 'which the model was not given' in page
+    assert 'The model is unchanged.' in page
+    assert 'which model.yaml does not have' in page
     assert '>Patch</h2>' in html and '>Patch</h2>' not in page
 
 
@@ -170,7 +170,7 @@ def test_what_is_suspected_and_not_checked_is_said_in_short(found):
     nothing = replace(found, verdict='consistent', findings=(), where=(), left=())
     rows = dict(Story(replace(nothing, suspected=found.findings, blind=('elbow',))).rows)
     assert rows['Where'] == ['No joint that was checked has a gap.', 'Not checked: elbow.']
-    assert rows['Which'][0] == 'Nothing is named.'
+    assert rows['Which'][0] == 'No cause was found.'
     assert rows['Which'][1].startswith('Suspected: quadratic friction of elbow')
     assert dict(Story(nothing).rows)['Where'] == ['No joint has a gap.']
 
@@ -193,8 +193,8 @@ def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found
 
 def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
     assert '>consistent<' in quiet
-    assert 'Nothing is named.' in quiet
-    assert 'The model stays as it was given.' in quiet
+    assert 'No cause was found.' in quiet
+    assert 'The model is unchanged.' in quiet
     assert '>What explains the gap<' not in quiet
     assert '>Patch</h2>' not in quiet
 
@@ -208,7 +208,7 @@ def test_a_model_that_simulates_worse_is_not_green(found, recordings):
     page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='arm', extras=extras)
     assert 'elbow' in extras.worse
     assert (tone_of(found), tone_of(found, extras.worse)) == ('good', 'fair')
-    assert 'farther off than the model before in ' in page
+    assert 'larger position errors than before in ' in page
     assert 'It is worse than before in ' in page
     assert 'Do not simulate with model.yaml' in page
 
@@ -220,7 +220,7 @@ def test_bad_data_have_no_green_tick():
     assert found.verdict == 'bad_data'
     page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
     assert '<li class="fine">' not in page
-    assert 'What was recorded is at fault' in page
+    assert 'The recorded signals are at fault' in page
     sound = [replace(one, source=f'before {k}') for k, one in enumerate(bench.recordings(seed=1))]
     both = DiagnosedRecordings(turned, baseline=sound)
     beside = diagnosis_report(found, both, robot='two_links')
@@ -304,8 +304,8 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
 
 
 def test_the_page_says_from_which_size_each_effect_would_show(html):
-    section = html[html.index('id="what-could-have-been-seen"') :]
-    assert 'Shows from' in section
+    section = html[html.index('id="smallest-detectable-effects"') :]
+    assert 'Detectable from' in section
     assert 'Not detectable with this motion in' in section
     assert '<td class="name">torque ripple</td>' in section
 

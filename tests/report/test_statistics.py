@@ -83,7 +83,7 @@ def test_what_is_said_first_is_how_well_held_out_data_are_predicted(case):
 
 def test_without_held_out_data_it_is_said_that_there_are_none(case):
     judgement = judge(case.result, {}, case.recordings)
-    assert 'no data were held out' in judgement.sentences[1]
+    assert 'No data were held out' in judgement.sentences[1]
     assert any('validate' in step for step in judgement.next_steps)
 
 
@@ -103,7 +103,7 @@ def test_missing_friction_is_seen_in_the_residual(case):
     coulomb = 0.1 * np.sign(fits[0].motion.dq)
     worse = replace(fits[0], predicted=fits[0].predicted - coulomb)
     judgement = judge(case.result, {source: (worse,)}, case.recordings)
-    speed = [line for line in judgement.beware if 'its speed (' in line]
+    speed = [line for line in judgement.beware if 'speed (' in line]
     assert len(speed) == len(case.result.arm.robot.joints)
 
 

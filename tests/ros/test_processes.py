@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 import os
 import signal
 import subprocess
@@ -32,11 +33,6 @@ def short_excitation():
     return Excitation(random_feasible(ArmModel(robot), limits, 4.0, 2, rng), 1, 1.0)
 
 
-def _hung_up_by_default():
-    """Let SIGHUP end a process also where the tests run under nohup and hand that on."""
-    signal.signal(signal.SIGHUP, signal.SIG_DFL)
-
-
 class Processes:
     """Nodes as processes on the domain of a bench."""
 
@@ -57,13 +53,15 @@ class Processes:
         return self.run_command([sys.executable, '-m', f'armid_ros.nodes.{node}', *arguments])
 
     def run_command(self, command):
+        # SIGHUP ends a process also where the tests run under nohup, which hands that on; Python
+        # code between fork and exec may wait for ever for another thread's lock.
         process = subprocess.Popen(
-            command,
+            ['env', '--default-signal=HUP', *command],
             env=self._environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=_hung_up_by_default,
+            start_new_session=True,
         )
         self.running.append(process)
         return process
@@ -85,9 +83,16 @@ def processes(bench):
     processes = Processes(bench)
     yield processes
     for process in processes.running:
-        if process.poll() is None:
-            process.kill()
-            process.communicate()
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # and what it started
+        process.communicate()
+
+
+def recorded(diagnostics):
+    """Return how many messages the recorder has written, by its last diagnostics."""
+    statuses = [s for d in diagnostics for s in d.status if s.name == 'recorder: state']
+    values = {v.key: v.value for s in statuses for v in s.values}
+    return int(values.get('messages', 0))
 
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL])
@@ -99,7 +104,9 @@ def test_a_node_ends_in_order_with_the_process_that_started_it(bench, processes,
     code = f'import subprocess; subprocess.run({node!r})'
     launch = processes.run_command([sys.executable, '-c', code])
     publisher = bench.matched_publisher(String, 'text', LATCHED)
+    diagnostics = bench.diagnostics()
     publisher.publish(String(data='one'))
+    bench.spin_until(lambda: recorded(diagnostics) == 1, 'the recording')
     launch.send_signal(number)
     bench.spin_until((bag / 'metadata.yaml').is_file, 'the end of the bag')
     assert [topic.count for topic in topics(bag)] == [1]
@@ -119,13 +126,8 @@ def test_arm_identifier_recorder_and_player_work_together(bench, processes, tmp_
     )
     arm = processes.start('simulated_arm', 'rate:=200.0')
 
-    def recorded():
-        statuses = [s for d in diagnostics for s in d.status if s.name == 'recorder: state']
-        values = {v.key: v.value for s in statuses for v in s.values}
-        return int(values.get('messages', 0))
-
     bench.spin_until(lambda: estimates and estimates[-1].samples > 200, 'the estimates')
-    bench.spin_until(lambda: recorded() > 600, 'the recording')
+    bench.spin_until(lambda: recorded(diagnostics) > 600, 'the recording')
     for process in (arm, identifier, excitation):
         errors = processes.end(process, signal.SIGINT, signal.SIGINT)
         assert process.returncode == 0 and 'Traceback' not in errors, errors

@@ -9,6 +9,8 @@ import os
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
+    ClearanceModel,
+    CollisionScene,
     Excitation,
     Limits,
     random_feasible,
@@ -28,6 +30,7 @@ from sensor_msgs.msg import JointState
 from tests.ros.controller import Controller, SECOND
 
 ROBOT = load_robot('humanoid_arm')
+SCENE = CollisionScene.of(ROBOT, 0.02)
 HOME = (ROBOT.lower + ROBOT.upper) / 2.0
 STEP = 0.02
 EPOCH = 10_000
@@ -53,8 +56,11 @@ class Bed:
         self.dt = step
         self.displaced = False  # whether the arm seems to stand a little off its path
         self.offset, self.changes, self.paths, self.violations = 0.0, [], [], []
+        self.set_points = []
         self.arm = Controller(bench, ROBOT, HOME)
-        planner = TransferPlanner(ArmModel(ROBOT), transfer_limits(ROBOT, 1.0), None, 0.0)
+        bodies = ClearanceModel.of(SCENE.bodies)
+        limits = transfer_limits(ROBOT, 1.0)
+        planner = TransferPlanner(ArmModel(ROBOT), limits, bodies, SCENE.clearance)
         options = {'start': False, 'approach': 1.0, 'tracking_tolerance': TOLERANCE}
         self.node = node = bench.add(
             ExcitationPublisherNode, excitation, planner, **(options | parameters)
@@ -116,6 +122,7 @@ class Bed:
             if away > allowed:
                 self.violations.append(f'{arm.now:.2f} s: {away:.3f} from every planned path')
         self._before = q
+        self.set_points.append(q)
 
     def run(self, seconds):
         for _ in range(round(seconds / self.dt)):
@@ -141,13 +148,17 @@ class Bed:
             speed = np.abs(self.arm.state(self.arm.now).dq).max()
             if speed > 1e-3:
                 self.violations.append(f'not at rest after the end: {speed}')
+        nearest = SCENE.bodies.path_clearance(np.array(self.set_points)).min()
+        if nearest <= 0.0:
+            self.violations.append(f'bodies or the floor were met: {nearest:.4f} m')
 
 
 @pytest.fixture(scope='module')
 def excitation():
     rng = np.random.default_rng(3)
     limits = Limits.of(ROBOT, speed='fast')
-    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng), 1, 0.5)
+    collision = {'collision': SCENE.bodies, 'margin': SCENE.clearance}
+    return Excitation(random_feasible(ArmModel(ROBOT), limits, 2.0, 3, rng, **collision), 1, 0.5)
 
 
 def other(message, joint, value, *, add=False):
@@ -221,6 +232,76 @@ def test_wrong_positions_do_not_move_the_arm(bench, excitation, value, count):
         assert np.abs(bed.arm.state(bed.arm.now).dq).max() < 1e-3
     if count == 1 and value != 'just beyond the tolerance':
         assert bed.node.elapsed is not None
+
+
+def renamed(message):
+    message.name = [f'other_{name}' for name in message.name]
+
+
+def shorter(message):
+    message.position = message.position[:2]
+
+
+def without_positions(message):
+    message.position = []
+
+
+def nameless(message):
+    message.name = []
+
+
+def twice(message):
+    message.name = [message.name[0], *list(message.name)[:-1]]
+
+
+def late(message):
+    message.header.stamp.sec += 3600
+
+
+def early(message):
+    message.header.stamp.sec -= 3600
+
+
+def overflowing(message):
+    message.header.stamp.sec = 2**31 - 1
+
+
+def infinite_velocity(message):
+    message.velocity = [np.inf] * len(message.name)
+
+
+def infinite_effort(message):
+    message.effort = [-np.inf] * len(message.name)
+
+
+MALFORMED = (
+    renamed, shorter, without_positions, nameless, twice, late, early, overflowing,
+    infinite_velocity, infinite_effort,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize('count', [1, 10**6])
+@pytest.mark.parametrize('spoil', MALFORMED, ids=lambda spoil: spoil.__name__)
+def test_malformed_states_do_not_move_the_arm(bench, excitation, spoil, count):
+    bed = Bed(bench, excitation)
+    bed.run(0.6)
+    assert not bed.call('start')
+    bed.run(1.7)
+    left = [count]
+
+    def change(messages):
+        for message in messages if left[0] > 0 else ():
+            spoil(message)
+        left[0] -= 1
+        return messages
+
+    bed.changes.append(change)
+    bed.run(2.0)
+    bed.changes.clear()
+    bed.run(0.1)
+    bed.close()
+    assert not bed.violations
+    assert not bed.node.complaints.defects
 
 
 @pytest.mark.parametrize('offset', [3600.0, -3600.0, -0.6, -0.3, 0.45])

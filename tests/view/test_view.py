@@ -101,7 +101,8 @@ def test_bodies_have_the_size_of_the_description():
     np.testing.assert_allclose(box.corners.mean(axis=(0, 1))[2], 1.0)
     np.testing.assert_allclose(np.ptp(cylinder.corners, axis=(0, 1)), [0.2, 0.2, 2.0], atol=0.01)
     np.testing.assert_allclose(np.linalg.norm(sphere.corners, axis=2), 0.3)
-    assert notes == ("link 'l': its mesh is not found; it is not drawn",)
+    (note,) = notes
+    assert "'l'" in note and 'not found' in note
     for body in (box, cylinder, sphere):
         assert volume(body.corners) > 0.0
 
@@ -164,7 +165,7 @@ def test_the_command_writes_a_file_and_marks_what_the_diagnosis_named(
 def test_it_asks_for_a_bag_or_topics(arguments):
     done = CliRunner().invoke(main, ['view', *arguments])
     assert done.exit_code == 2
-    assert 'a BAG, or with --live' in done.output
+    assert 'a BAG' in done.output and '--live' in done.output
 
 
 def test_without_rerun_one_line_says_what_to_install(monkeypatch, urdf, recording, tmp_path):
@@ -172,7 +173,7 @@ def test_without_rerun_one_line_says_what_to_install(monkeypatch, urdf, recordin
     monkeypatch.setitem(sys.modules, 'rerun', None)
     done = CliRunner().invoke(main, ['view', str(tmp_path / 'run'), '--robot', str(urdf)])
     assert done.exit_code == 2
-    assert "pip install 'armid_ros[view]'" in done.output
+    assert 'armid_ros[view]' in done.output
     assert done.output.count('\n') == 1
 
 

@@ -8,66 +8,68 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.arm import ArmModel, save_model
-from armid_ros.cli import options
-from armid_ros.cli.demo.story import show_story, tell_story
-from armid_ros.cli.terminal import ConvergenceTable, progress, say
-from armid_ros.effects import make_effect
-from armid_ros.errors import ModelError
-from armid_ros.excitation import design, DesignSettings, Excitation, save_excitation
-from armid_ros.files import json_text, load_yaml, read_text, settled
-from armid_ros.identification import (
-    grade,
-    identification_document,
-    identify,
-    Score,
-    write_document,
-)
-from armid_ros.identification.assess.agreement import Agreement
-from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.identification.output import SCHEMA
-from armid_ros.motion import FloatArray
-from armid_ros.recording import read_recording, Recording
-from armid_ros.robots import collision_model, load_robot, Robot
-from armid_ros.robots.shipped import shipped_path
-from armid_ros.simulation import Sensors, SimulatedArm
+from armid_ros.cli import parameters
+from armid_ros.cli.terminal import progress, say
 import click
-import numpy as np
 
 if TYPE_CHECKING:
-    from armid_ros.nodes.lockstep import Progress
+    from armid_ros.identification.assess.agreement import Agreement
 
-ROBOT = 'humanoid_arm'
-
-SENSORS = Sensors(
-    torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
-)
 #: Files that a folder to be filled may hold already, from a demo before.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
 #: What is written beside the story.
-_FILES = (
-    'bag, excitation.yaml, model.yaml, identification.json, torque.png, parameters.png, '
-    'convergence.png'
+_FILES = 'bag, excitation.yaml, model.yaml, identification.json, report.html'
+
+
+@click.command(epilog='Example: armid demo --gravity earth --out demo')
+@click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
+@click.option('--rate', default=200.0, show_default=True, help='Joint states per second.')
+@click.option(
+    '--hide',
+    default='',
+    metavar='E@joint',
+    help='What is hidden in the arm in the end, to be found; drawn, and told last, by default.',
 )
-
-
+@parameters.folder
+@parameters.seed
+@parameters.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find what was hidden in the arm."""
+    from armid_ros.arm import ArmModel, save_model
+    from armid_ros.cli import options
+    from armid_ros.cli.demo import steps
+    from armid_ros.cli.demo.story import show_story, tell_story
+    from armid_ros.excitation import save_excitation
+    from armid_ros.files import json_text, settled, write_file
+    from armid_ros.identification import (
+        grade,
+        identification_document,
+        identify,
+        Score,
+        write_document,
+    )
+    from armid_ros.identification.assess.agreement import Agreement
+    from armid_ros.identification.online.identifier import OnlineIdentifier
+    from armid_ros.identification.output import SCHEMA
     from armid_ros.nodes.lockstep import replay_lockstep
+    from armid_ros.recording import read_recording
+    from armid_ros.robots import load_robot
+    from armid_ros.simulation import SimulatedArm
+    import numpy as np
 
     rng = np.random.default_rng(seed)
-    robot = load_robot(ROBOT, gravity=gravity)
-    truth = true_arm(robot)
+    robot = load_robot(steps.ROBOT, gravity=gravity)
+    truth = steps.true_arm(robot)
     nominal = ArmModel(robot, truth.effects)
-    staged = options.stage(out, SCHEMA, ROBOT, [*OUTPUTS, '*.png'])
+    staged = options.stage(out, SCHEMA, steps.ROBOT, [*OUTPUTS, '*.png'])
     new = staged.folder
-    excitation = _excite(nominal, rng)
+    excitation = steps.excite(nominal, rng)
     save_excitation(excitation, new / 'excitation.yaml')
     identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     target = identifier.base.values(truth.theta)
-    plant = SimulatedArm(truth, rng=rng, sensors=SENSORS)
-    history, end = _run(plant, excitation, identifier, target, new / 'bag', rate)
+    plant = SimulatedArm(truth, rng=rng, sensors=steps.SENSORS)
+    history, end = steps.run_online(plant, excitation, identifier, target, new / 'bag', rate)
     again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
     with progress('playing the bag back') as tick:
         replay = replay_lockstep(
@@ -77,28 +79,36 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
             on_progress=lambda now: tick(now.t / now.duration),
         )
         tick(0.0, 'identifying offline')
-        recording = _read(new / 'bag', robot)
+        recording = read_recording(new / 'bag', joints=robot.joints)
+        recording = replace(recording, source=str(settled(new / 'bag')))
         result = identify(nominal, [recording], rng=rng, progress=tick)
         graded = grade(result, nominal, [recording], {})
     offline = Agreement.of(result.estimate, result.base.values(truth.theta))
     online = Agreement.of(end.estimate, target)
     document = {
-        **identification_document(result, ROBOT, {}, grade=graded),
+        **identification_document(result, steps.ROBOT, {}, grade=graded),
         'truth': offline.document(),
         'online': online.document(),
         'replay_difference': float(np.abs(replay.estimate.values - end.estimate.values).max()),
         'real_time_factor': end.real_time_factor,
-        'held_out': _held_out_error(result.arm, truth, rng),
+        'held_out': steps.held_out_error(result.arm, truth, rng),
     }
-    save_model(new / 'model.yaml', result.arm, ROBOT, result.estimate)
-    with progress('drawing'):
-        _draw(new, robot, result, history, target, result.base.values(truth.theta))
+    save_model(new / 'model.yaml', result.arm, steps.ROBOT, result.estimate)
+    page = steps.page(result, history, target, truth, graded, recording)
+    write_file(new / 'report.html', page)
     if not as_json:
         say(f'{graded.word}: {graded.reasons[0]}')
         _tell(document, online, offline, Score.of(result.training).relative_error_percent)
     rng = np.random.default_rng([seed, 1])
     told = tell_story(
-        new / 'story', truth, result.arm, recording, sensors=SENSORS, rng=rng, hide=hide, rate=rate
+        new / 'story',
+        truth,
+        result.arm,
+        recording,
+        sensors=steps.SENSORS,
+        rng=rng,
+        hide=hide,
+        rate=rate,
     )
     document['story'] = told.document()
     write_document(new / 'identification.json', document)
@@ -108,94 +118,6 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     else:
         show_story(told, out / 'story')
         say(f'{out}: {_FILES}')
-
-
-def _run(
-    plant: SimulatedArm,
-    excitation: Excitation,
-    identifier: OnlineIdentifier,
-    target: FloatArray,
-    bag: Path,
-    rate: float,
-) -> tuple[list[Progress], Progress]:
-    """Move the arm and identify it online, in a table; return what was said, and the end."""
-    from armid_ros.nodes.lockstep import run_lockstep
-
-    history: list[Progress] = []
-    with ConvergenceTable(target) as table:
-
-        def watch(now: Progress) -> None:
-            history.append(now)
-            table.show(now.t, now.duration, now.estimate, now.real_time_factor)
-
-        end = run_lockstep(plant, excitation, identifier, bag, rate=rate, on_progress=watch)
-    return history, end
-
-
-def true_arm(robot: Robot) -> ArmModel:
-    """Return the arm that is to be identified: other masses than described, and friction."""
-    path = shipped_path(ROBOT).with_name('demo.yaml')
-    true = load_yaml(read_text(path, ModelError))
-    factors = np.array(true['mass_factors'])[:, np.newaxis]
-    parameters = robot.rigid_parameters.reshape(-1, 10) * factors
-    arm = ArmModel(robot.with_inertias(parameters.ravel()))
-    for name, values in true['effects'].items():
-        arm = arm.with_effect(make_effect(name, robot), values)
-    return arm
-
-
-def _excite(arm: ArmModel, rng: np.random.Generator) -> Excitation:
-    settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
-    with progress('designing the excitation') as tick:
-        result = design(
-            arm,
-            settings,
-            rng,
-            collision=collision_model(arm.robot),
-            progress=lambda now: tick(now.done),
-        )
-    return result.excitation
-
-
-def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> float:
-    """Return the error of the torque in a motion that was never run, in percent of the torque."""
-    settings = DesignSettings(period=10.0, starts=1, candidates=1, iterations=1, processes=1)
-    collision = collision_model(arm.robot)
-    motion = design(arm, settings, rng, collision=collision).excitation.motion(100.0)
-    tau = truth.torque(motion)
-    return float(100.0 * np.linalg.norm(arm.torque(motion) - tau) / np.linalg.norm(tau))
-
-
-def _draw(
-    out: Path,
-    robot: Robot,
-    result: Any,
-    history: list[Any],
-    online_truth: FloatArray,
-    truth: FloatArray,
-) -> None:
-    from armid_ros.report.figures import (
-        convergence_figure,
-        parameter_figure,
-        save_figure,
-        torque_figure,
-    )
-
-    save_figure(torque_figure(robot, result.training), out / 'torque.png')
-    save_figure(parameter_figure(result.estimate, truth), out / 'parameters.png')
-    figure = convergence_figure(
-        [now.t for now in history],
-        [now.estimate.values for now in history],
-        [now.estimate.std for now in history],
-        online_truth,
-        history[-1].estimate.parameters,
-    )
-    save_figure(figure, out / 'convergence.png')
-
-
-def _read(bag: Path, robot: Robot) -> Recording:
-    """Read what was recorded, under the name that it is going to have."""
-    return replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
 
 
 def _tell(

@@ -15,17 +15,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from armid_ros.api.diagnosis import diagnose
+from armid_ros.api.table import ResultOrigin
 from armid_ros.arm import ArmModel
 from armid_ros.cli.diagnose.command import show
-from armid_ros.cli.diagnose.files import DiagnosisCase, write_results
 from armid_ros.cli.terminal import progress, say
-from armid_ros.diagnosis import diagnose, Diagnosis
+from armid_ros.diagnosis import Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.files import settled
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import read_recording, Recording
-from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
 from armid_ros.report.notation import digits, pretty
 from armid_ros.robots import collision_model
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -170,10 +170,8 @@ def tell_story(
             progress=tick,
         )
         robot = known.robot.name
-        data = DiagnosedRecordings(recordings[:-1], recordings[-1:], [baseline])
-        case = DiagnosisCase(known, robot, robot, data)
-        write_results(out, found, case, Extras())
-    return ToldStory(hidden, found)
+        found.fill(out, ResultOrigin(robot, robot))
+    return ToldStory(hidden, found.core)
 
 
 def show_story(told: ToldStory, out: Path) -> None:
@@ -189,7 +187,7 @@ def show_story(told: ToldStory, out: Path) -> None:
             f'with the patched model'
         )
     say(f'What was hidden: {told.hidden.sentence(arm)}.')
-    say('It was found.' if told.found else 'It was not named first.')
+    say('It was found.' if told.found else 'The diagnosis did not rank it first.')
     say(f'{out}: {", ".join(_RUNS)}, diagnosis.json, model.yaml, report.html')
 
 
@@ -223,7 +221,7 @@ def draw_hidden(
 
 def _drawn(arm: ArmModel, motion: Motion, rng: np.random.Generator, asked: str) -> Hidden:
     head, at, joints = asked.partition('@')
-    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.familiar]))
+    name = head or str(rng.choice([n for n, kind in CATALOGUE.items() if kind.traits.familiar]))
     effect = make_effect(f'{name}@{joints}' if at else name, arm.robot)
     if not at and len(effect.joints) > 1:
         effect = make_effect(f'{name}@{rng.choice(effect.joints)}', arm.robot)

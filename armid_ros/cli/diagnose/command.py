@@ -4,214 +4,215 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
-from armid_ros.arm import ArmModel, load_model
-from armid_ros.cli import options
+from armid_ros.cli import columns, parameters
 from armid_ros.cli.diagnose import partner as partner_options
-from armid_ros.cli.diagnose.files import DiagnosisCase, make_extras, write_results
-from armid_ros.cli.groups import FilterOptions, gathered, RobotChoice
-from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say
-from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, EXPERIMENT_FILE, Finding
-from armid_ros.diagnosis.ties.diagnosis import diagnose_beside
-from armid_ros.diagnosis.verdict.document import SCHEMA
-from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
-from armid_ros.effects.tied import Partner
 from armid_ros.errors import ArmidError
-from armid_ros.files import json_text
-from armid_ros.identification.description import kinematics_digest
-from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.identification.identified_from import identified_from, require_as_identified
-from armid_ros.identification.parameters_file import read_misfit
-from armid_ros.recording import Recording, require_once
-from armid_ros.report.diagnosis_report import DiagnosedRecordings, Extras
-from armid_ros.report.notation import percent, probability, value_of
-from armid_ros.residual import require_libraries, TABLE_FILE
-from armid_ros.robots import Robot
-from armid_ros.simulation.bodies import require_any_mass
 import click
-import numpy as np
 
-#: Verdicts with nothing to go on with, besides that on data that cannot be diagnosed.
-_OPEN = ('unknown', 'not_repeatable')
-#: What a verdict that nothing is there is worth.
-_NOT_SEEN = 'note: how large each effect has to be to be seen is in report.html'
-
-
-@dataclass(frozen=True)
-class DiagnosisData:
-    """
-    What is read.
-
-    Attributes
-    ----------
-    bags, validate, baseline : tuple of Path
-        Recordings to look at, those that are only predicted, and those from before.
-    no_baseline : bool
-        Whether what a model was identified from is no baseline either.
-    topic : str or None
-        Of the joint states.
-
-    """
-
-    bags: tuple[Path, ...]
-    validate: tuple[Path, ...]
-    baseline: tuple[Path, ...]
-    no_baseline: bool
-    topic: str | None
-
-    def __post_init__(self) -> None:
-        """Refuse a baseline and none."""
-        if self.baseline and self.no_baseline:
-            raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
-
-    def since(self, model: Path | None) -> DiagnosisData:
-        """
-        Return the same with a baseline: what a model was identified from, if none is given.
-
-        There is none where some of it is looked at: the question is then what the model lacks.
-
-        """
-        if self.baseline or self.no_baseline or model is None:
-            return self
-        found, asked = identified_from(model), [*self.bags, *self.validate]
-        if {path.resolve() for path in found} & {path.resolve() for path in asked}:
-            return self
-        require_as_identified(model)
-        return replace(self, baseline=found)
-
-    def read(
-        self, robot: Robot, partner: Partner | None, partner_topic: str | None
-    ) -> tuple[list[Recording], list[Recording], list[Recording]]:
-        """Return the three kinds of recordings, the first two with the motion of the partner."""
-        recordings, held_out, before = (
-            options.read(paths, robot, self.topic)
-            for paths in (self.bags, self.validate, self.baseline)
-        )
-        require_once([*recordings, *before], held_out)
-        options.tell_damage(*recordings, *held_out, *before)
-        if partner is not None:
-            how = options.read_settings()
-            recordings, held_out = (
-                partner_options.read_together(named, some, partner, partner_topic, how)
-                for named, some in ((self.bags, recordings), (self.validate, held_out))
-            )
-        return recordings, held_out, before
+if TYPE_CHECKING:
+    from armid_ros.api.diagnosis import DiagnosisResult
+    from armid_ros.arm import ArmModel
+    from armid_ros.diagnosis import Diagnosis, Finding
+    from armid_ros.robots import Robot
 
 
-@dataclass(frozen=True)
-class AskedOptions:
-    """
-    What is known of the arm, and what is asked.
+class Percent(click.ParamType):  # type: ignore[type-arg]
+    """A share that a person writes in per cent, with or without the sign."""
 
-    Attributes
-    ----------
-    model : Path or None
-        A model.yaml.
-    effects : str
-        Effects that are fitted anew.
-    material : float
-        Share of the torque below which an effect does not matter.
-    everything : bool
-        Whether those get into the model, too.
-    residual : str or None
-        How what is left without a name is learned.
-    strict : bool
-        Whether a verdict without a name is an error.
+    name = 'percent'
 
-    """
-
-    model: Path | None
-    effects: str
-    material: float
-    everything: bool
-    residual: str | None
-    strict: bool
-
-    def settings(self, filters: FilterOptions) -> DiagnosisSettings:
-        """Return what a diagnosis takes."""
-        return DiagnosisSettings(
-            signals=filters.settings(), material=self.material, everything=self.everything
-        )
+    def convert(
+        self, value: str | float, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the share, 0 to 1."""
+        if isinstance(value, float):
+            return value
+        try:
+            share = float(value.removesuffix('%')) / 100.0
+        except ValueError:
+            share = math.nan
+        if not 0.0 <= share < 1.0:
+            self.fail(f"'{value}' is not a percentage from 0% to 100%", param, ctx)
+        return share
 
 
-@gathered(
-    data=DiagnosisData,
-    robot=RobotChoice,
-    asked=AskedOptions,
-    filters=FilterOptions,
-    partner=partner_options.PartnerOptions,
+@click.command(epilog='Example: armid diagnose slow.mcap fast.mcap --robot ur10.urdf --out found')
+@parameters.bags
+@parameters.robot
+@parameters.folder
+@parameters.validate
+@click.option(
+    '--model',
+    type=click.Path(path_type=Path),
+    help='model.yaml with what is known of the arm; its effects are part of the model.',
 )
+@click.option(
+    '--baseline',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag from when nothing was wrong, to ask what has changed since; may be given several '
+    'times. By default what --model was identified from, where it is there.',
+)
+@click.option(
+    '--no-baseline',
+    is_flag=True,
+    help='Ask without those recordings: the misfit that identify wrote into --model is what the '
+    'gap is beyond.',
+)
+@click.option(
+    '--material',
+    type=Percent(),
+    default='1%',
+    show_default=True,
+    metavar='PERCENT',
+    help="Share of a joint's torque (rms) below which an effect does not matter.",
+)
+@click.option(
+    '--all', 'everything', is_flag=True, help='Add effects to the model that do not matter, too.'
+)
+@click.option(
+    '--effects',
+    default='',
+    metavar='E,...',
+    help="Effects that the model has already, fitted anew; 'E@joint+joint' for some joints only.",
+)
+@click.option(
+    '--residual',
+    type=click.Choice(['gp']),
+    help='Learn what is left without a name, where the verdict is partial or unknown, as a map '
+    'with its uncertainty (gp: a Gaussian process of each joint), and suggest a law.',
+)
+@click.option(
+    '--strict',
+    is_flag=True,
+    help='End with code 3 if something is there and has no name (unknown, not_repeatable). Data '
+    'that cannot be diagnosed (bad_data) end with code 2 in any case.',
+)
+@parameters.cutoff
+@parameters.decimation
+@columns.options
+@parameters.topic
+@partner_options.options
+@parameters.gravity
+@parameters.joints
+@parameters.seed
+@parameters.reading
+@parameters.as_json
 def diagnose(
-    data: DiagnosisData,
-    robot: RobotChoice,
+    bags: tuple[Path, ...],
+    robot_source: str,
+    gravity: str,
+    joints: str | None,
+    topic: str | None,
     out: Path,
-    asked: AskedOptions,
-    filters: FilterOptions,
-    partner: partner_options.PartnerOptions,
+    validate: tuple[Path, ...],
+    model: Path | None,
+    baseline: tuple[Path, ...],
+    no_baseline: bool,
+    effects: str,
+    residual: str | None,
+    strict: bool,
+    partner: str | None,
+    partner_topic: str | None,
+    ties: tuple[str, ...],
     seed: int,
     as_json: bool,
+    **asked: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
-    if asked.residual is not None:
+    if baseline and no_baseline:
+        raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
+    from armid_ros.api.diagnosis import diagnose as run
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.arm import ArmModel
+    from armid_ros.cli import options
+    from armid_ros.cli.origin import provenance
+    from armid_ros.diagnosis.ties.ties import diagnose_ties
+    from armid_ros.diagnosis.verdict.document import SCHEMA
+    from armid_ros.files import json_text
+    from armid_ros.identification.parameters_file import read_misfit
+    from armid_ros.residual import require_libraries
+
+    if residual is not None:
         require_libraries()
-    staged = options.stage(out, SCHEMA, robot.robot_source)
-    loaded = robot.load(data.bags)
-    arm = ArmModel(loaded) if asked.model is None else _model_of(asked.model, loaded)
-    require_any_mass(arm.robot)
-    arm = options.with_effects(arm, asked.effects)
-    beside = partner_options.open_partner(partner.partner, partner.ties, loaded, robot.gravity)
-    settings = asked.settings(filters)
-    given, data = data, data if beside is not None else data.since(asked.model)
-    misfit = None if asked.model is None else read_misfit(asked.model, arm)
-    if data.baseline != given.baseline:
-        say(f'baseline: {", ".join(map(str, data.baseline))}, which the model was identified from')
+    staged = options.stage(out, SCHEMA, robot_source)
+    robot = options.open_robot(robot_source, gravity, joints, bags)
+    arm = ArmModel(robot) if model is None else _model_of(model, robot)
+    arm = options.with_effects(arm, effects)
+    beside = partner_options.open_partner(partner, ties, robot, gravity)
+    misfit = None if model is None else read_misfit(model, arm)
+    if model is not None and beside is None and not (baseline or no_baseline):
+        baseline = _identified_from(model, [*bags, *validate])
     with progress('reading') as tick:
-        recordings, held_out, before = data.read(loaded, beside, partner.partner_topic)
-        result = diagnose_beside(
+        recordings, held_out, before = (
+            options.read(paths, robot, topic) for paths in (bags, validate, baseline)
+        )
+        options.tell_damage(*recordings, *held_out, *before)
+        if beside is not None:
+            recordings, held_out = (
+                partner_options.read_together(named, some, beside, partner_topic)
+                for named, some in ((bags, recordings), (validate, held_out))
+            )
+        result = run(
             arm,
             recordings,
-            beside,
             validate=held_out,
             baseline=before,
             misfit=misfit,
-            settings=settings,
-            rng=np.random.default_rng(seed),
+            partner=beside,
+            tied=diagnose_ties,
+            rng=seed,
             progress=tick,
+            **asked,
         )
-        case = DiagnosisCase(
-            arm,
-            robot.robot_source,
-            options.kept_source(robot.robot_source, loaded, staged.folder),
-            DiagnosedRecordings(recordings, held_out, before),
-            settings,
-            None if data.baseline else misfit,
-            provenance([*data.bags, *data.validate, *data.baseline], seed=seed),
-            asked.residual is not None,
+        source = options.kept_source(robot_source, robot, staged.folder)
+        origin = ResultOrigin(
+            robot_source, source, provenance([*bags, *validate, *baseline], seed=seed)
         )
-        write_results(staged.folder, result, case, Extras())
+        result.fill(staged.folder, origin)
         staged.keep()
-        extras = make_extras(result, case, seed, tick)
+        if residual is not None:
+            tick(1.0, 'learning the residual')
+            result = result.with_residual(seed)
+        result = result.with_simulations(tick)
+        tick(1.0, 'next run')
+        result = result.with_next_run(seed)
         tick(1.0, 'writing')
-        document = write_results(staged.folder, result, case, extras)
+        document = result.fill(staged.folder, origin)
         staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:
-        show(result)
-        _show_extras(out, result, extras)
-    _end(result.verdict, asked.strict)
+        show(result.core)
+        _show_extras(out, result)
+    _exit(result.verdict, strict)
 
 
-def _end(verdict: str, strict: bool) -> None:
+def _exit(verdict: str, strict: bool) -> None:
     """End with a code of its own where a script must not go on."""
     if verdict == 'bad_data':
         click.get_current_context().exit(2)
-    if strict and verdict in _OPEN:
+    if strict and verdict in ('unknown', 'not_repeatable'):
         click.get_current_context().exit(3)
+
+
+def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
+    """Return what a model was identified from as a baseline; nothing if some of it is asked of."""
+    from armid_ros.identification.identified_from import identified_from, require_as_identified
+
+    found = identified_from(model)
+    if not found or {path.resolve() for path in found} & {path.resolve() for path in asked}:
+        return ()
+    require_as_identified(model)
+    origin = 'which the model was identified from'
+    click.echo(f'baseline: {", ".join(map(str, found))}, {origin}', err=True)
+    return tuple(found)
 
 
 def _model_of(path: Path, robot: Robot) -> ArmModel:
@@ -224,6 +225,10 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
         If the description that it was made with is still there, and is of another arm.
 
     """
+    from armid_ros.arm import load_model
+    from armid_ros.cli import options
+    from armid_ros.identification.description import kinematics_digest
+
     arm = options.model_of(path, robot)
     try:
         known = load_model(path).robot
@@ -239,10 +244,14 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
 
 def show(result: Diagnosis) -> None:
     """Print the sentence first, then the values, then the small print."""
+    from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
+
     say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
     if result.findings:
         for group in by_cause(result.findings):
-            say(f'  {names_and_places(group)}: {_share(group)}')
+            share = share_in_words(group[0], interval=True)
+            together = ', together' if len(group) > 1 else ''
+            say(f'  {names_and_places(group)}: {share}{together}')
         rows = [row for finding in result.findings for row in _rows(finding)]
         print_rows(rows, as_json=False, right=('value, 95 %',))
     if result.minor:
@@ -251,13 +260,16 @@ def show(result: Diagnosis) -> None:
         rows = [_minor(finding, share) for finding in result.minor]
         print_rows(rows, as_json=False, right=(share, 'p'))
     if result.verdict == 'consistent':
-        say(_NOT_SEEN)
+        say('note: how large each effect has to be to be seen is in report.html')
     for note in result.notes:
         say(f'note: {note}')
 
 
 def _rows(finding: Finding) -> list[dict[str, str]]:
     """Return a row for every value whose interval excludes zero."""
+    from armid_ros.identification.fitting.identifiability import excludes_zero
+    from armid_ros.report.notation import value_of
+
     every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
     values = [row for row in every if excludes_zero(row[1], row[2])] or every
     return [
@@ -271,13 +283,9 @@ def _rows(finding: Finding) -> list[dict[str, str]]:
     ]
 
 
-def _share(group: Sequence[Finding]) -> str:
-    """Say how much of the gap a cause is, once where it has several names."""
-    share = share_in_words(group[0], interval=True)
-    return f'{share}, together' if len(group) > 1 else share
-
-
 def _minor(finding: Finding, share: str) -> dict[str, str]:
+    from armid_ros.report.notation import percent, probability
+
     return {
         'effect': finding.name.replace('_', ' '),
         'joints': ', '.join(finding.joints) or 'whole arm',
@@ -286,19 +294,20 @@ def _minor(finding: Finding, share: str) -> dict[str, str]:
     }
 
 
-def _show_extras(out: Path, result: Diagnosis, extras: Extras) -> None:
-    if extras.residual is not None:
-        for sentence in extras.residual.sentences():
-            say(sentence)
+def _show_extras(out: Path, result: DiagnosisResult) -> None:
+    from armid_ros.diagnosis import EXPERIMENT_FILE
+    from armid_ros.residual import TABLE_FILE
+
+    extras = result.extras
+    for sentence in () if extras.residual is None else extras.residual.sentences():
+        say(sentence)
     for pair in extras.forward:
         say(pair.sentence())
     for note in extras.notes:
         say(f'note: {note}')
     files = ['diagnosis.json', 'model.yaml', 'report.html']
-    if extras.residual is not None:
-        files.append(TABLE_FILE)
-    if extras.next_run is not None:
-        files.append(EXPERIMENT_FILE)
-    for step in extras.steps(result, str(out / 'model.yaml')):
+    files += [] if extras.residual is None else [TABLE_FILE]
+    files += [] if extras.next_run is None else [EXPERIMENT_FILE]
+    for step in extras.steps(result.core, str(out / 'model.yaml')):
         say(f'next: {step}')
     say(f'{out}: {", ".join(files)}')

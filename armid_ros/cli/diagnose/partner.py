@@ -5,37 +5,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TYPE_CHECKING, TypeVar
 
-from armid_ros.cli.options import tell_damage
-from armid_ros.effects.tied import Partner
 from armid_ros.errors import ModelError
-from armid_ros.model.spring_ties import centroid_ties, leg_ties, Tie
-from armid_ros.recording import read_recording, ReadSettings, recorded_together, Recording
-from armid_ros.robots import load_robot, Robot
+import click
+
+if TYPE_CHECKING:
+    from armid_ros.effects.tied import Partner
+    from armid_ros.model.spring_ties import Tie
+    from armid_ros.recording import Recording
+    from armid_ros.robots import Robot
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
 
+_OPTIONS = (
+    click.option(
+        '--partner',
+        metavar='R',
+        help='Shipped name, URDF or xacro of a machine or person recorded in the same bags, to '
+        'which the arm may be tied, such as the wearer of an exoskeleton.',
+    ),
+    click.option('--partner-topic', help="The partner's JointState topic, where several name it."),
+    click.option(
+        '--tie',
+        'ties',
+        multiple=True,
+        metavar='JOINT=JOINT',
+        help="Where they may be tied: a joint of the arm and one of the partner, whose links' "
+        'centroids the tie joins, or points of them, JOINT@X,Y,Z=JOINT@X,Y,Z [m]. By default '
+        'links of equal number.',
+    ),
+)
 
-@dataclass(frozen=True)
-class PartnerOptions:
-    """
-    A machine or a person that was recorded together with the arm.
 
-    Attributes
-    ----------
-    partner, partner_topic : str or None
-        Which, and the topic of its joint states.
-    ties : tuple of str
-        Where they may be tied.
-
-    """
-
-    partner: str | None
-    partner_topic: str | None
-    ties: tuple[str, ...]
+def options(command: _Command) -> _Command:
+    """Give a command the options --partner, --partner-topic and --tie."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command
 
 
 def open_partner(
@@ -50,6 +59,9 @@ def open_partner(
         If it is not clear where the two may be tied, or a tie names no joint.
 
     """
+    from armid_ros.effects.tied import Partner
+    from armid_ros.robots import load_robot
+
     if source is None:
         if ties:
             raise ModelError('--tie says where the arm is tied, --partner to what: give both')
@@ -65,12 +77,14 @@ def read_together(
     recordings: Sequence[Recording],
     partner: Partner,
     topic: str | None,
-    settings: ReadSettings,
 ) -> list[Recording]:
     """Add the motion of the partner, from the same bags, to recordings of the arm."""
-    joints = partner.robot.joints
-    others = [read_recording(bag, joints=joints, topic=topic, settings=settings) for bag in bags]
-    tell_damage(*others)
+    from armid_ros.cli import options
+    from armid_ros.recording import read_recording, recorded_together
+
+    joints, how = partner.robot.joints, options.read_settings()
+    others = [read_recording(bag, joints=joints, topic=topic, settings=how) for bag in bags]
+    options.tell_damage(*others)
     return [
         recorded_together(recording, other, partner.robot, partner.ties)
         for recording, other in zip(recordings, others, strict=True)
@@ -78,6 +92,8 @@ def read_together(
 
 
 def _equal_links(robot: Robot, other: Robot) -> list[Tie]:
+    from armid_ros.model.spring_ties import centroid_ties, leg_ties
+
     if (robot.name, other.name) == ('exoskeleton_legs', 'human_legs'):
         return list(leg_ties(robot, other))
     if robot.n_joints != other.n_joints:
@@ -90,6 +106,8 @@ def _equal_links(robot: Robot, other: Robot) -> list[Tie]:
 
 
 def _tie(text: str, robot: Robot, other: Robot) -> Tie:
+    from armid_ros.model.spring_ties import centroid_ties
+
     ends = [end.partition('@') for end in text.split('=')]
     if len(ends) != 2:
         raise ModelError(f"--tie '{text}' has to be JOINT=JOINT, of the arm and of its partner")

@@ -4,215 +4,387 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
+import math
 from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
-from armid_ros.arm import ArmModel
-from armid_ros.cli import options
-from armid_ros.cli.excite.files import (
-    ExcitationPlan,
-    require_free,
-    SCHEMA,
-    write_plan,
-    Written,
+from armid_ros.cli import parameters
+from armid_ros.cli.choices import (
+    COURSES,
+    CRITERIA,
+    FOURIER,
+    MAX_DURATION,
+    SPEED_CLASSES,
+    TARGETS,
 )
-from armid_ros.cli.excite.options import (
-    design_settings,
-    LimitOptions,
-    ModelOptions,
-    MotionOptions,
-    SearchOptions,
-)
-from armid_ros.cli.excite.springs import COURSES, refuse_other_options, write_course
-from armid_ros.cli.groups import gathered, RobotChoice
 from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import (
-    ClearanceModel,
-    CollisionScene,
-    Design,
-    design_speeds,
-    DesignProblem,
-    DesignProgress,
-    DesignSettings,
-    transfer_limits,
-    TransferPlanner,
-    with_joint_limits,
-)
-from armid_ros.excitation.fitness import FIT
-from armid_ros.excitation.search.parallel import INTERRUPTED
-from armid_ros.files import json_text
-from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
-from armid_ros.motion import FloatArray
-from armid_ros.robots import joints_beside_arms, Robot
 import click
-import numpy as np
 
-#: The kind of trajectory that is designed.
-FOURIER = 'fourier'
+if TYPE_CHECKING:
+    from armid_ros.api.excitation import ExcitationResult
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.arm import ArmModel
+    from armid_ros.excitation import DesignProgress, TransferPlanner
+    from armid_ros.files import Staged
+    from armid_ros.motion import FloatArray
+    from armid_ros.robots import Robot
 
 
-@gathered(
-    robot=RobotChoice,
-    motion=MotionOptions,
-    model=ModelOptions,
-    limits=LimitOptions,
-    search=SearchOptions,
+class Speeds(click.ParamType[tuple[str | float, ...]]):
+    """Speed classes, or shares of the velocity and acceleration limits, with commas."""
+
+    name = 'speeds'
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str | float, ...]:
+        """Read them."""
+        return tuple(self._one(part.strip()) for part in str(value).split(','))
+
+    def _one(self, text: str) -> str | float:
+        if text in SPEED_CLASSES:
+            return text
+        try:
+            return float(text)
+        except ValueError:
+            self.fail(f"'{text}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
+
+
+@click.command(epilog='Example: armid excite --robot ur5.urdf --duration 40 --out plan')
+@parameters.robot
+@parameters.folder
+@click.option(
+    '--kind',
+    type=click.Choice([FOURIER, *COURSES]),
+    default=FOURIER,
+    show_default=True,
+    help='Designed; or for elastic joints, a bag alone: multisines of torque on the move, steps.',
 )
+@click.option(
+    '--share',
+    type=click.FloatRange(0.0, 1.0, min_open=True),
+    default=0.1,
+    show_default=True,
+    help='Of the torque limits (multisine, rms) or of the velocity limits (steps).',
+)
+@click.option(
+    '--duration',
+    type=click.FloatRange(0.0, MAX_DURATION, min_open=True),
+    default=44.0,
+    show_default=True,
+    help='From rest to rest [s].',
+)
+@click.option(
+    '--periods',
+    type=click.IntRange(min=2),
+    default=2,
+    show_default=True,
+    help='Identical periods in it; their difference is the noise.',
+)
+@click.option('--harmonics', default=5, show_default=True, help='Per joint.')
+@click.option(
+    '--speed',
+    'speeds',
+    type=Speeds(),
+    metavar='S,...',
+    default='fast',
+    show_default=True,
+    help=f'{", ".join(SPEED_CLASSES)}, or a share of the limits; several: a folder for each.',
+)
+@click.option(
+    '--criterion',
+    type=click.Choice(list(CRITERIA)),
+    default='D',
+    show_default=True,
+    help='; '.join(f'{name}: {what}' for name, what in CRITERIA.items()),
+)
+@click.option(
+    '--target',
+    type=click.Choice(list(TARGETS)),
+    default='all',
+    show_default=True,
+    help='; '.join(f'{name}: {what}' for name, what in TARGETS.items()),
+)
+@click.option(
+    '--focus',
+    default='',
+    metavar='E,...',
+    help='Effects to see best, everything else being fitted too.',
+)
+@parameters.effects
+@click.option(
+    '--effect',
+    'texts',
+    multiple=True,
+    metavar='NAME:k=v',
+    help='An effect of known size, which counts against the torque limits.',
+)
+@click.option(
+    '--rival',
+    metavar='E,...|none',
+    help='With --criterion T: what may be there in place of --effect.',
+)
+@click.option(
+    '--model', type=click.Path(path_type=Path), help='model.yaml with what is known of the arm.'
+)
+@click.option(
+    '--start',
+    metavar='Q,...',
+    help='Pose that the trajectory leaves and returns to [rad or m]; zero by default.',
+)
+@click.option(
+    '--acceleration',
+    metavar='A[,...]',
+    help='Limit of each joint [rad/s^2 or m/s^2]; top speed in 0.25 s by default.',
+)
+@click.option(
+    '--joint-limits',
+    type=click.Path(path_type=Path),
+    help='joint_limits.yaml of MoveIt: velocity and acceleration limits.',
+)
+@click.option(
+    '--velocity',
+    multiple=True,
+    metavar='JOINT:=V',
+    help='Velocity limit of a joint [rad/s or m/s]. May be given several times.',
+)
+@click.option(
+    '--torque-noise',
+    metavar='N[,...]',
+    help='Standard deviation at each joint [N m or N]; 1 % of the torque limit by default.',
+)
+@click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
+@click.option(
+    '--environment',
+    type=click.Path(path_type=Path),
+    help='YAML with what stands around the arm, or a planning scene of MoveIt.',
+)
+@click.option(
+    '--floor',
+    metavar='Z|none',
+    help='Height of the floor above the origin of the base [m]; without it and without '
+    '--environment, the base plane of an arm that stands.',
+)
+@click.option(
+    '--after',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag recorded already: add most to what it tells. May be given several times.',
+)
+@click.option('--starts', default=4, show_default=True, help='Searches from other beginnings.')
+@click.option('--iterations', default=150, show_default=True, help='Of each search.')
+@click.option(
+    '--time-budget',
+    default=120.0,
+    show_default=True,
+    help='At most so much processor time in each search process [s].',
+)
+@parameters.gravity
+@parameters.joints
+@parameters.seed
+@parameters.reading
+@parameters.as_json
 def excite(
-    robot: RobotChoice,
+    robot_source: str,
+    gravity: str,
+    joints: str | None,
     out: Path,
-    motion: MotionOptions,
-    model: ModelOptions,
-    limits: LimitOptions,
-    search: SearchOptions,
+    kind: str,
+    share: float,
+    duration: float,
+    periods: int,
+    speeds: tuple[str | float, ...],
+    focus: str,
+    effects: str,
+    texts: tuple[str, ...],
+    rival: str | None,
+    model: Path | None,
+    start: str | None,
+    acceleration: str | None,
+    joint_limits: Path | None,
+    velocity: tuple[str, ...],
+    torque_noise: str | None,
+    clearance: float,
+    environment: Path | None,
+    floor: str | None,
+    after: tuple[Path, ...],
+    seed: int,
     as_json: bool,
+    **settings: Any,
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
+    from armid_ros.api.excitation import (
+        design_excitation,
+        design_settings,
+        SCHEMA,
+        transfer_planner,
+    )
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.cli import options
+    from armid_ros.cli.excite.springs import (
+        refuse_other_options,
+        require_free,
+        write_course,
+    )
+    from armid_ros.cli.origin import provenance
+    from armid_ros.excitation import CollisionScene, with_joint_limits
+    from armid_ros.excitation.search.parallel import INTERRUPTED
+    from armid_ros.files import json_text
+
     refuse_other_options(click.get_current_context())
-    loaded = robot.load(search.after)
-    others = () if robot.joints else joints_beside_arms(loaded)
-    if others:
-        names = ','.join(joint for joint in loaded.joints if joint not in others)
-        loaded = replace(robot, joints=names).load(search.after)
-        drives = f'{", ".join(others)}; --joints A,B,... drives them'
-        say(f'not driven, as they belong to no arm: {drives}', 'yellow')
-    loaded, acceleration = with_joint_limits(loaded, limits.joint_limits, limits.velocity)
-    space = limits.workspace(loaded)
-    if motion.kind in COURSES:
-        write_course(motion, space, search.seed, out)
+    robot = _driven(robot_source, gravity, joints, after)
+    robot, limits = with_joint_limits(robot, joint_limits, velocity)
+    with progress('reading meshes') as tick:
+        scene = CollisionScene.of(robot, clearance, floor, environment, progress=tick)
+    if kind in COURSES:
+        write_course(kind, scene, duration, share, seed, out)
         return
-    arm, rival = model.arms(loaded)
-    settings = design_settings(loaded, acceleration, motion, model, limits, search)
-    planners = {
-        speed: _planner(arm, settings, speed, space) for speed in dict.fromkeys(motion.speeds)
+    arm, other = _arms(robot, model, effects, focus, texts, rival)
+    if acceleration is not None:
+        limits = options.per_joint(acceleration, robot, '--acceleration')
+    settings |= {
+        'focus': tuple(name.partition('@')[0] for name in focus.split(',') if name),
+        'acceleration': limits,
+        'noise': options.per_joint(torque_noise, robot, '--torque-noise'),
+        'clearance': clearance,
     }
-    given = options.per_joint(limits.start, loaded, '--start')
-    start, zero_fault = _start(given, planners[motion.speeds[0]])
-    files = tuple(filter(None, (model.model, limits.environment, limits.joint_limits)))
-    plan = ExcitationPlan(arm, robot.robot_source, space, start, search.after, files, search.seed)
-    folders = {s: out if len(motion.speeds) == 1 else out / f'{s}' for s in motion.speeds}
+    known = design_settings(duration, periods, **settings)
+    planner = transfer_planner(arm, replace(known, speed=speeds[0]), scene)
+    pose, whose = _start(options.per_joint(start, robot, '--start'), planner)
+    folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}
     for folder in folders.values():
         require_free(folder)
-    staged = {s: options.stage(f, SCHEMA, robot.robot_source) for s, f in folders.items()}
-    known = _known(arm, settings, search.after, search.seed) if search.after else None
-    task = _Task(plan, settings, rival, known)
+    staged = {s: options.stage(f, SCHEMA, robot_source) for s, f in folders.items()}
+    recordings = options.read(after, robot, None)
+    beside = [path for path in (model, environment, joint_limits) if path is not None]
+    read = [Path(robot_source.split(' ')[0]), *after, *beside]
     missing = list(folders)
     for number, (speed, folder) in enumerate(folders.items()):
         with progress('designing') as tick:
-            result = task.design(speed, _share(tick, number, len(folders)))
+            result = design_excitation(
+                arm,
+                duration=duration,
+                periods=periods,
+                scene=scene,
+                start=pose,
+                after=recordings,
+                rival=other,
+                rng=seed,
+                progress=_shown(tick, number, len(folders), speed),
+                speed=speed,
+                **settings,
+            )
             tick((number + 1.0) / len(folders), 'writing')
-            written = write_plan(staged[speed], plan, result, planners[speed])
+            origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
+            document = _written(staged[speed], result, origin)
         missing.remove(speed)
         if as_json:
-            click.echo(json_text(written.document))
+            click.echo(json_text(document))
         else:
-            _tell(folder, result, written, plan, zero_fault, given is not None)
-        if result.stopped == INTERRUPTED:
+            _print(folder, document, result, whose)
+        if result.core.stopped == INTERRUPTED:
             break
     if missing:
         click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
 
 
-def _share(tick: Tick, number: int, count: int) -> Callable[[str | float, DesignProgress], None]:
+def _shown(
+    tick: Tick, number: int, count: int, speed: str | float
+) -> Callable[[DesignProgress], None]:
     """Return what shows the progress of one design of several."""
 
-    def told(speed: str | float, now: DesignProgress) -> None:
+    def shown(now: DesignProgress) -> None:
         tick((number + now.done) / count, f'designing {speed}, cost {now.cost:.2f}')
 
-    return told
+    return shown
 
 
-@dataclass(frozen=True)
-class _Task:
-    """What is designed at every speed: the plan, the rival, and the prior information."""
+def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
+    """Load the robot; joints that belong to no arm are driven where they are named only."""
+    from armid_ros.cli import options
+    from armid_ros.robots import joints_beside_arms
 
-    plan: ExcitationPlan
-    settings: DesignSettings
-    rival: ArmModel | None
-    known: FloatArray | None
-
-    def design(
-        self, speed: str | float, told: Callable[[str | float, DesignProgress], None]
-    ) -> Design:
-        """Return the design for one speed."""
-        return design_speeds(
-            self.plan.arm,
-            self.settings,
-            np.random.default_rng(self.plan.seed),
-            speeds=[speed],
-            collision=self.plan.workspace.bodies,
-            prior_information=self.known,
-            rival=self.rival,
-            progress=told,
-        )[speed]
-
-
-def _planner(
-    arm: ArmModel,
-    settings: DesignSettings,
-    speed: str | float,
-    space: CollisionScene,
-) -> TransferPlanner:
-    """Return what plans the ways to a run of some speed, and back."""
-    return TransferPlanner(
-        arm,
-        transfer_limits(arm.robot, speed, settings.acceleration),
-        ClearanceModel.of(space.bodies),
-        settings.clearance,
-    )
+    robot = options.open_robot(source, gravity, joints, bags)
+    others = () if joints else joints_beside_arms(robot)
+    if not others:
+        return robot
+    names = ','.join(joint for joint in robot.joints if joint not in others)
+    robot = options.open_robot(source, gravity, names, bags)
+    drives = f'{", ".join(others)}; --joints A,B,... drives them'
+    say(f'not driven, as they belong to no arm: {drives}', 'yellow')
+    return robot
 
 
 def _start(given: FloatArray | None, planner: TransferPlanner) -> tuple[FloatArray, str]:
-    """Return the pose to start from, and what is wrong with zero where it is not zero."""
-    if given is None:
-        return planner.free_start()
-    fault = planner.fault(given)
-    if fault:
-        raise TrajectoryError(f'--start: {fault}')
-    return given, ''
+    """Return the pose to start from, and what it is in words."""
+    if given is not None:
+        fault = planner.fault(given)
+        if fault:
+            raise TrajectoryError(f'--start: {fault}')
+        return given, 'as given'
+    pose, fault = planner.free_start()
+    zero = 'the zero of the description'
+    return pose, f'{zero} is not free: {fault}' if fault else zero
 
 
-def _known(arm: ArmModel, settings: DesignSettings, bags: Sequence[Path], seed: int) -> FloatArray:
-    """Return the information that recordings hold already, shape (r, r)."""
-    recordings = options.read(bags, arm.robot, None)
-    used = conditioning(recordings, SignalSettings())
-    problem = DesignProblem.of(arm, settings, np.random.default_rng(seed))
-    size = len(problem.base.parameters)
-    matrix = np.zeros((size, size))
-    for recording in recordings:
-        for motion in segments(recording, used):
-            thinned = motion.select(slice(None, None, used.decimation))
-            duration = float(motion.t[-1] - motion.t[0])
-            matrix += problem.information(thinned, duration * settings.rate).matrix
-    return matrix
+def _arms(
+    robot: Robot,
+    model: Path | None,
+    effects: str,
+    focus: str,
+    texts: tuple[str, ...],
+    rival: str | None,
+) -> tuple[ArmModel, ArmModel | None]:
+    """Return the prior model, and the one to tell it from."""
+    from armid_ros.arm import ArmModel
+    from armid_ros.cli import options
+    from armid_ros.effects import parse_effect
+
+    arm = ArmModel(robot) if model is None else options.model_of(model, robot)
+    arm = options.with_effects(arm, effects)
+    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
+    arm = options.with_effects(arm, focus)
+    for text in texts:
+        arm = arm.with_effect(*parse_effect(text, robot))
+    return arm, other
 
 
-def _tell(
-    folder: Path,
-    result: Design,
-    written: Written,
-    plan: ExcitationPlan,
-    zero_fault: str,
-    given: bool,
-) -> None:
-    document, run = written.document, written.run
+def _written(staged: Staged, result: ExcitationResult, origin: ResultOrigin) -> dict[str, Any]:
+    """Write a design; where no way leads to it, its coefficients alone, unless one was there."""
+    try:
+        document = result.fill(staged.folder, origin)
+    except TrajectoryError as error:
+        held = f'{staged.out}: stays as it was'
+        if staged.alone:
+            staged.keep()
+            held = f'{staged.out / "excitation.yaml"} holds the design'
+        raise TrajectoryError(
+            f'{held}, but there is no trajectory: {error}; take another --start, or another --seed'
+        ) from error
+    staged.keep()
+    return document
+
+
+def _print(folder: Path, document: dict[str, Any], result: ExcitationResult, whose: str) -> None:
+    from armid_ros.excitation.fitness import FIT
+
     unseen = sum(row['std'] is None for row in document['parameters'])
+    condition = document['condition_number'] or math.inf
     say(
-        f'{result.settings.speed}: condition number {document["condition_number"] or np.inf:.1f}, '
+        f'{document["speed"]}: condition number {condition:.1f}, '
         f'{len(document["parameters"])} parameters' + (f', {unseen} not seen' if unseen else '')
     )
-    say(str(written.fitness), 'green' if written.fitness.word == FIT else 'yellow')
-    whose = 'as given' if given else 'the zero of the description'
-    if zero_fault:
-        whose = f'the zero of the description is not free: {zero_fault}'
+    say(str(result.fitness), 'green' if result.fitness.word == FIT else 'yellow')
+    run = result.run
     say(
-        f'starts at rest at {_pose(plan.arm.robot, run.approach.q[0])} ({whose}), is on the '
+        f'starts at rest at {_pose(result.arm.robot, run.approach.q[0])} ({whose}), is on the '
         f'trajectory after {run.approach.duration:.1f} s and back after {run.duration:.1f} s'
     )
-    if result.stopped:
-        say(f'stopped early ({result.stopped}): the best so far, not what the seed would give')
+    stopped = result.core.stopped
+    if stopped:
+        say(f'stopped early ({stopped}): the best so far, not what the seed would give')
     say(f'{folder}: excitation.yaml, excitation.csv, trajectory (a bag), report.html')
 
 

@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+from armid_ros.api.excitation import BAG, SCHEMA
 from armid_ros.cli import options
-from armid_ros.cli.excite.files import BAG, require_free, SCHEMA
-from armid_ros.cli.excite.options import MotionOptions
 from armid_ros.cli.terminal import say
+from armid_ros.errors import RecordingError
 from armid_ros.excitation import CollisionScene, Limits, not_checked
+from armid_ros.files.own import is_plan
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
 from armid_ros.simulation.elastic.courses import multisine_course, step_course
@@ -37,7 +39,20 @@ def refuse_other_options(context: click.Context) -> None:
             raise click.UsageError(f'{option.opts[0]} does not go with --kind {kind}')
 
 
-def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: Path) -> None:
+def require_free(folder: Path) -> None:
+    """Raise a RecordingError where a recording is already, before a design takes its time."""
+    if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
+        raise RecordingError(f'{folder} is a recording; name another --out')
+    if os.path.lexists(folder / BAG) and not is_plan(folder / BAG):
+        raise RecordingError(
+            f'{folder / BAG}: is no trajectory of armid excite; name another --out, or move it '
+            'away'
+        )
+
+
+def write_course(
+    kind: str, space: CollisionScene, duration: float, share: float, seed: int, out: Path
+) -> None:
     """Write the trajectory as a bag."""
     robot = space.collision.robot
     require_free(out)
@@ -49,7 +64,7 @@ def write_course(motion: MotionOptions, space: CollisionScene, seed: int, out: P
         return bool(inside) and float(bodies.path_clearance(q).min()) >= space.clearance
 
     rng = np.random.default_rng(seed)
-    course = COURSES[motion.kind](robot, motion.duration, motion.share, rng, clear)
+    course = COURSES[kind](robot, duration, share, rng, clear)
     write_joint_trajectory(staged.folder / BAG, course, robot_description=robot.urdf)
     staged.keep()
     say(f'{out / BAG}: {len(course.t)} waypoints, {course.duration:.1f} s')

@@ -182,7 +182,7 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
     fuller = arm
     for kind in CATALOGUE.values():
         joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
-        if kind.everywhere and kind.name in library and joints:
+        if kind.traits.everywhere and kind.name in library and joints:
             fuller = fuller.with_effect(kind.on(arm.robot, joints))
             added += [kind.on(arm.robot, (joint,)) for joint in joints]
     return fuller, tuple(added)
@@ -280,7 +280,7 @@ def candidates(
             for single in singles:
                 size = len(single.parameters(arm.robot))
                 if (single.name, single.joints) not in taken:
-                    for kept in single.separate or (tuple(range(size)),):
+                    for kept in single.traits.separate or (tuple(range(size)),):
                         span = slice(start + kept[0], start + kept[-1] + 1)
                         candidates.append(Candidate(single, span, kept, arm.robot))
                 start += size

@@ -271,7 +271,9 @@ def _beside_a_correction(first: Explanation) -> bool:
 
 def _may_correct(step: Step) -> bool:
     effect, others = step.trial.candidate.effect, [rival.candidate.effect for rival in step.rivals]
-    return effect.corrects or (effect.changes_body and any(one.corrects for one in others))
+    return effect.traits.corrects or (
+        effect.changes_body and any(one.traits.corrects for one in others)
+    )
 
 
 def _stands(first: Explanation, anew: Explanation) -> bool:
@@ -289,7 +291,9 @@ def _stands(first: Explanation, anew: Explanation) -> bool:
     given = zip(first.given.effects, first.given.values, strict=True)
     open_values = {effect.name for effect, values in given if not np.any(values)}
     candidates = [
-        step.trial.candidate for step in first.steps if not step.trial.candidate.effect.corrects
+        step.trial.candidate
+        for step in first.steps
+        if not step.trial.candidate.effect.traits.corrects
     ]
     gone = {
         candidate.key[:2] for candidate in candidates if candidate.effect.name not in open_values

@@ -345,7 +345,7 @@ def _base_values(fitted: Fitted, base: BaseParameters) -> FloatArray:
 
 def _offsets(friction: Sequence[Accepted]) -> list[Effect]:
     """Return those of the effects without given values that are no friction."""
-    return [one.named.effect for one in friction if not one.named.effect.friction]
+    return [one.named.effect for one in friction if not one.named.effect.traits.friction]
 
 
 def _of(step: Step, question: Question) -> Accepted:

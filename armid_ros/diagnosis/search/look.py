@@ -191,7 +191,7 @@ def _joint_by_joint(
         where = _touched(trial, here)
         if len(where) == 1 and acceptable(trial, here):
             groups[trial.candidate.effect.name].setdefault(where, trial)
-            if first.candidate.effect.external:
+            if first.candidate.effect.traits.external:
                 groups[_ANY].setdefault(where, trial)
     single = [trial for trial in passing if len(_touched(trial, here)) == 1]
     able = [trial.candidate.key for trial in single if changed(trial, here)]
@@ -204,7 +204,7 @@ def _joint_by_joint(
     resolution = np.concatenate([trial.resolution for trial in parts])
     whole = replace(parts[0], cross=cross, square=square, resolution=resolution)
     simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
-    simpler = simpler or first.candidate.effect.common
+    simpler = simpler or first.candidate.effect.traits.common
     if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
         return []
     return sorted(parts, key=lambda trial: (trial.candidate.key not in able, -worth(trial, here)))
@@ -246,7 +246,9 @@ def _least_sizes(trial: Trial, here: Round) -> FloatArray:
 def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
     """Refine shapes of the best candidates; return the ranking and a round with their columns."""
     problem = here.problem
-    best = max((worth(t, here) for t in ranking if not t.candidate.effect.external), default=0.0)
+    best = max(
+        (worth(t, here) for t in ranking if not t.candidate.effect.traits.external), default=0.0
+    )
     refined: list[Trial] = []
     found: list[FloatArray] = []
     first = problem.x.shape[2]
@@ -328,7 +330,7 @@ def _examined(
     closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
     result = sorted([*others, *compared], key=lambda t: -worth(t, here))
     if here.tested is not None:  # what cannot be named, or is a misfit of all joints alike
-        able = [one.candidate.key for one in compared if not one.candidate.effect.common]
+        able = [one.candidate.key for one in compared if not one.candidate.effect.traits.common]
         here = replace(here, tested=here.tested.among(able, certain))
     there = [change for change in there if changed(change, here)]
     return result, sorted(there, key=lambda t: -worth(t, here)), closing, here

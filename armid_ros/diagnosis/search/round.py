@@ -274,8 +274,8 @@ def worth(trial: Trial, here: Round) -> float:
 def cost(trial: Trial, settings: DiagnosisSettings) -> float:
     """Return the number of values and shapes that the data choose, more for external effects."""
     effect = trial.candidate.effect
-    shapes = len(effect.shapes) / max(len(effect.separate), 1)
-    outside = settings.thresholds.outside if effect.external else 0.0
+    shapes = len(effect.shapes) / max(len(effect.traits.separate), 1)
+    outside = settings.thresholds.outside if effect.traits.external else 0.0
     return trial.freedom + shapes + outside
 
 
@@ -292,7 +292,9 @@ def beaten(other: Trial, first: Trial, here: Round) -> bool:
     z *= squares / gains if gains else 0.0
     if squares <= 0.0:
         return False
-    often = frequency(other, here) is Frequency.OFTEN and not other.candidate.effect.external
+    often = (
+        frequency(other, here) is Frequency.OFTEN and not other.candidate.effect.traits.external
+    )
     if frequency(first, here) > Frequency.OFTEN and often:
         return squares > thresholds.far * first.gain
     if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
@@ -309,7 +311,7 @@ class Frequency(IntEnum):
 def frequency(trial: Trial, here: Round) -> Frequency:
     """Return how seldom a cause changes: a link never does, an inner one hardly has a load."""
     effect = trial.candidate.effect
-    if here.since and effect.corrects:
+    if here.since and effect.traits.corrects:
         return Frequency.NEVER
     seldom = here.since and effect.changes_body and not _usual(trial)
     return Frequency.SELDOM if seldom else Frequency.OFTEN
@@ -326,7 +328,9 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -
     changes may be excluded by another one that often does.
 
     """
-    of_arm = [frequency(trial, here) for trial in tied if not trial.candidate.effect.external]
+    of_arm = [
+        frequency(trial, here) for trial in tied if not trial.candidate.effect.traits.external
+    ]
     least = min(of_arm, default=Frequency.NEVER)
     first, *others = (trial for trial in tied if frequency(trial, here) <= least)
     tied = [first, *(trial for trial in others if not beaten(trial, first, here))]
@@ -388,7 +392,10 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
     if apart < thresholds.same * squares or _same_body(big, small):
         if not here.since:
             return False
-        if small.candidate.effect.comes_and_goes and not big.candidate.effect.comes_and_goes:
+        if (
+            small.candidate.effect.traits.comes_and_goes
+            and not big.candidate.effect.traits.comes_and_goes
+        ):
             return True  # links do not change; a description of them may be off
     if cost(big, here.settings) <= cost(small, here.settings):
         return False

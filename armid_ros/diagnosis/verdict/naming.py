@@ -80,13 +80,15 @@ def findings(
                 rivals,
                 _separating(name, order, rivals[0]) if rivals else '',
                 float(attribution.taken[indices].sum()),
-                parts[0].effect.sign,
+                parts[0].effect.traits.sign,
                 _ties([part.effect for part in parts], order),
-                parts[0].effect.weighs,
+                parts[0].effect.traits.weighs,
                 tuple(other for other in together if other != name),
                 _of_joint(explanation, indices, attribution.share(indices)),
                 tuple(had.get((row[0].name, row[0].joint), 0.0) for row in rows),
-                explanation.fitted.named[own[0]].effect.look_at if len(together) > 1 else '',
+                explanation.fitted.named[own[0]].effect.traits.look_at
+                if len(together) > 1
+                else '',
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
@@ -137,8 +139,8 @@ def small_print(
                 (share - wide, share + wide),
                 min(1.0, trial.p * tried),
                 gain=trial.gain,
-                sign=effect.sign,
-                weighs=effect.weighs,
+                sign=effect.traits.sign,
+                weighs=effect.traits.weighs,
             )
         )
     return tuple(result)
@@ -306,7 +308,7 @@ def on_one_link(name: str, joints: Sequence[str], rival: Rival) -> bool:
     """Return whether a load and its rival are bodies on the same link, which no motion tells."""
     both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
     bodies = len(both) == 2 and all(kind.changes_body for kind in both)
-    carried = any(kind.comes_and_goes for kind in both)
+    carried = any(kind.traits.comes_and_goes for kind in both)
     return bodies and carried and bool(joints) and set(joints) == set(rival.joints)
 
 
@@ -319,5 +321,7 @@ def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
     """
     kinds = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
     if on_one_link(name, joints, rival):
-        kinds = [kind for kind in kinds if kind.comes_and_goes]
-    return '; or '.join(dict.fromkeys([kind.shown_by for kind in kinds] or [Effect.shown_by]))
+        kinds = [kind for kind in kinds if kind.traits.comes_and_goes]
+    return '; or '.join(
+        dict.fromkeys([kind.traits.shown_by for kind in kinds] or [Effect.traits.shown_by])
+    )

@@ -366,7 +366,7 @@ def _left_open(finding: Finding) -> list[str]:
     names = ' and '.join(dict.fromkeys(p.words for p in left))
     return [
         f'These recordings do not determine its {names}; what shows it is '
-        f'{CATALOGUE[finding.name].shown_by}.'
+        f'{CATALOGUE[finding.name].traits.shown_by}.'
     ]
 
 

@@ -20,28 +20,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.least_squares import noise_products, solve
-from armid_ros.identification.fitting.nonlinear import linearised
+from armid_ros.identification.fitting.instruments import (
+    by_instruments,
+    linear_problem,
+    smoothed,
+)
+from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.identify import Identification
-from armid_ros.identification.rows.regression import Regression, regressions
-from armid_ros.identification.rows.signals import even_positions, sampling_rate, unbroken
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.signals import even_positions, sampling_rate
 from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-from scipy import signal
 from scipy.stats import chi2
 
-#: The instruments keep this share of the band of the regressor, which is ten times the motion's.
-INSTRUMENT_SHARE = 0.2
 #: Noise is what lies above this share of the sampling rate.
 _NOISE_ABOVE = 0.3
-#: Samples that a stretch is continued by at its ends at the most: three times the length of the
-#: filter, two sections of second order, as scipy does where nothing is said.
-_EDGE = 15
 #: A difference between the two fits of less than this share of a deviation does not matter, and
 #: counts little in the test: two fits of the same data are distinguishable to a thousandth.
 NEGLIGIBLE = 0.1
@@ -173,99 +172,47 @@ def check_noise(
     """
     if repeats < 2:
         raise IdentificationError(f'{repeats} simulations do not tell a mean from chance: take 2')
-    used = result.used
-    tick = _steps(repeats + 2, progress)
-    problem = _about(result, recordings)
-    tick()
-    solution = solve(problem, result.settings.least_squares)
-    calm = [
-        calm_recording(recording, INSTRUMENT_SHARE * used.cutoff_hz) for recording in recordings
-    ]
-    instruments = _about(result, calm)
-    tick()
-    statistic, freedom, values, covariance = _hausman(problem, instruments, solution.weights)
-
-    noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
-    bias, bias_std = _simulated_bias(
-        result, calm, instruments, solution.weights, noise, rng, repeats, tick
+    report = progress or (lambda share: None)
+    about = partial(
+        linear_problem, result.arm, result.base, used=result.used, linear=result.passes == 1
     )
+    problem = about(recordings)
+    report(1.0 / (repeats + 2))
+    weights = solve(problem, result.settings.least_squares).weights
+    calm = smoothed(recordings, result.used)
+    exact = about(calm)
+    report(2.0 / (repeats + 2))
+    found = by_instruments(problem, [part.columns for part in exact], weights)
+    unit = 1.0 / np.sqrt(np.diag(found.covariance))
+    sizes, axes = np.linalg.eigh(found.spread * np.outer(unit, unit))
+    counted = 1.0 / (sizes.clip(0.0) + NEGLIGIBLE**2)
+    statistic = float(np.sum((axes.T @ (found.difference * unit)) ** 2 * counted))
+    freedom = max(float(np.sum(sizes.clip(0.0) * counted)), 1.0)  # what to expect of it
+
+    # A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what
+    # was found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times
+    # the difference of the torques of what was found along the exact and the noisy motion.
+    noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
+    values, std = result.estimate.values, result.estimate.std
+    scale = np.where(std > 0.0, std, 1.0)
+    w, torque = _weighted(exact, weights, scale), _torque(exact, weights, values)
+    biases = []
+    for k in range(repeats):
+        noisy = about([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
+        both = np.column_stack([w, torque - _torque(noisy, weights, values)])
+        gain = np.linalg.lstsq(_weighted(noisy, weights, scale), both, rcond=None)[0]
+        biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
+        report((k + 3.0) / (repeats + 2))
     return NoiseCheck(
         statistic=statistic,
         freedom=freedom,
         p_value=float(chi2.sf(statistic, freedom)),
-        instrumental=Estimate(result.base.parameters, values, covariance),
+        instrumental=Estimate(result.base.parameters, found.values, found.covariance),
         position_noise=noise,
-        bias=bias,
-        bias_std=bias_std,
-        std=result.estimate.std,
+        bias=scale * np.mean(biases, axis=0),
+        bias_std=scale * np.std(biases, axis=0, ddof=1) / np.sqrt(repeats),
+        std=std,
     )
-
-
-def _steps(count: int, progress: Callable[[float], None] | None) -> Callable[[], None]:
-    """Return what is called after each of some steps of equal length."""
-    done = 0
-
-    def tick() -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done / count)
-
-    return tick
-
-
-def calm_recording(recording: Recording, cutoff_hz: float) -> Recording:
-    """Return a recording with positions smoothed below a frequency."""
-    sections = signal.butter(4, cutoff_hz * recording.period * 2.0, output='sos')
-    q = recording.q.copy()
-    for part in unbroken(recording, sampling_rate(recording)):
-        edge = min(_EDGE, len(part) - 1)
-        q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
-    return replace(recording, q=q, dq=None)
-
-
-def _hausman(
-    problem: Sequence[Regression], instruments: Sequence[Regression], weights: FloatArray
-) -> tuple[float, float, FloatArray, FloatArray]:
-    """
-    Compare the fit with the one by instruments; both are linear in the torque.
-
-    Returns
-    -------
-    statistic : float
-    freedom : float
-    values : ndarray, shape (r,)
-        Fit by instruments.
-    covariance : ndarray, shape (r, r)
-        Of that.
-
-    """
-    rank = problem[0].columns.shape[2]
-    w, z = (np.concatenate([p.columns for p in parts]) for parts in (problem, instruments))
-    tau = np.concatenate([part.target for part in problem])
-    scale = np.linalg.norm((weights[:, :, np.newaxis] * w).reshape(-1, rank), axis=0)
-    scaled = [replace(part, columns=part.columns / scale) for part in problem]
-    weighted_w = (weights[:, :, np.newaxis] * w / scale).reshape(-1, rank)
-    weighted_z = (weights[:, :, np.newaxis] * z / scale).reshape(-1, rank)
-    torque = (weights * tau).ravel()
-    triangle = np.linalg.qr(weighted_w, mode='r')
-    inverse = np.linalg.inv(triangle)
-    by_w, by_z = inverse @ inverse.T, np.linalg.inv(weighted_z.T @ weighted_w)
-    plain, other = by_w @ (weighted_w.T @ torque), by_z @ (weighted_z.T @ torque)
-
-    residual = (torque - weighted_w @ plain).reshape(weights.shape)
-    further = [part.columns / scale for part in instruments]
-    products = noise_products(scaled, residual, weights, inverse, further)
-    difference = np.concatenate([-by_w, by_z], axis=1)
-    spread = difference @ products @ difference.T
-    covariance = by_z @ products[rank:, rank:] @ by_z.T
-    unit = 1.0 / np.sqrt(np.diag(covariance))
-    sizes, axes = np.linalg.eigh(spread * np.outer(unit, unit))
-    sizes = sizes.clip(0.0)
-    along = axes.T @ ((other - plain) * unit)
-    statistic = float(np.sum(along**2 / (sizes + NEGLIGIBLE**2)))
-    freedom = float(np.sum(sizes / (sizes + NEGLIGIBLE**2)))  # what to expect of it
-    return statistic, max(freedom, 1.0), other / scale, covariance / np.outer(scale, scale)
 
 
 def position_noise(recording: Recording) -> FloatArray:
@@ -279,47 +226,6 @@ def position_noise(recording: Recording) -> FloatArray:
     frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
     level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))
-
-
-def _simulated_bias(
-    result: Identification,
-    calm: Sequence[Recording],
-    exact: Sequence[Regression],
-    weights: FloatArray,
-    noise: FloatArray,
-    rng: np.random.Generator,
-    repeats: int,
-    tick: Callable[[], None],
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Return how much noisy positions change a fit, and the standard error of that.
-
-    A fit with noisy columns V to the torque W beta of exact ones finds M beta, M = V^+ W; what was
-    found is M beta of the truth, so the bias is beta_hat - M^-1 beta_hat, or M^-1 V^+ times the
-    difference of the torques of what was found along the exact and the noisy motion.
-
-    """
-    scale = np.where(result.estimate.std > 0.0, result.estimate.std, 1.0)
-    w = _weighted(exact, weights, scale)
-    found = _torque(exact, weights, result.estimate.values)
-    biases = []
-    for _ in range(repeats):
-        noisy = [replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm]
-        again = _about(result, noisy)
-        off = found - _torque(again, weights, result.estimate.values)
-        both = np.column_stack([w, off])
-        gain = np.linalg.lstsq(_weighted(again, weights, scale), both, rcond=None)[0]
-        biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
-        tick()
-    spread = np.std(biases, axis=0, ddof=1) / np.sqrt(repeats)
-    return scale * np.mean(biases, axis=0), scale * spread
-
-
-def _about(result: Identification, recordings: Sequence[Recording]) -> Sequence[Regression]:
-    """Linearise the identified arm along recordings, with a constant where it is not linear."""
-    if result.passes > 1:
-        return linearised(result.arm, result.base, recordings, result.used)[0]
-    return regressions(result.arm, result.base.independent, recordings, result.used)
 
 
 def _torque(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:

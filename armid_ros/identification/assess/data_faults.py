@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.assess.dead_channels import dead_channels
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
 from armid_ros.identification.assess.hypotheses import (
     Exchanged,
     InDegrees,
@@ -128,20 +127,40 @@ def check_data(
         one.source: [part.motion for part in data if part.source == one.source]
         for one in recordings
     }
-    band_hz = _band(used, data)
-    uneven = (uneven_stamps(one, used.cutoff_hz, band_hz) for one in recordings)
-    stamps = [*filter(None, uneven)]  # by which anything else seems to be wrong
-    blind = [x for one in recordings for x in dead_encoders(arm.body, one, motions[one.source])]
+    band_hz = min(used.kept_hz, *(part.motion.band_hz for part in data))
+    stamps = [uneven_stamps(one, used.cutoff_hz, band_hz) for one in recordings]
+    times = [(one.source or 'recording', time_base_fault(one)) for one in recordings]
+    # each makes those after it appear
     mistaken = (
-        stamps or blind or _velocities(recordings) or _mistaken(arm, recordings, used, before)
+        [*filter(None, stamps)]
+        or [
+            text
+            for one in recordings
+            for text in dead_encoders(arm.body, one, motions[one.source])
+        ]
+        or [f'{source}: {text}' for source, text in times if text]
     )
-    mistaken = mistaken or _units(arm, recordings, used, before)
+    alone = not any(one.partner is not None for one in recordings)
+    if alone and not mistaken:
+        now, then = (slow_motions_of(some, used) for some in (recordings, before))
+        mistaken = (
+            _mistaken(arm, recordings, used, before)
+            or list(units_beside_model(arm, now, then))
+            or list(units_beyond_drives(arm.robot, recordings, now))
+        )
     if mistaken:
         return mistaken, []
-    faults = [*_laws(arm, data)]
+    faults = [
+        f'{part.source or "recording"}: {law}'
+        for part in data
+        for law in laws_of_controllers(arm.body, part.motion, part.informative)
+    ]
     for one in recordings:
         faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
-    faults += [] if faults else _signs(arm, recordings, data)
+    if alone and not faults:  # another machine that an arm is tied to may drive it
+        moved, torques = [part.motion for part in data], [part.torque for part in data]
+        driven = driven_by_friction(arm.robot, moved, torques)
+        faults += [wrong_sign(driven)] if driven else []
     notes = [*_clipped(arm.robot, recordings), *_beyond_limits(arm.robot, recordings)]
     notes += _described_friction(arm)
     for held in held_elsewhere(arm.robot, recordings, [part.motion for part in data]):
@@ -153,21 +172,10 @@ def check_data(
     return faults, notes
 
 
-def _signs(arm: ArmModel, recordings: Sequence[Recording], data: Sequence[Stretch]) -> list[str]:
-    """Say whose friction drives; another machine that an arm is tied to may drive it."""
-    if any(one.partner is not None for one in recordings):
-        return []
-    motions, torques = [part.motion for part in data], [part.torque for part in data]
-    driven = driven_by_friction(arm.robot, motions, torques)
-    return [wrong_sign(driven)] if driven else []
-
-
 def _mistaken(
     arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
 ) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
-    if any(one.partner is not None for one in recordings):
-        return []
     then = _baseline_factor(arm, before, used)
     mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
     found = [one.hypotheses for one in mistakes if one is not None]
@@ -229,23 +237,6 @@ def mistaken_recordings(
     return said
 
 
-def _velocities(recordings: Sequence[Recording]) -> list[str]:
-    """Say of which recordings velocities and time do not go together."""
-    said = [(one.source or 'recording', time_base_fault(one)) for one in recordings]
-    return [f'{source}: {text}' for source, text in said if text]
-
-
-def _units(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
-) -> list[str]:
-    """Say of which joints torques are in another unit, as the model or else drives show."""
-    if any(one.partner is not None for one in recordings):
-        return []
-    now, then = (slow_motions_of(some, used) for some in (recordings, before))
-    beside = list(units_beside_model(arm, now, then))
-    return beside or list(units_beyond_drives(arm.robot, recordings, now))
-
-
 def _baseline_factor(
     arm: ArmModel, before: Sequence[Recording], used: Conditioning
 ) -> float | None:
@@ -288,11 +279,6 @@ def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
         )
 
 
-def _band(used: Conditioning, data: Sequence[Stretch]) -> float:
-    """Return up to which frequency rows hold motion [Hz]."""
-    return min(used.kept_hz, *(part.motion.band_hz for part in data))
-
-
 def _described_friction(arm: ArmModel) -> list[str]:
     """Say that a description states friction that the model does not have."""
     robot = arm.robot
@@ -301,10 +287,10 @@ def _described_friction(arm: ArmModel) -> list[str]:
         joint
         for k, joint in enumerate(robot.joints)
         if any(
-            getattr(robot, f'urdf_{kind.urdf_attribute}')[k] > 0.0
+            getattr(robot, f'urdf_{kind.traits.urdf_attribute}')[k] > 0.0
             and (kind.name, joint) not in there
             for kind in CATALOGUE.values()
-            if kind.urdf_attribute
+            if kind.traits.urdf_attribute
         )
     ]
     if not stated:
@@ -313,12 +299,6 @@ def _described_friction(arm: ArmModel) -> list[str]:
         f'the description states friction of {", ".join(stated)} in <dynamics>, which the model '
         'does not have: it is looked for like any other; give a model that has it'
     ]
-
-
-def _laws(arm: ArmModel, data: Sequence[Stretch]) -> Iterator[str]:
-    for part in data:
-        for law in laws_of_controllers(arm.body, part.motion, part.informative):
-            yield f'{part.source or "recording"}: {law}'
 
 
 def _clipped(robot: Robot, recordings: Sequence[Recording]) -> list[str]:

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.dead_channels import dead_channels
-from armid_ros.identification.assess.dead_encoders import dead_encoders
+from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives
@@ -88,28 +87,45 @@ def grade(
         Those recordings.
 
     """
-    blind = _blind(result, description, validation, [*recordings, *held_out])
-    seeing = [one for one in [*recordings, *held_out] if one.source not in blind]
+    robot, every = description.robot, [*recordings, *held_out]
+    fits = [*result.training, *(fit for part in validation.values() for fit in part)]
+    motions = {
+        one.source: [fit.motion for fit in fits if fit.source == one.source] for one in every
+    }
+    dead = {
+        one.source: [*dead_encoders(description.body, one, motions[one.source])] for one in every
+    }
+    # what else a recording with a dead encoder seems to show is of that
+    seeing = [one for one in every if not dead[one.source]]
     mistakes, suspicions = _mistakes(result, description, seeing)
+    moved = [fit.motion for fit in fits]
+    units = [] if mistakes else units_beyond_drives(robot, seeing, moved)
+    silent = (
+        text for one in every for text in dead_channels(description, one, motions[one.source])
+    )
     faults = [
-        *(_Reason('unusable', text) for texts in blind.values() for text in texts),
-        *_time_bases([*recordings, *held_out], result),
-        *(mistakes or _units(result, description, validation, seeing)),
-        *_dead(result, description, validation, [*recordings, *held_out]),
-        *_elsewhere(result, description, validation, [*recordings, *held_out]),
+        *(_Reason('unusable', text) for texts in dead.values() for text in texts),
+        *_time_bases(every, result),
+        *mistakes,
+        *(_Reason('poor', text) for text in units),
+        *(_Reason('unusable', text) for text in silent),
+        *(
+            _Reason('poor' if found.spoils else 'good', found.text)
+            for found in held_elsewhere(robot, every, moved)
+        ),
     ]
     reasons = [
         *faults,
         *_errors(result, validation),
         *_resting(result, validation),
-        *_clocks([*recordings, *held_out]),
-        *_velocities([*recordings, *held_out]),
+        *_clocks(every),
+        *_velocities(every),
         *suspicions,
     ]
     ordered = _worst_first(reasons)
     return Grade(
         ordered[0].word,
-        tuple(_sentence(reason.text) for reason in ordered),
+        tuple(f'{reason.text[0].upper()}{reason.text[1:]}.' for reason in ordered),
         tuple(fault.text for fault in _worst_first(faults) if fault.word != 'good'),
     )
 
@@ -121,18 +137,6 @@ def _worst_first(reasons: Sequence[_Reason]) -> list[_Reason]:
 def by_error(error: float) -> Word:
     """Return the grade of a relative torque error on data that were not fitted [%]."""
     return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'
-
-
-def _units(
-    result: Identification,
-    description: ArmModel,
-    validation: Mapping[str, Sequence[Fit]],
-    recordings: Sequence[Recording],
-) -> list[_Reason]:
-    """Say whose torque is in another unit, as limits of drives tell where the body does not."""
-    motions = [fit.motion for fit in _fits(result, validation)]
-    units = units_beyond_drives(description.robot, recordings, motions)
-    return [_Reason('poor', text) for text in units]
 
 
 def _mistakes(
@@ -167,40 +171,6 @@ def _mistakes(
     return mistakes, suspicions
 
 
-def _blind(
-    result: Identification,
-    description: ArmModel,
-    validation: Mapping[str, Sequence[Fit]],
-    recordings: Sequence[Recording],
-) -> dict[str, list[str]]:
-    """Say of which recordings encoders are dead; what else they seem to show is of that."""
-    fits = _fits(result, validation)
-    said = {}
-    for recording in recordings:
-        motions = [fit.motion for fit in fits if fit.source == recording.source]
-        said[recording.source] = list(dead_encoders(description.body, recording, motions))
-    return {source: texts for source, texts in said.items() if texts}
-
-
-def _dead(
-    result: Identification,
-    description: ArmModel,
-    validation: Mapping[str, Sequence[Fit]],
-    recordings: Sequence[Recording],
-) -> Iterator[_Reason]:
-    """Say which torques nobody measured; a fit of them is close, and of no arm."""
-    fits = _fits(result, validation)
-    for recording in recordings:
-        motions = [fit.motion for fit in fits if fit.source == recording.source]
-        for text in dead_channels(description, recording, motions):
-            yield _Reason('unusable', text)
-
-
-def _fits(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[Fit]:
-    """Return what was fitted and what was held out."""
-    return [*result.training, *(fit for part in validation.values() for fit in part)]
-
-
 def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:
     for bag, fits in validation.items():
         worst = _Worst.of(Score.of(fits).joint_relative_error_percent, fits, result)
@@ -214,7 +184,8 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
         yield _Reason(word, text)
     if not validation:
         yield _halves(result)
-    fits = _fits_that_count(result, validation)
+    # what was held out, or what was fitted where nothing was
+    fits = [fit for part in validation.values() for fit in part] or list(result.training)
     every = Score.of(fits).joint_relative_error_percent
     if np.all(every[moving(fit.motion for fit in fits)] > LIMITS.unusable):
         yield _Reason('unusable', f'the torque of no joint is predicted to {LIMITS.unusable:g} %')
@@ -226,11 +197,6 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
         )
         text = f'the torque is hardly predicted of {named}, where it is noise or friction at rest'
         yield _Reason('good', text)
-
-
-def _fits_that_count(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[Fit]:
-    """Return what was held out, or what was fitted where nothing was."""
-    return [fit for part in validation.values() for fit in part] or list(result.training)
 
 
 class _Worst(NamedTuple):
@@ -277,18 +243,6 @@ def _halves(result: Identification) -> _Reason:
             f'{result.base.rank} parameters; record longer, or move more'
         )
     return _Reason(word, text)
-
-
-def _elsewhere(
-    result: Identification,
-    description: ArmModel,
-    validation: Mapping[str, Sequence[Fit]],
-    recordings: Sequence[Recording],
-) -> Iterator[_Reason]:
-    """Say which joints move, or stand elsewhere, without being driven."""
-    motions = [fit.motion for fit in _fits(result, validation)]
-    for found in held_elsewhere(description.robot, recordings, motions):
-        yield _Reason('poor' if found.spoils else 'good', found.text)
 
 
 def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[_Reason]:
@@ -348,7 +302,3 @@ def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
         rounded = rounded_stamps(recording)
         if rounded:
             yield _Reason('good', f'in {recording.source or "a recording"} {rounded}')
-
-
-def _sentence(text: str) -> str:
-    return f'{text[0].upper()}{text[1:]}.'

@@ -18,7 +18,6 @@ from typing import ClassVar
 
 from armid_ros.identification.assess.grade_limits import GradeLimits
 from armid_ros.identification.assess.hypothesis import changed, Hypothesis, Quantity, scaled
-from armid_ros.identification.assess.known_gravity import known_gravity
 from armid_ros.identification.rows.checks import (
     effort_unit,
     FOLLOWS,
@@ -28,7 +27,7 @@ from armid_ros.identification.rows.checks import (
 )
 from armid_ros.model import gravity_sensitivity, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
+from armid_ros.robots import GRAVITIES, Robot
 import numpy as np
 
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
@@ -36,6 +35,8 @@ TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
+#: Free values that are within this of an axis [degrees] are written as that axis.
+_AXIS = 15.0
 
 
 @dataclass(frozen=True)
@@ -381,3 +382,36 @@ def _of_joint(robot: Robot, joint: int) -> Iterator[Hypothesis]:
 def _beyond_masses(factor: float, limits: GradeLimits) -> bool:
     """Whether masses are not off by a factor, all of them."""
     return not 1.0 / limits.torque_factor < factor < limits.torque_factor
+
+
+def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
+    """
+    Write a gravity vector that was found as a person would.
+
+    Parameters
+    ----------
+    vector : ndarray, shape (3,)
+        As it was found [m/s^2].
+    told : ndarray, shape (3,)
+        As described; its magnitude is kept where the estimated one is close.
+
+    Returns
+    -------
+    direction : ndarray, shape (3,)
+        Unit vector; that of an axis where it is near.
+    option : str
+        What to give to --gravity.
+
+    """
+    size = float(np.linalg.norm(vector))
+    direction = vector / size
+    axis = np.round(direction)
+    if np.count_nonzero(axis) == 1 and direction @ axis > np.cos(np.deg2rad(_AXIS)):
+        direction = axis + 0.0
+    sizes = [float(np.linalg.norm(told)), *(-value[2] for value in GRAVITIES.values())]
+    near = min(sizes, key=lambda known: abs(np.log(size / max(known, 1e-9))))
+    size = near if 0.75 < size / max(near, 1e-9) < 1.33 else size
+    for name, value in GRAVITIES.items():
+        if np.allclose(size * direction, value, atol=1e-6):
+            return direction, name
+    return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)

@@ -67,17 +67,13 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     if not len(differences):
         return np.zeros(fits[0].motion.n_joints)
     deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
-    return np.asarray(deviation / np.sqrt(_second_differences(used)))
-
-
-def _second_differences(used: Conditioning) -> float:
-    """Return the variance of second differences of rows over that of rows, of white noise."""
+    # the variance of second differences of rows over that of rows, of white noise
     taps, step = used.taps(), used.decimation
     own, next_one, after = (
         float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0
         for lag in (0, step, 2 * step)
     )
-    return (6.0 * own - 8.0 * next_one + 2.0 * after) / own
+    return np.asarray(deviation / np.sqrt((6.0 * own - 8.0 * next_one + 2.0 * after) / own))
 
 
 def _torque(fit: Fit) -> FloatArray:

@@ -72,7 +72,11 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateT
     seconds, half = 0.0, np.inf
     for _ in range(_STEPS):
         moved = [LateTorque(seconds).motion(motion) for motion in stretches]
-        rows = [_rows(robot, motion, used) for motion in moved if _enough(motion, used)]
+        rows = [
+            _rows(robot, motion, used)
+            for motion in moved
+            if len(decimated_samples(len(motion), used)) > 1  # or they have no rate
+        ]
         found = _step(rows) if rows else None
         if found is None:
             return None
@@ -81,11 +85,6 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateT
         if abs(seconds - before) < _SETTLED:
             break
     return LateTorque(seconds, half) if abs(seconds) > half else None
-
-
-def _enough(motion: Motion, used: Conditioning) -> bool:
-    """Whether decimated rows have a rate."""
-    return len(decimated_samples(len(motion), used)) > 1
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armid_ros.effects.timing import within_band
-from armid_ros.identification.assess.faulty_samples import faulty_samples
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     AsRecorded,
@@ -34,21 +33,26 @@ from armid_ros.identification.assess.prediction_error import (
     described_error,
     nearest_error,
     PredictionError,
+    thinned,
 )
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
     decimated_samples,
+    GAP_PERIODS,
     segments,
 )
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 
 #: Samples of a recording that are looked at: a hundred and more for every value that is fitted to
 #: the torque of a joint, and ten and more where the body is fitted too.
 _ROWS, _ROWS_FITTED = 600, 200
+#: The middle of a recording that tells what is usual of it, in percent.
+_USUAL = (1.0, 99.0)
 #: Samples below which nothing can be asked.
 _FEWEST = 40
 
@@ -135,10 +139,8 @@ def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) ->
     tried = list(hypotheses(robot))
     late = late_torque(robot, recording, used)
     tried += [] if late is None else [late]
-    faults = faulty_samples(robot, recording)
-    if faults is not None:
-        without = tuple(slow_motions(recording.select(faults.sound), used))
-        tried.append(Faulty(faults.first, faults.count, without))
+    faulty = faulty_samples(robot, recording, used)
+    tried += [] if faulty is None else [faulty]
     found = _best(robot, tried, _described(robot, slow), _nearest(robot, slow))
     if found is not None:
         likely = tuple(one.detailed(robot, slow) for one in found.hypotheses)
@@ -149,6 +151,57 @@ def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) ->
         return found
     changes = [one for one in tried if not isinstance(one, InUnit | OtherGravity | OtherUnit)]
     return _best(robot, changes, _nearest(robot, slow)) or found
+
+
+def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Faulty | None:
+    """
+    Find samples that no arm can have given: torques far out of the rest, positions that jump.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    recording : Recording
+        Data with torques.
+    used : Conditioning
+        Filters that the recording is identified with.
+
+    Returns
+    -------
+    Faulty or None
+        The recording without them; None where there are none.
+
+    """
+    assert recording.tau is not None
+    # where torques are further from what is usual than that spans, many times
+    lower, upper = np.percentile(recording.tau, _USUAL, axis=0)
+    excess = np.maximum(lower - recording.tau, recording.tau - upper)
+    torque = np.asarray((excess > LIMITS.jump * (upper - lower)) & (upper > lower))
+    # where positions have stepped faster than the joint ever moves, many times
+    position = np.zeros(recording.q.shape, dtype=bool)
+    if len(recording) > 1:
+        time = np.maximum(np.diff(recording.t), recording.period)
+        speed = np.abs(np.diff(recording.q, axis=0)) / time[:, np.newaxis]
+        usual = np.percentile(speed, _USUAL[1], axis=0)
+        position[1:] = (speed > LIMITS.jump * usual) & (usual > 0.0)
+    at = np.argwhere(torque | position)
+    if not len(at):
+        return None
+    row, joint = at[0]
+    sound: npt.NDArray[np.bool_] = np.logical_not(torque.any(axis=1))
+    width = int(GAP_PERIODS) + 1  # so much is missing around a jump that filters do not bridge it
+    for jump in np.flatnonzero(position.any(axis=1)):
+        sound[max(0, jump - width) : jump + width] = False
+    name, t = recording.joints[joint], recording.t[row]
+    if torque[row, joint]:
+        unit = robot.torque_units[joint]
+        first = f'the torque of {name} is {recording.tau[row, joint]:.3g} {unit} at {t:.3f} s'
+    else:
+        step = recording.q[row, joint] - recording.q[row - 1, joint]
+        unit = robot.position_units[joint]
+        first = f'the position of {name} jumps by {step:.3g} {unit} at {t:.3f} s'
+    without = tuple(slow_motions(recording.select(sound), used))
+    return Faulty(first, len(np.unique(at[:, 0])), without)
 
 
 def effort_factor(
@@ -203,8 +256,8 @@ def _predicts(judge: Judge) -> bool:
 
 def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
     def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = _thinned(one.stretches(slow), _ROWS)
-        if motion is None:
+        motion = thinned(one.stretches(slow), _ROWS)
+        if motion is None or len(motion) < _FEWEST:
             return None
         error = described_error(motion, *one.torque(robot, motion))
         return error, one.settled(error.shared)
@@ -214,8 +267,10 @@ def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
 
 def _nearest(robot: Robot, slow: Sequence[Motion]) -> Judge:
     def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = _thinned(one.stretches(slow), _ROWS_FITTED)
-        return None if motion is None else (nearest_error(robot, motion), one)
+        motion = thinned(one.stretches(slow), _ROWS_FITTED)
+        if motion is None or len(motion) < _FEWEST:
+            return None
+        return nearest_error(robot, motion), one
 
     return judge
 
@@ -324,16 +379,3 @@ def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
 def slow_motions_of(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
     """Return such stretches of several recordings."""
     return [motion for one in recordings for motion in slow_motions(one, used)]
-
-
-def _thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
-    """Put stretches one after the other, and keep some of the samples."""
-    if not stretches:
-        return None
-    arrays = [
-        np.concatenate([getattr(part, name) for part in stretches])
-        for name in ('t', 'q', 'dq', 'ddq', 'tau')
-    ]
-    step = max(1, len(arrays[0]) // rows)
-    motion = Motion(stretches[0].joints, *(array[::step] for array in arrays))
-    return motion if len(motion) >= _FEWEST else None

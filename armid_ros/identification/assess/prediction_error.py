@@ -11,6 +11,7 @@ those that the description may mean.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.effects.load import described_spread
@@ -91,6 +92,17 @@ class PredictionError:
 
     def _counted(self) -> FloatArray:
         return np.clip(self.joints, LIMITS.floor, 1.0)
+
+
+def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
+    """Put stretches with torques one after the other, and keep about so many of the samples."""
+    parts = [motion for motion in stretches if motion.tau is not None and len(motion) > 2]
+    if not parts:
+        return None
+    names = ('t', 'q', 'dq', 'ddq', 'tau')
+    arrays = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
+    step = max(1, len(arrays[0]) // rows)
+    return Motion(parts[0].joints, *(array[::step] for array in arrays))
 
 
 def described_error(motion: Motion, fixed: FloatArray, columns: FloatArray) -> PredictionError:

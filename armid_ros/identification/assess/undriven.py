@@ -77,7 +77,21 @@ def held_elsewhere(
             continue  # a part of the body that carries it, in whatever position
         places = list(np.linspace(found.lowest, found.highest, _PLACES if moves else 1))
         places += [joint.position] if moves or joint.carries else []
-        shares = _changes(robot, joint.name, places, motions)
+        # the largest change of the described torque between places, as a share
+        measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
+        described = [
+            np.concatenate(
+                [
+                    inverse_dynamics(described_at(robot, {joint.name: place}), motion)
+                    for motion in motions
+                ]
+            )
+            for place in places
+        ]
+        changes = [np.linalg.norm(a - b, axis=0) for a, b in combinations(described, 2)]
+        whole = np.linalg.norm(measured, axis=0)
+        largest = np.max(changes, axis=0)
+        shares: FloatArray = np.divide(largest, whole, out=np.zeros_like(whole), where=whole > 0.0)
         worst = int(np.argmax(shares))
         if shares[worst] > LIMITS.floor or (moves and joint.carries):
             what = f'{100.0 * shares[worst]:.0f} % of the torque of {robot.joints[worst]}'
@@ -90,23 +104,6 @@ def _range(joint: str, recordings: Sequence[Recording]) -> PositionRange | None:
         return None
     lowest, highest = min(one.lowest for one in found), max(one.highest for one in found)
     return PositionRange(joint, lowest, highest)
-
-
-def _changes(
-    robot: Robot, joint: str, places: Sequence[float], motions: Sequence[Motion]
-) -> FloatArray:
-    """Return the largest change of the described torque between places, shape (n,), as shares."""
-    measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
-    described = [_torque(described_at(robot, {joint: place}), motions) for place in places]
-    changes = [np.linalg.norm(a - b, axis=0) for a, b in combinations(described, 2)]
-    whole = np.linalg.norm(measured, axis=0)
-    largest = np.max(changes, axis=0)
-    shares: FloatArray = np.divide(largest, whole, out=np.zeros_like(whole), where=whole > 0.0)
-    return shares
-
-
-def _torque(robot: Robot, motions: Sequence[Motion]) -> FloatArray:
-    return np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
 
 
 def _text(joint: HeldJoint, found: PositionRange, moves: bool, change: str) -> str:

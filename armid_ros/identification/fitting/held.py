@@ -23,7 +23,6 @@ from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 
 
 def determined(
@@ -63,7 +62,14 @@ def determined(
         kept = np.delete(np.arange(base.rank), worst)
         value = float(base.values(arm.theta)[worst])
         problem = tuple(_held(part, worst, value).restrict(kept) for part in problem)
-        base, spread = _of(base, kept), spread[kept]
+        parameters = tuple(base.parameters[k] for k in kept)
+        base = replace(
+            base,
+            parameters=parameters,
+            independent=base.independent[kept],
+            grouping=base.grouping[kept],
+        )
+        spread = spread[kept]
     return base, problem
 
 
@@ -81,16 +87,6 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     known = np.where(np.isfinite(spread), spread, 0.0)
     size = np.linalg.norm(base.grouping * known, axis=1)
     return np.where(~unknown & (size > 0.0), size, np.inf)
-
-
-def _of(base: BaseParameters, kept: npt.NDArray[np.intp]) -> BaseParameters:
-    """Return some of base parameters."""
-    return replace(
-        base,
-        parameters=tuple(base.parameters[k] for k in kept),
-        independent=base.independent[kept],
-        grouping=base.grouping[kept],
-    )
 
 
 def _held(part: Regression, column: int, value: float) -> Regression:

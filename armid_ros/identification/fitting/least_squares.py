@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args, Literal
 
 from armid_ros.identification.fitting.triangle import (
     fit_scaled,
@@ -33,6 +33,17 @@ from scipy import fft
 import scipy.linalg
 
 Method = Literal['ols', 'wls', 'irls']
+Estimator = Literal['ols', 'wls', 'irls', 'iv']
+
+#: All estimators.
+ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
+#: Description of each estimator.
+IN_WORDS: dict[Estimator, str] = {
+    'ols': 'ordinary least squares',
+    'wls': 'least squares weighted by the noise of each joint',
+    'irls': 'least squares weighted by the noise of each joint, outliers weighted down',
+    'iv': 'instrumental variables from a simulation of the arm',
+}
 
 #: Residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 % efficiency).
 _HUBER = 1.345
@@ -129,7 +140,10 @@ def _robust(
     for _ in range(ROUNDS):
         before = (fit.scale, relative)
         residual = _residual(problem, fit.values)
-        scale = positive(_robust_scale(residual, used))
+        # the standard deviation that the middle half of each joint's residual suggests
+        masked = np.where(used, residual, np.nan)
+        spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
+        scale = positive(1.4826 * np.nan_to_num(spread))
         size = np.maximum(np.abs(residual) / scale, 1e-12)
         relative = np.asarray(used * np.sqrt(np.minimum(1.0, _HUBER / size)))
         fit = fit_scaled(Triangle.of(problem, relative), scale)
@@ -141,13 +155,6 @@ def _robust(
 def _residual(problem: Sequence[Regression], values: FloatArray) -> FloatArray:
     parts: list[FloatArray] = [part.target - part.columns @ values for part in problem]
     return np.concatenate(parts)
-
-
-def _robust_scale(residual: FloatArray, used: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the standard deviation that the middle half of each joint's residual suggests."""
-    masked = np.where(used, residual, np.nan)
-    spread = np.nanmedian(np.abs(masked - np.nanmedian(masked, axis=0)), axis=0)
-    return np.asarray(1.4826 * np.nan_to_num(spread))
 
 
 def noise_products(
@@ -244,7 +251,10 @@ def _noise_spectrum(
     lags = np.fft.irfft(power, size)[:count]
     whitening = _whitening(lags, size)
     lags = np.fft.irfft(power * whitening, size)[: count // 2]
-    reach = _correlation_reach(lags, count)
+    # how many lags matter: four times the first at which the correlation is noise
+    quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
+    first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
+    reach = int(np.clip(4 * first, min(10, len(lags)), len(lags)))
     left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
     return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
 
@@ -281,10 +291,3 @@ def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
     tapered[:reach] = lags[:reach] * parzen
     tapered[size - reach + 1 :] = tapered[1:reach][::-1]
     return np.asarray(np.fft.rfft(tapered).real)
-
-
-def _correlation_reach(lags: FloatArray, count: int) -> int:
-    """Return how many lags matter: four times the first at which the correlation is noise."""
-    quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
-    first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
-    return int(np.clip(4 * first, min(10, len(lags)), len(lags)))

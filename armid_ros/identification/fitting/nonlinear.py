@@ -12,7 +12,7 @@ model promises is the torque of the arm. Steps that make the fit worse are dampe
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -131,12 +131,15 @@ def fit_values(
         problem, _ = linearised(arm, base, recordings, used)
     elif not curved(arm, reached, motions):
         predicted = tuple(part.torque(solution.values) for part in problem)
-        found = (
-            reached
-            if free is not None
-            else _lifted(arm, base, problem, solution, reached, recordings, used)
-        )
-        return FittedValues(found, base, solution.values, tuple(problem), solution, predicted)
+        # nearest to the description, if it has the fitted torque along this motion
+        nearest = arm.with_theta(base.lift(solution.values, arm.theta))
+        rigid = _rigid(arm)
+        if free is None and (
+            np.allclose(nearest.theta[rigid:], reached.theta[rigid:])
+            or agree(problem, solution.weights, predicted, torques(nearest, recordings, used))
+        ):
+            reached = nearest
+        return FittedValues(reached, base, solution.values, tuple(problem), solution, predicted)
     return _iterate(arm, base, problem, recordings, used, method, chosen)
 
 
@@ -248,7 +251,8 @@ def agree(
     """Tell whether the torque of an arm is what a linear model promised, as far as it matters."""
     off = _size(weights, [p - q for p, q in zip(promised, predicted, strict=True)])
     whole = _size(weights, [part.tau for part in problem])
-    return bool(off <= max(AGREED * np.sqrt(_cost(problem, weights, promised)), _EXACT * whole))
+    left = [part.tau - torque for part, torque in zip(problem, promised, strict=True)]
+    return bool(off <= max(AGREED * _size(weights, left), _EXACT * whole))
 
 
 def _iterate(
@@ -271,7 +275,15 @@ def _iterate(
         if passes > 1 and abs(now.gain(promised)) < _NOTHING:
             break
         steps = [now.damped(damping, limits) for damping in _DAMPINGS]
-        trial = _best_step(now, solution.values, promised, steps, base, free, recordings, used)
+        # straight to a solution that keeps its promise, else the best of damped steps
+        trial = None
+        for values in (solution.values, *steps):
+            stepped = moved(now.arm, base, values, free)
+            predicted = torques(stepped, recordings, used)
+            if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):
+                trial = _State(stepped, values, through(now.problem, predicted, values))
+            if values is solution.values and now.cost(predicted) <= _KEPT * now.cost(promised):
+                break
         if trial is None:
             settled = all(now.gain(now.linear(values)) < _STUCK * now.cost() for values in steps)
             break
@@ -285,28 +297,6 @@ def _iterate(
     return FittedValues(
         now.arm, base, now.values, now.problem, solution, now.predicted, max(passes, 2), settled
     )
-
-
-def _best_step(
-    now: _State,
-    straight: FloatArray,
-    promised: Torques,
-    damped: Iterable[FloatArray],
-    base: BaseParameters,
-    free: FloatArray,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-) -> _State | None:
-    """Go straight to a solution that keeps its promise, else by the best of damped steps."""
-    best = None
-    for values in (straight, *damped):
-        arm = moved(now.arm, base, values, free)
-        predicted = torques(arm, recordings, used)
-        if now.cost(predicted) <= now.cost(None if best is None else best.predicted):
-            best = _State(arm, values, through(now.problem, predicted, values))
-        if values is straight and now.cost(predicted) <= _KEPT * now.cost(promised):
-            break
-    return best
 
 
 class _State:
@@ -364,24 +354,6 @@ class _State:
         return float(np.sum(left**2))
 
 
-def _lifted(
-    arm: ArmModel,
-    base: BaseParameters,
-    problem: Sequence[Regression],
-    solution: Solution,
-    reached: ArmModel,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-) -> ArmModel:
-    """Return the arm nearest to the description that has the fitted torque along this motion."""
-    found = arm.with_theta(base.lift(solution.values, arm.theta))
-    if np.allclose(found.theta[_rigid(arm) :], reached.theta[_rigid(arm) :]):
-        return found
-    promised = tuple(part.torque(solution.values) for part in problem)
-    same = agree(problem, solution.weights, promised, torques(found, recordings, used))
-    return found if same else reached
-
-
 def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
     """Return directions of the rigid parameters that change no base parameter, (10 n, k)."""
     return np.asarray(scipy.linalg.null_space(base.grouping[:, : _rigid(arm)]))
@@ -389,11 +361,6 @@ def ungrouped(arm: ArmModel, base: BaseParameters) -> FloatArray:
 
 def _rigid(arm: ArmModel) -> int:
     return len(arm.robot.rigid_parameters)
-
-
-def _cost(problem: Sequence[Regression], weights: FloatArray, predicted: Torques) -> float:
-    left = [part.tau - torque for part, torque in zip(problem, predicted, strict=True)]
-    return _size(weights, left) ** 2
 
 
 def _size(weights: FloatArray, torque: Sequence[FloatArray]) -> float:

@@ -73,7 +73,12 @@ def with_uncertain_inertia(
     ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
     notes: tuple[str, ...] = ()
     if ratio > _NEGLIGIBLE:
-        share = _inertial_share(description, recordings, used)
+        # the share of inertia in the torque of the description
+        still = replace(description, quasi_static=True)
+        whole, weight = (
+            np.concatenate(torques(arm, recordings, used)) for arm in (description, still)
+        )
+        share = float(np.linalg.norm(whole - weight) / np.linalg.norm(whole))
         notes = (
             f'too fast for quasi-static: inertia takes {100.0 * share:.2g} % of the torque by the '
             'description, which is taken off, and what that may be wrong by is in the intervals; '
@@ -102,14 +107,3 @@ def _fit_of(
     scale = np.linalg.norm(w, axis=0)
     solution = np.linalg.lstsq(w / scale, d, rcond=None)[0]
     return np.asarray(solution / scale[:, np.newaxis])
-
-
-def _inertial_share(
-    description: ArmModel, recordings: Sequence[Recording], used: Conditioning
-) -> float:
-    """Return the share of inertia in the torque of the description."""
-    still = replace(description, quasi_static=True)
-    whole, weight = (
-        np.concatenate(torques(arm, recordings, used)) for arm in (description, still)
-    )
-    return float(np.linalg.norm(whole - weight) / np.linalg.norm(whole))

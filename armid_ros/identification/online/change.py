@@ -132,12 +132,12 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
         for owner in effect.owners:
             columns = list(range(first, first + count))
             found.append(_candidate(effect.name, owner, columns, base))
-            if effect.friction:
+            if effect.traits.friction:
                 friction.setdefault(owner, []).extend(columns)
             first += count
     several = {joint: c for joint, c in friction.items() if len(c) > 1}
     found += [_candidate('friction', joint, c, base) for joint, c in several.items()]
-    carried = [kind.on(arm.robot) for kind in CATALOGUE.values() if kind.comes_and_goes]
+    carried = [kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.comes_and_goes]
     found += [_carried(effect, arm, base) for effect in carried if effect.adds_to(arm.robot)]
     return tuple(candidate for candidate in found if candidate.parameters)
 

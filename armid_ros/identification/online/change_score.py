@@ -24,7 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from armid_ros.identification.online.background import at_once, Pieces
+from armid_ros.identification.online.background import Pieces
 from armid_ros.identification.online.recursive import Learned, WeightedSample
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -155,15 +155,6 @@ class ScoreStatistics:
         hidden = np.flatnonzero(told < 1.0 - _HIDDEN)
         covariance[hidden, hidden] = np.inf
         return values, np.asarray(covariance)
-
-
-def score_statistics(
-    blocks: Sequence[Block], before: Block, directions: FloatArray, residual_scale: float = 1.0
-) -> ScoreStatistics:
-    """Weigh possible changes by a window of rows; see `weighing`."""
-    window = [at_once(projecting(block, directions)) for block in blocks]
-    known = at_once(projecting(before, directions))
-    return at_once(weighing(window, known, directions, residual_scale))
 
 
 def weighing(

@@ -246,7 +246,8 @@ class ChangeSearch:
         if not (at[best] > self._least_likelihood() and seen >= _EARLIEST):
             return None
         alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
-        named = self._most_common(self._candidates[best], alike)
+        # the load where it explains the torques as well: arms pick things up all day
+        named = next((c for c in alike if c.common), self._candidates[best])
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:
             return None
@@ -268,11 +269,6 @@ class ChangeSearch:
         t, likelihood = self._fresh
         soon = self._blocks[-1].block.end - t < _LEARNING
         return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
-
-    @staticmethod
-    def _most_common(best: ChangeCandidate, alike: Sequence[ChangeCandidate]) -> ChangeCandidate:
-        """Return the load where it explains the torques as well: arms pick things up all day."""
-        return next((c for c in alike if c.common), best)
 
     def _likelihood(self, ratios: FloatArray) -> FloatArray:
         """Return logarithms of likelihoods, each free parameter being charged for."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
@@ -19,7 +19,6 @@ from armid_ros.identification.online.checks import MissingSamples, StreamChecks
 from armid_ros.identification.online.learner import Learner
 from armid_ros.identification.online.nuisance_rows import Seed
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
-from armid_ros.identification.online.sample import OnlineSample
 from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import RowNoise
@@ -41,6 +40,35 @@ _PIECES = 400.0
 #: Samples between two rows of which one is for learning from the row alone; where there are fewer,
 #: pieces of work have to be done with it.
 _SPARE = 4.0
+
+
+@dataclass(frozen=True)
+class OnlineSample:
+    """
+    One sample that the estimator saw.
+
+    Attributes
+    ----------
+    t : float
+        When it was [s]: the stamp of the newest joint state minus the delay of the filters.
+    measured : ndarray, shape (n,)
+        Filtered measured torque [N m].
+    predicted : ndarray, shape (n,)
+        What the estimate before this sample predicts, filtered alike [N m].
+    used : ndarray of bool, shape (n,)
+        False for a joint at rest, which friction may hold with any torque.
+
+    """
+
+    t: float
+    measured: FloatArray
+    predicted: FloatArray
+    used: npt.NDArray[np.bool_]
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus predicted torque, shape (n,) [N m]."""
+        return self.measured - self.predicted
 
 
 class OnlineIdentifier:
@@ -95,7 +123,12 @@ class OnlineIdentifier:
     ) -> None:
         settings = settings or OnlineSettings()
         robot = arm.robot
-        _require_instantaneous(arm)
+        for effect in arm.effects:
+            if not effect.instantaneous:
+                raise IdentificationError(
+                    f'{effect.name} depends on the motion before, which single samples do not '
+                    'tell; identify it from a recording'
+                )
         self.arm = arm
         self.settings = settings
         self.base: BaseParameters = arm.base_parameters(rng)
@@ -343,7 +376,8 @@ class OnlineIdentifier:
     def _learn(
         self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
     ) -> OnlineSample:
-        one = _one_sample(self.arm, motion)
+        state = (motion.q[None], motion.dq[None], motion.ddq[None])
+        one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
         stacked = np.column_stack([motion.tau, self._rows(one)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows = filtered[:, 0], filtered[:, 1:]
@@ -390,21 +424,7 @@ def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
     return joint_gate(
         arm.robot.prismatic,
         'qvt' if settings.measured_velocity else 'qt',
+        torque_limit=arm.robot.torque_limit,
         max_gap=settings.longest_damage,
         false_alarm_time=changes.false_alarm_time,
     )
-
-
-def _one_sample(arm: ArmModel, motion: CausalMotion) -> Motion:
-    state = (motion.q[None], motion.dq[None], motion.ddq[None])
-    return Motion(arm.robot.joints, np.array([motion.t]), *state)
-
-
-def _require_instantaneous(arm: ArmModel) -> None:
-    """Refuse an arm with effects that single samples do not show."""
-    for effect in arm.effects:
-        if not effect.instantaneous:
-            raise IdentificationError(
-                f'{effect.name} depends on the motion before, which single samples do not tell; '
-                'identify it from a recording'
-            )

@@ -55,12 +55,10 @@ class ResidualScale:
         later = self._seen.values[len(self._seen) // 2 :]
         known = np.any(later > 0.0, axis=0)
         value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
-        value[known] = np.sqrt(_medians(later[:, known]) / _MEDIAN)
+        # the medians of the numbers in every column; numpy's nanmedian takes ten times it
+        values = later[:, known]
+        ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
+        columns = np.arange(values.shape[1])
+        medians = (ordered[(counts - 1) // 2, columns] + ordered[counts // 2, columns]) / 2.0
+        value[known] = np.sqrt(medians / _MEDIAN)
         self._value = np.maximum(value, self._least)
-
-
-def _medians(values: FloatArray) -> FloatArray:
-    """Return the medians of the numbers in every column; numpy's nanmedian takes ten times it."""
-    ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
-    columns = np.arange(values.shape[1])
-    return np.asarray((ordered[(counts - 1) // 2, columns] + ordered[counts // 2, columns]) / 2.0)

@@ -70,7 +70,15 @@ def fit_to_bodies(
         settled = agree(fit.problem, fit.solution.weights, promised, predicted)
         if settled:
             return replace(fit, settled=free.settled), certificate
-        fit, certificate = _bodies(arm, _about(fit, recordings, used, method, rng), settings)
+        # linearise about the fit in the parameters that are identifiable there, and solve
+        theory = fit.arm.base_parameters(rng)
+        columns = regressions(fit.arm, theory.independent, recordings, used)
+        base, problem = excited(theory, columns)
+        values = base.values(fit.arm.theta)
+        problem = through(problem, fit.predicted, values)
+        solution = solve(problem, method, bounds(fit.arm, base))
+        fit = replace(fit, base=base, values=values, problem=problem, solution=solution)
+        fit, certificate = _bodies(arm, fit, settings)
     predicted = torques(fit.arm, recordings, used)
     return replace(fit, predicted=predicted, settled=False), certificate
 
@@ -86,21 +94,3 @@ def _bodies(
     predicted = tuple(part.torque(values) for part in fit.problem)
     found = arm.with_theta(theta)
     return replace(fit, arm=found, values=values, predicted=predicted), certificate
-
-
-def _about(
-    fit: FittedValues,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    method: Method,
-    rng: np.random.Generator,
-) -> FittedValues:
-    """Linearise about a fit in the parameters that are identifiable there, and solve."""
-    arm = fit.arm
-    theory = arm.base_parameters(rng)
-    columns = regressions(arm, theory.independent, recordings, used)
-    base, problem = excited(theory, columns)
-    values = base.values(arm.theta)
-    problem = through(problem, fit.predicted, values)
-    solution = solve(problem, method, bounds(arm, base))
-    return replace(fit, base=base, values=values, problem=problem, solution=solution)

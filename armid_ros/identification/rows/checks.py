@@ -89,7 +89,11 @@ def check_motion(
     for recording in recordings:
         check_positions(robot, recording.source, recording.q.min(axis=0), recording.q.max(axis=0))
         if recording.duration < SHORTEST:
-            raise _too_short(recording)
+            raise IdentificationError(
+                f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
+                'too short; record a movement of several seconds, or of a table see '
+                '--time-unit and --rate'
+            )
         if used is not None and not any(True for _ in segments(recording, used)):
             raise no_stretch(recording, used)
     ranges = np.max([np.ptp(recording.q, axis=0) for recording in recordings], axis=0)
@@ -144,13 +148,6 @@ def resting(robot: Robot, source: str, ranges: FloatArray) -> tuple[str, ...]:
     if names:
         return (f'at rest throughout: {", ".join(names)}; nothing of their own is identified',)
     return ()
-
-
-def _too_short(recording: Recording) -> IdentificationError:
-    return IdentificationError(
-        f'{recording.source}: {recording.duration:.2f} s in {len(recording)} samples is '
-        'too short; record a movement of several seconds, or of a table see --time-unit and --rate'
-    )
 
 
 def check_torque(

@@ -68,7 +68,12 @@ def laws_of_controllers(
     said: list[str] = []
     silent = 0
     for joint, (name, unit) in enumerate(zip(robot.joints, robot.torque_units, strict=True)):
-        rows = told[:, joint] & ~_turning(motion.dq[:, joint])
+        # where a joint turns round, or filters smear that it does
+        dq = motion.dq[:, joint]
+        slow = np.abs(dq) <= _TURNING * np.abs(dq).max(initial=0.0)
+        slow[1:] |= np.diff(np.sign(dq)) != 0
+        beside = np.convolve(slow, np.ones(2 * _BESIDE + 1))
+        rows = told[:, joint] & ~(beside[_BESIDE : _BESIDE + len(slow)] > 0.0)
         tau = motion.tau[rows, joint]
         direction = np.sign(motion.dq[rows, joint])
         law = np.column_stack([weight[rows, joint], direction, np.ones_like(tau)])
@@ -89,14 +94,6 @@ def laws_of_controllers(
             'the arm while it follows a trajectory'
         )
     return tuple(said) if len(said) > silent else ()
-
-
-def _turning(dq: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return where a joint turns round, or filters smear that it does, shape (R,)."""
-    slow = np.abs(dq) <= _TURNING * np.abs(dq).max(initial=0.0)
-    slow[1:] |= np.diff(np.sign(dq)) != 0
-    beside = np.convolve(slow, np.ones(2 * _BESIDE + 1))
-    return np.asarray(beside[_BESIDE : _BESIDE + len(slow)] > 0.0)
 
 
 def _left(law: FloatArray, torque: FloatArray) -> float | None:

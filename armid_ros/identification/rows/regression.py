@@ -176,11 +176,13 @@ def predictions(
     arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
 ) -> list[Prediction]:
     """Return what the torque of an arm is along recordings, one per unbroken stretch."""
-    return [
-        Prediction(*_rows_with_torque(arm, motion, used), recording.source)
-        for recording in recordings
-        for motion in segments(recording, used)
-    ]
+    found = []
+    for recording in recordings:
+        for motion in segments(recording, used):
+            rows, informative = _rows(arm, motion, used)
+            torque = filtered_torque(arm, motion, used)
+            found.append(Prediction(rows, torque, informative, recording.source))
+    return found
 
 
 def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatArray:
@@ -214,13 +216,6 @@ def _rows(
     tau = bridged(motion.tau, unsure_samples(arm, motion))
     decimated = motion.select(kept).with_torque(decimate(tau, used))
     return decimated, ~_at_rest(arm, motion)[kept]
-
-
-def _rows_with_torque(
-    arm: ArmModel, motion: Motion, used: Conditioning
-) -> tuple[Motion, FloatArray, npt.NDArray[np.bool_]]:
-    decimated, informative = _rows(arm, motion, used)
-    return decimated, filtered_torque(arm, motion, used), informative
 
 
 def filtered_columns(

@@ -48,8 +48,18 @@ class RowNoise:
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
         """Return what the motion filter and the row filter leave, of these poles [rad/s]."""
-        bandwidth = _bandwidth(motion_pole, row_pole, 0.5 / period)
-        return cls(period, bandwidth, _peak(motion_pole, row_pole))
+        # integrate the squared gain of both filters over frequency, both signs [Hz]
+        nyquist = 0.5 / period
+        f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
+        w = 2.0 * np.pi * f
+        gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
+        bandwidth = float(2.0 * np.trapezoid(gain, f))
+        # the largest value of the impulse response of both filters in series [1/s]
+        ratio = motion_pole / row_pole  # in the time of the row filter
+        response = signal.impulse(
+            ([], [-ratio] * 3 + [-1.0] * 3, ratio**3), T=np.linspace(0, 20, 401)
+        )
+        return cls(period, bandwidth, float(row_pole * np.max(response[1])))
 
     @property
     def gain(self) -> float:
@@ -117,18 +127,3 @@ def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:
     if not known.any():
         return np.ones(robot.n_joints)
     return _NOISE_OF_LIMIT * np.where(known, limit, np.median(limit[known]))
-
-
-def _bandwidth(motion_pole: float, row_pole: float, nyquist: float) -> float:
-    """Integrate the squared gain of both filters over frequency, both signs [Hz]."""
-    f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
-    w = 2.0 * np.pi * f
-    gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
-    return float(2.0 * np.trapezoid(gain, f))
-
-
-def _peak(motion_pole: float, row_pole: float) -> float:
-    """Return the largest value of the impulse response of both filters in series [1/s]."""
-    ratio = motion_pole / row_pole  # in the time of the row filter
-    response = signal.impulse(([], [-ratio] * 3 + [-1.0] * 3, ratio**3), T=np.linspace(0, 20, 401))
-    return float(row_pole * np.max(response[1]))

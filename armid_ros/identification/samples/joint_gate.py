@@ -8,11 +8,16 @@ from armid_ros.identification.samples.spikes import SpikeGate
 import numpy as np
 import numpy.typing as npt
 
+#: Resolution at best, of a position and a velocity [rad or m, and a second], and of a torque as a
+#: share of its limit: an encoder of 22 bits, a torque sensor of 17.
+_FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
+
 
 def joint_gate(
     prismatic: npt.ArrayLike,
     signals: str,
     *,
+    torque_limit: npt.ArrayLike = 0.0,
     max_gap: int = 10,
     false_alarm_time: float = 360000.0,
 ) -> SpikeGate:
@@ -26,6 +31,8 @@ def joint_gate(
     signals : str
         What a sample holds of all joints, in turn: q for positions, v for velocities, t for
         torques, as in 'qt'.
+    torque_limit : array_like, shape (n,), optional
+        Largest torque of each joint [N m or N], infinite where unknown.
     max_gap, false_alarm_time
         As for `SpikeGate`.
 
@@ -37,10 +44,15 @@ def joint_gate(
     turning = ~np.asarray(prismatic, dtype=bool)
     kind, revolute = np.repeat(list(signals), len(turning)), np.tile(turning, len(signals))
     position = kind == 'q'
+    limit = np.broadcast_to(np.asarray(torque_limit, dtype=float), turning.shape)
+    known = limit[np.isfinite(limit)]
+    scale = np.where(np.isfinite(limit), limit, known.min() if len(known) else 0.0)
+    finest = [_FINEST[one] * (scale if one == 't' else np.ones(len(turning))) for one in signals]
     return SpikeGate(
         position & revolute,
         max_gap=max_gap,
         false_alarm_time=false_alarm_time,
         continuous=position,
         pulsing=kind == 't',
+        finest=np.concatenate(finest),
     )

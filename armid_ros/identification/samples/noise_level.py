@@ -44,6 +44,8 @@ class NoiseLevel:
         Signals m.
     together : int, optional
         Most samples that are learned from before `settle`.
+    finest : ndarray, shape (m,), or float
+        Resolution of the signals at best.
 
     Attributes
     ----------
@@ -52,7 +54,8 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, count: int, together: int = 1) -> None:
+    def __init__(self, count: int, together: int = 1, finest: FloatArray | float = 0.0) -> None:
+        self._finest = finest
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((SEEN, count), np.inf), np.zeros(count)
         self._windows = Loudest(count, _REMEMBERED)
@@ -119,12 +122,13 @@ class NoiseLevel:
     @property
     def _resolution(self) -> FloatArray:
         """
-        Return the smallest step of every signal, 0 where it is not known.
+        Return the smallest step of every signal, at least the finest one.
 
         A signal that moves fast makes no small steps; but by its resolution it leaves any line.
 
         """
-        return np.minimum(self._most, np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0))
+        step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
+        return np.maximum(np.minimum(self._most, step), self._finest)
 
 
 class Loudest:

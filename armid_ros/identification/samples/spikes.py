@@ -77,6 +77,9 @@ class SpikeGate:
         Signals that never step, as positions; none by default.
     pulsing : array_like of bool, shape (m,), optional
         Signals that may jump and come back, as torques; none by default.
+    finest : array_like, shape (m,), optional
+        Resolution of the signals at best, in their units. A simulation without noise and an arm
+        at rest have less noise than that, and a limit that follows it would leave out sound data.
 
     Attributes
     ----------
@@ -98,6 +101,7 @@ class SpikeGate:
         false_alarm_time: float = 360000.0,
         continuous: npt.ArrayLike = False,
         pulsing: npt.ArrayLike = False,
+        finest: npt.ArrayLike = 0.0,
     ) -> None:
         if not (max_gap >= 1 and false_alarm_time > 0.0):
             raise IdentificationError(
@@ -107,6 +111,7 @@ class SpikeGate:
         self._turn = np.where(np.asarray(turning, dtype=bool), 2.0 * np.pi, 0.0)
         self._continuous = np.broadcast_to(np.asarray(continuous, dtype=bool), self._turn.shape)
         self._pulsing = np.broadcast_to(np.asarray(pulsing, dtype=bool), self._turn.shape)
+        self._finest = np.broadcast_to(np.asarray(finest, dtype=float), self._turn.shape)
         self._max_gap = max_gap
         self._false_alarm_time = false_alarm_time
         self.reset()
@@ -119,7 +124,7 @@ class SpikeGate:
         self._early: StreamSample | None = None
         count = len(self._turn)
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(count, together=self._max_gap + 1)
+        self._level = NoiseLevel(count, self._max_gap + 1, self._finest)
         self._least: tuple[Usual, float, FloatArray] | None = None
         self._restart([])
 

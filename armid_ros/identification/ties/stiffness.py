@@ -116,7 +116,12 @@ def identify_interaction(
 
     """
     uncorrected = _least_squares(problem, problem.columns)
-    theta = _start(problem)
+    # one stiffness for all springs by least squares, which noise does not blow up
+    count = len(problem.segments)
+    together = problem.columns[:, :, :count].sum(axis=2, keepdims=True)
+    columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
+    theta = _least_squares(problem, columns)
+    theta = np.concatenate([np.full(count, theta[0]), theta[1:]])
     given = _given(problem, torque_noise)
     used = _torque_variance(problem, theta) if given is None else given
     for _ in range(_LINEAR):
@@ -148,15 +153,6 @@ def identify_interaction(
         read_only(problem.residual(theta)),
         misfit,
     )
-
-
-def _start(problem: InteractionProblem) -> FloatArray:
-    """Return one stiffness for all springs by least squares, which noise does not blow up."""
-    count = len(problem.segments)
-    together = problem.columns[:, :, :count].sum(axis=2, keepdims=True)
-    columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
-    theta = _least_squares(problem, columns)
-    return np.concatenate([np.full(count, theta[0]), theta[1:]])
 
 
 def _compensated(
@@ -328,7 +324,9 @@ def _covariance(
 
     """
     _, information, columns, pull = _gauss_newton(problem, theta, variance)
-    inverse = _inverse(information)
+    size = np.sqrt(np.diag(information))
+    scaled = np.linalg.inv(information / np.outer(size, size))
+    inverse = scaled / np.outer(size, size)
     if len(problem.torque_lags) == 1:
         return np.asarray(excess * inverse)
     by_motion = problem.sensitivity(theta)
@@ -348,9 +346,3 @@ def _covariance(
     lasting = np.diag(inverse @ seen @ inverse) / np.diag(covariance)
     factor = np.sqrt(np.maximum(lasting, 1.0))
     return np.asarray(covariance * np.outer(factor, factor))
-
-
-def _inverse(information: FloatArray) -> FloatArray:
-    size = np.sqrt(np.diag(information))
-    scaled = np.linalg.inv(information / np.outer(size, size))
-    return np.asarray(scaled / np.outer(size, size))

@@ -48,9 +48,7 @@ class StampDifference:
         if abs(self._late) <= allowed:
             return ''
         size = f'{abs(self._late):.0f}' if abs(self._late) >= 10.0 else f'{abs(self._late):.2f}'
-        side = 'behind' if self._late > 0.0 else 'ahead of'
-        clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
-        return f'stamps of {topic} are {size} s {side} {clock}'
+        return f'stamps of {topic} are {size} s {self._side(self._late)}'
 
     def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
         """
@@ -75,12 +73,14 @@ class StampDifference:
         advice = 'set the clocks, or zero_stamp:=true'
         if simulated:
             advice = 'use_sim_time on both nodes or on neither'
-        clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
-        side = 'behind' if late > 0.0 else 'ahead of'
         return (
-            f'stamps of {topic} are {abs(late):.3g} s {side} {clock} ({now - late:.3f} s and '
+            f'stamps of {topic} are {abs(late):.3g} s {self._side(late)} ({now - late:.3f} s and '
             f'{now:.3f} s), more than {allowed:.3g} s: {advice}'
         )
+
+    def _side(self, late: float) -> str:
+        clock = '/clock' if self._clock.ros_time_is_active else "this computer's clock"
+        return f'{"behind" if late > 0.0 else "ahead of"} {clock}'
 
     def of_results(self, topic: str) -> str:
         """Say what follows for results, which carry the stamps of what they were made of."""

@@ -115,7 +115,8 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
         If robot, model, effects or sensors are not valid or do not fit each other.
 
     """
-    arm, drives = _model(value)
+    arm, drives = _described(value)
+    arm = with_effects(arm, value('effects'))
     n, dt = arm.robot.n_joints, value('time_step')
     rng = np.random.default_rng(value('seed'))
     start = _numbers(value('start'), n, 'start') if value('start') else None
@@ -185,11 +186,6 @@ def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
     for text in filter(None, texts):
         arm = arm.with_effect(*parse_effect(text, arm.robot))
     return arm
-
-
-def _model(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
-    arm, drives = _described(value)
-    return with_effects(arm, value('effects')), drives
 
 
 def _described(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:

@@ -27,7 +27,6 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
-from armid_ros.motion import FloatArray
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.robots import CollisionModel, joints_beside_arms, load_robot, Robot
 import numpy as np
@@ -113,8 +112,6 @@ class Surroundings:
         Plans the way to an excitation.
     unchecked : tuple of str
         What cannot be checked.
-    acceleration : ndarray, shape (n,), or None
-        Acceleration limits that are given [rad/s^2 or m/s^2].
 
     """
 
@@ -122,7 +119,6 @@ class Surroundings:
     bodies: CollisionModel
     planner: TransferPlanner
     unchecked: tuple[str, ...]
-    acceleration: FloatArray | None
 
 
 def make_surroundings(value: Values) -> Surroundings:
@@ -152,11 +148,13 @@ def make_surroundings(value: Values) -> Surroundings:
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
     bodies = scene.bodies
     limits = transfer_limits(arm.robot, value('speed'), acceleration)
-    planner = TransferPlanner(arm, limits, ClearanceModel.of(bodies), scene.clearance)
+    planner = TransferPlanner(
+        arm, limits, ClearanceModel.of(bodies), scene.clearance, acceleration
+    )
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
-    return Surroundings(arm.robot, bodies, planner, unchecked, acceleration)
+    return Surroundings(arm.robot, bodies, planner, unchecked)
 
 
 def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
@@ -180,7 +178,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     """
     robot = surroundings.robot
     if value('file'):
-        return _loaded(value('file'), surroundings)
+        return checked(load_excitation(value('file')), surroundings.planner, value('file'))
     arm = surroundings.planner.arm
     own = {effect.name for effect in arm.effects}
     for name in filter(None, value('effects')):
@@ -194,7 +192,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
-        acceleration=surroundings.acceleration,
+        acceleration=surroundings.planner.acceleration,
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),
@@ -202,10 +200,6 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     )
     rng = np.random.default_rng(value('seed'))
     return design(arm, settings, rng, collision=surroundings.bodies).excitation
-
-
-def _loaded(path: str, surroundings: Surroundings) -> Excitation:
-    return checked(load_excitation(path), surroundings.planner, path)
 
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:
@@ -239,7 +233,7 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
         speed=1.0,
         torque_fraction=1.0,
         position_margin=0.0,
-        acceleration=np.full(robot.n_joints, np.inf),  # no description knows it
+        acceleration=planner.given_acceleration,
     )
     rules = (planner.clearance, planner.margin)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)

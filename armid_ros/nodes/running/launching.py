@@ -11,6 +11,16 @@ from typing import Any, NamedTuple
 
 import yaml
 
+#: Parameters of the simulated arm, where neither an argument nor a parameter file sets them.
+SIMULATED_DRIVES: Mapping[str, Any] = {
+    'rate': 500.0,
+    'torque_noise': [0.05],
+    'effects': [
+        'viscous_friction:viscous_coefficient=0.5',
+        'coulomb_friction:coulomb_torque=0.2',
+    ],
+}
+
 
 class Argument(NamedTuple):
     """
@@ -154,15 +164,12 @@ def parameters_named(file: str, name: str) -> set[str]:
         for key, value in part.items() if isinstance(part, dict) else ():
             if key != 'ros__parameters':
                 pending.append((f'{pattern}/{str(key).lstrip("/")}', value))
-            elif _matches(pattern, name):
+                continue
+            # as rcl_yaml_param_parser has it
+            expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+            if re.fullmatch(expression, name):
                 found |= set(_flat(value))
     return found
-
-
-def _matches(pattern: str, name: str) -> bool:
-    """Whether a pattern of a parameter file is for a node, as rcl_yaml_param_parser has it."""
-    expression = re.escape(pattern).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
-    return re.fullmatch(expression, name) is not None
 
 
 def _flat(value: Any, prefix: str = '') -> list[str]:

@@ -15,9 +15,8 @@ import sys
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import ParameterError
-from armid_ros.nodes.running.arguments import stray, unreadable
+from armid_ros.nodes.running.arguments import is_asked_for, stray, unreadable, usage
 from armid_ros.nodes.running.steady import steady
-from armid_ros.nodes.running.usage import is_asked_for, usage
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.context import Context

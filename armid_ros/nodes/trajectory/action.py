@@ -12,8 +12,8 @@ from typing import Any
 from uuid import uuid4
 
 from action_msgs.msg import GoalStatus, GoalStatusArray
+from armid_ros.nodes.complaints import surviving
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.running.surviving import surviving
 from builtin_interfaces.msg import Duration
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle

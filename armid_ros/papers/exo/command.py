@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.cli.signatures import options
-from armid_ros.cli.signatures.late import done_by
+from armid_ros.cli import parameters as options
+from armid_ros.cli.late import done_by
 import click
 
 #: What a leg and its exoskeleton do; `armid_ros.papers.exo.plant.exercises.EXERCISES`.

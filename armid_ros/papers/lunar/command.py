@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from armid_ros.cli.signatures import options
-from armid_ros.cli.signatures.late import done_by
+from armid_ros.cli import parameters as options
+from armid_ros.cli.late import done_by
 import click
 
 

@@ -62,7 +62,9 @@ def _converter(where: str, topic: Topic) -> Convert | None:
     described = topic.message_type
     path = [] if described.name == JOINT_STATE else [_inside(described)]
     if topic.encoding == 'json':
-        return lambda data: _part(json.loads(data, object_hook=_namespace), path)
+        return lambda data: _part(
+            json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields)), path
+        )
     if topic.encoding not in ('cdr', 'ros1'):
         raise RecordingError(
             f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2, ROS 1 and JSON can be "
@@ -100,19 +102,13 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
             messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
         except Exception:  # the decoder counts it as malformed
             messages.append(bytes(4))
-    length = np.array([len(message) for message in messages], np.int64)
-    start = np.cumsum(length) - length
-    return MessageBlock(b''.join(messages), start, length, block.log_time, block.publish_time)
+    return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
 def _part(message: Any, path: list[str]) -> Any:
     for name in path:
         message = getattr(message, name)
     return message
-
-
-def _namespace(fields: dict[str, Any]) -> SimpleNamespace:
-    return SimpleNamespace(**fields)
 
 
 def _inside(described: MessageType) -> str:

@@ -50,6 +50,13 @@ class JointStates:
         """Return the number of messages."""
         return len(self.number)
 
+    def select(self, which: slice | npt.NDArray[np.intp]) -> JointStates:
+        """Return some of the messages."""
+        values = (self.position, self.velocity, self.effort)
+        q, dq, tau = (None if array is None else array[which] for array in values)
+        stamps = self.header[which], self.receive[which]
+        return JointStates(self.joints, self.number[which], *stamps, q, dq, tau)
+
     @property
     def nbytes(self) -> int:
         """Memory of the arrays [bytes]."""

@@ -77,9 +77,8 @@ def joint_state_cdr(
 
     """
     stamps = np.asarray(stamps_ns, np.int64)
-    fields = [None if v is None else np.asarray(v, np.float64) for v in (q, dq, tau)]
     messages: list[bytes] = []
-    for rows in _encoded(tuple(joints), stamps, fields, frame_id):
+    for rows in _encoded(tuple(joints), stamps, (q, dq, tau), frame_id):
         messages += rows.tolist()
     return messages
 
@@ -103,9 +102,8 @@ def write_joint_states(
     """
     stamps = np.asarray(stamps_ns, np.int64)
     writer.add_topic(topic, JOINT_STATE)
-    fields = [None if v is None else np.asarray(v, np.float64) for v in (q, dq, tau)]
     at = 0
-    for rows in _encoded(tuple(joints), stamps, fields, frame_id):
+    for rows in _encoded(tuple(joints), stamps, (q, dq, tau), frame_id):
         writer.write_many(topic, rows, stamps[at : at + len(rows)])
         at += len(rows)
 
@@ -182,10 +180,11 @@ def write_recording(
 def _encoded(
     joints: tuple[str, ...],
     stamps: IntArray,
-    fields: list[FloatArray | None],
+    given: Sequence[npt.ArrayLike | None],
     frame_id: str,
 ) -> Iterator[npt.NDArray[np.void]]:
     """Yield messages as records, some thousand at a time."""
+    fields = [None if v is None else np.asarray(v, np.float64) for v in given]
     n = len(joints)
     for name, values in zip(('q', 'dq', 'tau'), fields, strict=True):
         if values is not None and values.shape != (len(stamps), n):

@@ -87,7 +87,8 @@ class JointStateLayout:
                 offsets.append(start)
         except (struct.error, UnicodeDecodeError) as error:
             raise MalformedMessage(f'not a JointState: {error}') from error
-        if position > len(cdr) or len(cdr) - position > 7:
+        # A writer reserves room to align what follows, and for each empty sequence as well.
+        if not 0 <= len(cdr) - position <= 7 + 4 * counts.count(0):
             raise MalformedMessage(f'{len(cdr)} bytes where a JointState has {position}')
         return cls(
             order,

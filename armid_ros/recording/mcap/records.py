@@ -22,7 +22,7 @@ import struct
 import zlib
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.damage import Damage
+from armid_ros.recording.source import Damage
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode

@@ -13,7 +13,7 @@ from armid_ros.files import reading
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
-from armid_ros.recording.writer import BagWriter, whole_bag
+from armid_ros.recording.writer import whole_bag
 
 
 @dataclass(frozen=True)
@@ -115,11 +115,6 @@ def _copied(path: Path, out: str | Path, settings: ReadSettings) -> RecoveryRepo
         damage = source.damage
     finally:
         source.close()
-    return _report(path, writer, damage)
-
-
-def _report(path: Path, writer: BagWriter, damage: str) -> RecoveryReport:
-    """Describe the bag as it was written."""
     start, end = writer.time_range
     return RecoveryReport(path, writer.path, writer.topics, damage, (end - start) * 1e-9)
 

@@ -263,8 +263,12 @@ class McapSource:
     def _describe(self, channel: Channel, count: int) -> Topic:
         """Describe the topic of a channel."""
         schema = self._found.schemas.get(channel.schema_id)
+        name = schema.name if schema else ''
+        package, _, rest = name.partition('/')
+        if rest and '/' not in rest:  # some writers leave the namespace out
+            name = f'{package}/msg/{rest}'
         described = MessageType(
-            name=_full_name(schema.name) if schema else '',
+            name=name,
             definition=schema.data.decode('utf-8', 'replace') if schema else '',
             encoding=schema.encoding if schema else '',
             type_hash=channel.metadata.get('topic_type_hash', ''),
@@ -287,12 +291,6 @@ def _piece(
 ) -> tuple[MessageBlock, npt.NDArray[np.uint16]]:
     rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
     return message_block(data, offsets), rows['channel']
-
-
-def _full_name(name: str) -> str:
-    """Return a type name with its namespace, which some writers leave out."""
-    package, _, rest = name.partition('/')
-    return f'{package}/msg/{rest}' if rest and '/' not in rest else name
 
 
 def _map(path: Path) -> bytes | mmap.mmap:

@@ -1,12 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The bytes of a table, unpacked where it is a .gz, within bounds."""
+"""The bytes of a table, unpacked where it is a .gz, and the libraries that some formats need."""
 
 from __future__ import annotations
 
 import gzip
+from importlib import import_module
 import os
 from pathlib import Path
+from typing import Any
 import zlib
 
 from armid_ros.errors import RecordingError
@@ -36,3 +38,14 @@ def read_content(path: Path) -> bytes:
             raise RecordingError(f'{path}: cannot be unpacked: {error}') from error
     DEFAULT.require(len(content), f'{path}: what is packed in it')
     return content
+
+
+def imported(library: str, path: Path, format_name: str) -> Any:
+    """Import a library; RecordingError says how to install it."""
+    try:
+        return import_module(library)
+    except ImportError:
+        raise RecordingError(
+            f'{path}: {format_name} is read by {library.split(".")[0]}, which is not installed: '
+            "pip install 'armid_ros[convert]'"
+        ) from None

@@ -95,9 +95,12 @@ def guess(
         From names in the file to names of the joints.
 
     """
-    families = _families(table, joints, rename)
+    groups = _groups(table, joints, rename).items()
+    families = (_in_order(pattern, members, joints, rename) for pattern, members in groups)
     scored = [
-        Guess(chosen, _score(chosen.pattern, quantity) - _still(chosen)) for chosen in families
+        Guess(chosen, _score(chosen.pattern, quantity) - _still(chosen))
+        for chosen in families
+        if chosen is not None
     ]
     likely = [one for one in scored if one.score > 0.0]
     best: dict[tuple[TableColumn, ...], Guess] = {}
@@ -139,18 +142,6 @@ def named_time(table: Table, way: float) -> TableColumn | None:
         if score > 0.5 and len(finite) > 1 and np.mean(way * np.diff(finite) >= 0.0) > 0.9:
             scores[column] = score
     return max(scores, key=lambda column: scores[column]) if scores else None
-
-
-def _families(
-    table: Table, joints: Sequence[str] | None, rename: Sequence[tuple[str, str]]
-) -> list[ChosenColumns]:
-    """Return the columns that are alike but for what stands for a joint."""
-    families = []
-    for pattern, members in _groups(table, joints, rename).items():
-        chosen = _in_order(pattern, members, joints, rename)
-        if chosen is not None:
-            families.append(chosen)
-    return families
 
 
 def _groups(

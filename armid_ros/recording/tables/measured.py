@@ -4,12 +4,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, ReadReport, Recording
-from armid_ros.recording.series import gaps, longest_run, not_finite, unwrapped
+from armid_ros.recording.series import (
+    gaps,
+    JointSamples,
+    longest_in_order,
+    not_finite,
+    unwrapped,
+)
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
@@ -41,33 +48,34 @@ def measured(plan: TablePlan) -> Recording:
     stamped = np.isfinite(t)
     kept, culprits = _finite(plan, stamped, values)
     rows = np.flatnonzero(kept & stamped)
-    run = longest_run(np.round(t[rows] * 1e9).astype(np.int64)) or slice(None)
-    restarted = len(rows) - len(rows[run])
-    rows = rows[run]
-    late = int(np.sum(t[rows][1:] < np.maximum.accumulate(t[rows])[:-1]))
-    rows = rows[np.argsort(t[rows], kind='stable')]
-    first = np.concatenate([[True], np.diff(t[rows]) > 0.0])
-    duplicates = int((~first).sum())
-    if duplicates > 0.5 * len(rows):
+    position, velocity, effort = (
+        values[name][rows] if name in values else None
+        for name in ('position', 'velocity', 'effort')
+    )
+    counts: Counter[str] = Counter()
+    stamps = np.round(t[rows] * 1e9).astype(np.int64)
+    series = longest_in_order(
+        JointSamples(plan.joints, stamps, (position, velocity, effort)), counts
+    )
+    found = len(series) + counts['duplicates']
+    if counts['duplicates'] > 0.5 * found:
         raise RecordingError(
             f'{table.source}: column {plan.time.name if plan.time else "time"} stands still in '
-            f'{duplicates} of {len(rows)} rows; name another with --time, or give --rate'
+            f'{counts["duplicates"]} of {found} rows; name another with --time, or give --rate'
         )
-    rows = rows[first]
-    if len(rows) < 2:
-        raise RecordingError(f'{table.source}: {len(rows)} rows with numbers are left')
-    of = {name: array[rows] for name, array in values.items()}
-    position, wrapped = unwrapped(of['position'])
-    q, dq, tau = on_joint_side(
-        plan.settings, plan.joints, position, of.get('velocity'), of.get('effort')
-    )
-    time = t[rows] - t[rows[0]]
+    if len(series) < 2:
+        raise RecordingError(f'{table.source}: {len(series)} rows with numbers are left')
+    position, velocity, effort = series.values
+    assert position is not None
+    position, wrapped = unwrapped(position)
+    q, dq, tau = on_joint_side(plan.settings, plan.joints, position, velocity, effort)
+    time = (series.stamps - series.stamps[0]) * 1e-9
     report = ReadReport(
         messages=len(table),
-        samples=len(rows),
-        duplicates=duplicates,
-        out_of_order=late,
-        restarted=restarted,
+        samples=len(series),
+        duplicates=counts['duplicates'],
+        out_of_order=counts['out_of_order'],
+        restarted=counts['restarted'],
         nan=int((~kept & stamped).sum()),
         unstamped=int((~stamped).sum()),
         not_finite=culprits,
@@ -76,6 +84,9 @@ def measured(plan: TablePlan) -> Recording:
         unwrapped=tuple(plan.joints[k] for k in wrapped),
         damage='; '.join(note for note in table.notes if 'cut off' in note),
     )
+    topic = 'the table'
+    if tau is None and plan.unread:
+        topic += f' (--effort names columns of it; not read are {plan.unread})'
     return Recording(
         joints=plan.joints,
         t=time,
@@ -84,17 +95,10 @@ def measured(plan: TablePlan) -> Recording:
         tau=tau,
         start_ns=start,
         source=table.source,
-        topic=_called(plan),
+        topic=topic,
         report=report,
         others=tuple(_others(plan)),
     )
-
-
-def _called(plan: TablePlan) -> str:
-    """Name the table for messages, with what it has that may be what is missing."""
-    if plan.source('effort') is not None or not plan.unread:
-        return 'the table'
-    return f'the table (--effort names columns of it; not read are {plan.unread})'
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:

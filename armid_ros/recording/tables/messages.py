@@ -33,7 +33,12 @@ def settled(table: Table) -> Table:
 
 def _with_names(table: Table) -> Table:
     """Call values by the joints that cells name, whose order may change from row to row."""
-    for prefix, named in _names(table.words).items():
+    names: dict[str, dict[str, npt.NDArray[np.str_]]] = {}  # by what precedes 'name', and number
+    for name, cells in table.words.items():
+        match = _NAME.fullmatch(name)
+        if match and len(cells):
+            names.setdefault(match[1], {})[match[2]] = np.array(cells)
+    for prefix, named in names.items():
         values: dict[str, dict[str, TableColumn]] = {}
         for column in table.columns:
             match = _NUMBERED.fullmatch(column.name)
@@ -54,16 +59,6 @@ def _with_names(table: Table) -> Table:
         rest = [column for column in table.columns if column not in taken]
         table = replace(table, columns=(*rest, *apart))
     return table
-
-
-def _names(words: Mapping[str, Sequence[str]]) -> dict[str, dict[str, npt.NDArray[np.str_]]]:
-    """Return columns of names by what precedes 'name', each by its number."""
-    found: dict[str, dict[str, npt.NDArray[np.str_]]] = {}
-    for name, cells in words.items():
-        match = _NAME.fullmatch(name)
-        if match and len(cells):
-            found.setdefault(match[1], {})[match[2]] = np.array(cells)
-    return found
 
 
 def _of_joint(

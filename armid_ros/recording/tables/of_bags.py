@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,22 +36,25 @@ _WHAT = {
 
 def refuse_columns(path: str | Path, settings: ColumnSettings) -> None:
     """Raise a RecordingError where a bag is told which of its columns are what, or its rate."""
-    for name, option in _WHERE.items():
-        if getattr(settings, name) is not None:
-            raise RecordingError(
-                f'{path}: {option} is for tables, and this is a bag, whose messages have stamps '
-                'and names; leave it out, or make a bag of the tables with armid convert'
-            )
+    reason = (
+        'is for tables, and this is a bag, whose messages have stamps and names; leave it out, or '
+        'make a bag of the tables with armid convert'
+    )
+    _refuse(path, settings, _WHERE, reason)
 
 
 def refuse_units(path: str | Path, settings: ColumnSettings) -> None:
     """Raise a RecordingError where a bag that is copied as it is gets other units."""
-    for name, option in _WHAT.items():
-        if getattr(settings, name):
-            raise RecordingError(
-                f'{path}: {option} changes no bag that is copied; give it to the command that '
-                'reads the bag'
-            )
+    reason = 'changes no bag that is copied; give it to the command that reads the bag'
+    _refuse(path, settings, _WHAT, reason)
+
+
+def _refuse(
+    path: str | Path, settings: ColumnSettings, options: Mapping[str, str], reason: str
+) -> None:
+    for name, option in options.items():
+        if getattr(settings, name) != getattr(ColumnSettings, name):  # its default
+            raise RecordingError(f'{path}: {option} {reason}')
 
 
 def in_si(

@@ -11,7 +11,7 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.files import finite, load_json, read_text, reading
 from armid_ros.recording.settings import DEFAULT
-from armid_ros.recording.tables.extra import imported
+from armid_ros.recording.tables.content import imported
 from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
 
@@ -53,7 +53,7 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
             kept = tuple(
                 TableColumn(c.name, c.values[rows], c.array)
                 for c in columns
-                if not _is_index(c.name)
+                if not (c.name.endswith('index') or c.name.startswith('next.'))
             )
             notes = (f'episode {chosen} of 0 to {total - 1}',)
             return Table(str(path), kept, 'LeRobot dataset', rate_hz=rate, notes=notes)
@@ -69,10 +69,6 @@ def _files(path: Path, episode: int) -> Sequence[Path]:
     return [f for f in files if f.name == own] or [
         f for f in files if not f.name.startswith('episode_')
     ]
-
-
-def _is_index(name: str) -> bool:
-    return name.endswith('index') or name.startswith('next.')
 
 
 def _element_names(feature: Mapping[str, Any]) -> list[str]:
@@ -116,8 +112,7 @@ def _columns(
                 else:
                     numbers = np.array(cells, dtype=float)
                     columns.append(TableColumn(name, numbers, field.name))
-    there = tuple(one for one in columns if np.isfinite(one.values).any())
-    return there, words | {one.name: () for one in columns if one not in there}
+    return tuple(columns), words
 
 
 def _elements(

@@ -196,8 +196,10 @@ def plan(
     sources, lacking = [position], []
     for quantity in _OTHERS:
         found = _source(table, quantity, settings, names)
-        if found is None and joints is None:
-            found = _as_many(table, quantity, settings, position)
+        if found is None and joints is None and getattr(settings, quantity) is None:
+            # its joints are called otherwise, or not at all: their number decides
+            numbers = [str(k) for k in range(len(position.chosen.columns))]
+            found = _source(table, quantity, settings, numbers)
         if found is not None:
             sources.append(found)
         elif getattr(settings, quantity) is None:
@@ -276,16 +278,6 @@ def _source(
     plain = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}[quantity]
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
     return QuantitySource(quantity, chosen, unit or plain, factor, asked is None, rivals)
-
-
-def _as_many(
-    table: Table, quantity: QuantityName, settings: ColumnSettings, position: QuantitySource
-) -> QuantitySource | None:
-    """Guess a quantity whose joints are called otherwise, or not at all, from their number."""
-    if getattr(settings, quantity) is not None:
-        return None
-    numbers = [str(k) for k in range(len(position.chosen.columns))]
-    return _source(table, quantity, settings, numbers)
 
 
 def _scaled(
@@ -375,7 +367,14 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
         column = guess_time(table)
     if column is not None:
         table.column(column.name)  # which has to be one
-        _require_forwards(table, column)
+        steps = np.diff(column.values[np.isfinite(column.values)])
+        if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would turn the motion round
+            raise RecordingError(
+                f'{table.source}: column {column.name} runs backwards, from '
+                f'{column.values[0]:.6g} to {column.values[-1]:.6g}: turn the rows round if the '
+                'last was measured first, or leave the column out with --time none --rate HZ if '
+                'they are in order'
+            )
         return column, settings.time_unit or _time_unit(table, column), None
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
@@ -390,17 +389,6 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
             f'second with --rate. Its columns are {table.listed()}'
         )
     return None, 's', rate
-
-
-def _require_forwards(table: Table, column: TableColumn) -> None:
-    """Refuse a time that runs backwards: sorting it would turn the motion round as well."""
-    steps = np.diff(column.values[np.isfinite(column.values)])
-    if len(steps) and np.mean(steps < 0.0) > 0.5:
-        raise RecordingError(
-            f'{table.source}: column {column.name} runs backwards, from {column.values[0]:.6g} to '
-            f'{column.values[-1]:.6g}: turn the rows round if the last was measured first, or '
-            'leave the column out with --time none --rate HZ if they are in order'
-        )
 
 
 def _time_unit(table: Table, column: TableColumn) -> str:

@@ -105,7 +105,11 @@ class Table:
     words: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse tables that are empty or ragged."""
+        """Set columns without numbers apart; refuse tables that are empty or ragged."""
+        there = tuple(one for one in self.columns if np.isfinite(one.values).any())
+        empty = {one.name: () for one in self.columns if one not in there}
+        object.__setattr__(self, 'columns', there)
+        object.__setattr__(self, 'words', {**empty, **self.words})
         lengths = {len(column.values) for column in self.columns}
         if not lengths or lengths == {0}:
             raise RecordingError(f'{self.source}: there is no column of numbers in it')
@@ -221,9 +225,7 @@ def table_of_arrays(
     columns: list[TableColumn] = []
     for name, values in usable.items():
         columns += _columns_of(name, values.astype(np.float64), length)
-    there = tuple(column for column in columns if np.isfinite(column.values).any())
-    words: dict[str, Sequence[str]] = {one.name: () for one in columns if one not in there}
-    return Table(source, there, described, words=words)
+    return Table(source, tuple(columns), described)
 
 
 def _common_length(source: str, arrays: Sequence[npt.NDArray[np.generic]]) -> int:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 import csv
 import io
 from pathlib import Path
@@ -51,7 +52,8 @@ def read_text(path: Path) -> Table:
     names = _names(header, separator, len(cells), path, first)
     unit_cells = _split(units, separator) if units else [''] * len(names)
     unit_cells += [''] * (len(names) - len(unit_cells))
-    widths = [_width(cell) for cell in cells]
+    lists = [_elements(cell) for cell in cells]
+    widths = [None if elements is None else len(elements) for elements in lists]
     heads = [
         (name if width is None else f'{name}[{k}]', unit, '' if width is None else name)
         for name, unit, width in zip(names, unit_cells, widths, strict=True)
@@ -62,13 +64,7 @@ def read_text(path: Path) -> Table:
     columns = tuple(
         TableColumn(name, column, array if header else '[]', unit)
         for (name, unit, array), column in zip(heads, values.T, strict=True)
-        if np.isfinite(column).any()
     )
-    words |= {
-        name: ()
-        for name, column in zip(names, values.T, strict=True)
-        if not np.isfinite(column).any() and name not in words
-    }
     described = f'text with {_SEPARATORS[separator]}'
     return Table(str(path), columns, described, first_line=first + 1, notes=notes, words=words)
 
@@ -78,7 +74,10 @@ def _lines(path: Path) -> list[str]:
     if not raw.strip():
         raise RecordingError(f'{path}: the file is empty; record again, or name another file')
     for start, coding in _WIDE.items():
-        if raw.startswith(start) and _decodes(raw, coding):
+        if not raw.startswith(start):
+            continue
+        with suppress(UnicodeDecodeError):
+            raw.decode(coding)
             raise RecordingError(
                 f'{path}: text in {coding}, not in UTF-8; save it as CSV in UTF-8, or: '
                 f'iconv --from-code {coding} --to-code UTF-8 {path} > utf8.csv'
@@ -93,14 +92,6 @@ def _lines(path: Path) -> list[str]:
     except UnicodeDecodeError:
         text = raw.decode('latin-1')
     return text.rstrip().splitlines()
-
-
-def _decodes(raw: bytes, coding: str) -> bool:
-    try:
-        raw.decode(coding)
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
@@ -141,13 +132,10 @@ def _as_many(header: str, row: str) -> bool:
 
 
 def _is_number(cell: str) -> bool:
-    if _DECIMAL_COMMA.fullmatch(cell):
+    with suppress(ValueError):
+        _number(cell, ';')
         return True
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+    return False
 
 
 def _elements(cell: str) -> list[str] | None:
@@ -156,11 +144,6 @@ def _elements(cell: str) -> list[str] | None:
     return (
         None if found is None else [part.strip('\'"') for part in _COMMAS.split(found[1]) if part]
     )
-
-
-def _width(cell: str) -> int | None:
-    elements = _elements(cell)
-    return None if elements is None else len(elements)
 
 
 def _separator(lines: list[str]) -> str:

@@ -17,10 +17,8 @@ WIDTH = 8.6
 _DPI = 160
 
 MEASURED = '#333333'
-BROAD = '#9b9b9b'
 PREDICTED = '#d55e00'
 RESIDUAL = '#0072b2'
-FAINT = '#b8b8b8'
 #: Okabe and Ito (2008), without the yellow that white paper swallows.
 COLOURS = ('#0072b2', '#d55e00', '#009e73', '#cc79a7', '#56b4e9', '#e69f00')
 

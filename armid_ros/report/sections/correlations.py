@@ -4,20 +4,17 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from typing import ClassVar
 
 from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
-from armid_ros.report.charts import script_json
+from armid_ros.report.charts import image_data, script_json
 from armid_ros.report.families import full_label, parameter_families
 from armid_ros.report.page import Section
 from armid_ros.report.statistics import correlations
 from markupsafe import Markup
-from matplotlib.image import imsave
 import numpy as np
 
 #: Correlation from which two parameters are hard to tell apart.
@@ -64,13 +61,7 @@ class Correlations(Section):
     def picture(self) -> str:
         """Return the matrix as an image of one pixel an entry, transparent where it is zero."""
         rho = self._sorted()
-        pixels = np.zeros((*rho.shape, 4))
-        pixels[rho >= 0.0, :3] = _POSITIVE
-        pixels[rho < 0.0, :3] = _NEGATIVE
-        pixels[..., 3] = np.abs(rho)
-        stream = BytesIO()
-        imsave(stream, pixels, format='png')
-        return f'data:image/png;base64,{b64encode(stream.getvalue()).decode()}'
+        return image_data(np.where((rho >= 0.0)[..., None], _POSITIVE, _NEGATIVE), rho)
 
     @property
     def json(self) -> Markup:

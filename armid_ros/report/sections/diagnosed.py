@@ -56,7 +56,7 @@ class Shares(Section):
             taken += share
             rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
         rest = max(1.0 - taken, 0.0)
-        rows.append(('the rest, the floor in it', [Bar(rest, 'floor', percent(rest))]))
+        rows.append(('unexplained (noise included)', [Bar(rest, 'floor', percent(rest))]))
         return BarChart(rows, '', full=1.0)
 
     @property
@@ -116,7 +116,7 @@ class EvidenceSection(Section):
 
     """
 
-    title: ClassVar[str] = 'Where it lives'
+    title: ClassVar[str] = 'Where it shows'
     template: ClassVar[str] = 'evidence.html'
 
     places: Sequence[Where]
@@ -133,7 +133,7 @@ class EvidenceSection(Section):
             return ''
         return (
             f'The mean of the residual, {digits(place.mean)} {place.unit} or '
-            f'{percent(place.mean_share)} of its power, is taken off; shares are of the rest.'
+            f'{percent(place.mean_share)} of its power, is subtracted; shares are of the rest.'
         )
 
     def charts(self, place: Where) -> list[tuple[str, Chart]]:
@@ -173,7 +173,7 @@ class SmallPrint(Section):
 
     """
 
-    title: ClassVar[str] = 'Small print'
+    title: ClassVar[str] = 'Minor effects'
     template: ClassVar[str] = 'small_print.html'
 
     minor: Sequence[Finding]
@@ -183,7 +183,7 @@ class SmallPrint(Section):
     @property
     def share(self) -> str:
         """Head of the column of shares: no gap is open where nothing was named."""
-        return 'Share of the gap' if self.named else 'Share of what is left'
+        return 'Share of the gap' if self.named else 'Share of the remaining error'
 
     @property
     def rows(self) -> list[tuple[str, str, str, str, str]]:
@@ -212,7 +212,7 @@ class CouldBeSeen(Section):
 
     """
 
-    title: ClassVar[str] = 'What could have been seen'
+    title: ClassVar[str] = 'Smallest detectable effects'
     template: ClassVar[str] = 'could_be_seen.html'
 
     sizes: Sequence[Detectable]

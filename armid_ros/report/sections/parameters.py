@@ -101,6 +101,8 @@ class ParameterSection(Section):
         What the data do not tell.
     links : sequence of str
         Names of the links, in the order of their numbers.
+    reference : str
+        What ``described`` is: 'description', or 'truth' of a simulated arm.
 
     """
 
@@ -111,6 +113,7 @@ class ParameterSection(Section):
     described: FloatArray
     unidentified: Sequence[Unidentified] = ()
     links: Sequence[str] = ()
+    reference: str = 'description'
 
     @property
     def lost(self) -> dict[str, list[str]]:

@@ -144,7 +144,7 @@ class Foreseen(Section):
 
     """
 
-    title: ClassVar[str] = 'What will be known'
+    title: ClassVar[str] = 'Expected accuracy'
     template: ClassVar[str] = 'foreseen.html'
 
     design: Design

@@ -4,17 +4,14 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from typing import ClassVar
 
-from armid_ros.motion import FloatArray
+from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent, position_unit, torque_unit
 from armid_ros.report.page import Section
 from armid_ros.residual import JointResidual, Residual, TABLE_FILE
-from matplotlib.image import imsave
 import numpy as np
 
 #: Cells of a picture along position and velocity.
@@ -66,7 +63,7 @@ class ResidualMap(Section):
 
     """
 
-    title: ClassVar[str] = 'Without a name'
+    title: ClassVar[str] = 'Learned residual'
     template: ClassVar[str] = 'residual_map.html'
     table: ClassVar[str] = TABLE_FILE
 
@@ -108,10 +105,10 @@ class ResidualMap(Section):
         most = inputs[np.unravel_index(np.argmax(np.abs(torque)), torque.shape)]
         return Picture(
             joint=one.joint,
-            torque=_image(
+            torque=image_data(
                 np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE), torque / peak
             ),
-            std=_image(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
+            std=image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
             alt=f'most at {digits(most[0])} {length} and {digits(most[1])} {length}/s',
             peak=f'{digits(peak)} {unit}',
             unsure=f'{digits(one.learned.amplitude)} {unit}',
@@ -127,11 +124,3 @@ def _alone(one: JointResidual) -> str:
     if one.held_out is None:
         return ''
     return 'worse' if one.held_out < 0.0 else percent(one.held_out)
-
-
-def _image(colour: FloatArray, strength: FloatArray) -> str:
-    """Return an image as data: colours (H, W, 3), as opaque as a strength (H, W) is large."""
-    pixels = np.concatenate([colour, np.clip(np.abs(strength), 0.0, 1.0)[..., None]], axis=-1)
-    stream = BytesIO()
-    imsave(stream, pixels, format='png')
-    return f'data:image/png;base64,{b64encode(stream.getvalue()).decode()}'

@@ -52,7 +52,7 @@ class Residuals(Section):
 
     """
 
-    title: ClassVar[str] = 'Where the residual lives'
+    title: ClassVar[str] = 'Residual by variable'
     template: ClassVar[str] = 'residuals.html'
     telling: ClassVar[float] = TELLING_SHARE
 

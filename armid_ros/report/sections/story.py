@@ -98,7 +98,7 @@ class Story(Section):
         ]
         left = self.diagnosis.left
         if self.diagnosis.findings and left:
-            answers.append(('Left', [f'{w.joint}: {w.signature}' for w in left[:_JOINTS]]))
+            answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in left[:_JOINTS]]))
         return answers
 
     def _where(self) -> list[str]:
@@ -117,7 +117,7 @@ class Story(Section):
             none = 'No joint that was checked has a gap.' if unseen else 'No joint has a gap.'
             found = [*self._in_fitted_alone(), *lines] or [none]
             return [*found, f'Not checked: {", ".join(unseen)}.'] if unseen else found
-        return ['No joint is far above the floor.']
+        return ['No joint is far above its floor.']
 
     def _in_fitted_alone(self) -> list[str]:
         """Say that a gap was located in fitted data, where others have none in its joint."""
@@ -127,14 +127,11 @@ class Story(Section):
         joint = places[0].joint
         if gap.chi2_before[self.diagnosis.arm.robot.joints.index(joint)] > 1.0:
             return []
-        return [
-            f'In the recordings that were fitted; in those that were not {joint} is below its '
-            'floor:'
-        ]
+        return [f'In the fitted recordings only; in the held-out ones {joint} is below its floor:']
 
     def _which(self) -> list[str]:
         causes = [_cause(finding) for finding in self.diagnosis.findings] or [
-            'Nothing is named.',
+            'No cause was found.',
             *(_suspected(group) for group in by_cause(self.diagnosis.suspected)),
         ]
         return causes + [_likeness(one) for one in self._maps if one.law is not None]
@@ -144,11 +141,11 @@ class Story(Section):
         patched = not diagnosis.harmful
         added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
         if self._maps:
-            added.append(f'what was learned of {", ".join(one.joint for one in self._maps)}')
+            added.append(f'the learned residual of {", ".join(one.joint for one in self._maps)}')
         if not added:
-            return ['The model stays as it was given.']
+            return ['The model is unchanged.']
         fitted = diagnosis.refitted and patched
-        more = ', with its rigid body and friction fitted anew' if fitted else ''
+        more = ', with rigid body and friction refitted' if fitted else ''
         return [f'model.yaml is the model with {" and ".join(added)}{more}.']
 
     @property
@@ -165,7 +162,7 @@ class Story(Section):
         before, after, floor = (
             f'{digits(float(x[j]))} {unit}' for x in (gap.before, gap.after, gap.floor)
         )
-        where = 'on recordings that were not used' if gap.predicted else f'on {gap.data}'
+        where = 'on held-out recordings' if gap.predicted else f'on {gap.data}'
         if not self.diagnosis.findings:
             change = after
         else:
@@ -195,23 +192,25 @@ def _cause(finding: Finding) -> str:
 
 def _suspected(group: Sequence[Finding]) -> str:
     """Return a cause that these recordings hardly tell."""
-    return f'Suspected: {names_and_places(group)}; more recordings tell.'
+    return f'Suspected: {names_and_places(group)}; record more to confirm.'
 
 
 def share_of(diagnosis: Diagnosis) -> str:
     """Return what the shares of joints are of: where something is named, of what it explains."""
-    return 'what is explained' if diagnosis.findings else 'the gap'
+    return 'the explained part' if diagnosis.findings else 'the gap'
 
 
 def _likeness(one: JointResidual) -> str:
     """Return the law that what is left of a joint looks like."""
     assert one.law is not None
-    return f'{one.joint}, without a name: looks like {one.law.text}, {percent(one.law.share)}'
+    return f'{one.joint}, no known cause: looks like {one.law.text}, {percent(one.law.share)}'
 
 
 def _taken(one: JointResidual) -> str:
     """Return how much of what is left of a joint its map predicts."""
-    return f'{one.joint}: the map predicts {percent(one.gain)} of what is left without a name.'
+    return (
+        f'{one.joint}: the map predicts {percent(one.gain)} of the residual without a known cause.'
+    )
 
 
 def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]

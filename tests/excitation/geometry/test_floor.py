@@ -50,7 +50,7 @@ def test_arms_of_other_people_that_stand_have_one_too(example_robot, name):
 @pytest.mark.parametrize('name', ['talos_left_arm', 'baxter'])
 def test_arms_that_hang_or_reach_below_their_base_are_asked_for(example_robot, name):
     collision = collision_model(load_robot(example_robot(f'{name}.urdf')))
-    with pytest.raises(TrajectoryError, match=r'below it.*--floor Z, or --floor none'):
+    with pytest.raises(TrajectoryError, match=r'--floor Z.*--floor none'):
         find_floor(collision)
     assert find_floor(collision, 'none').height is None
     assert find_floor(collision, '-0.93').height == -0.93
@@ -58,7 +58,7 @@ def test_arms_that_hang_or_reach_below_their_base_are_asked_for(example_robot, n
 
 @pytest.mark.parametrize('gravity', [(9.81, 0.0, 0.0), (0.0, 0.0, 9.81)], ids=['wall', 'ceiling'])
 def test_an_arm_on_a_wall_or_a_ceiling_is_asked_for(gravity):
-    with pytest.raises(TrajectoryError, match='gravity does not pull it onto its base plane'):
+    with pytest.raises(TrajectoryError, match='gravity'):
         find_floor(bodies(ABOVE, gravity=gravity))
 
 
@@ -70,13 +70,13 @@ def test_a_mount_below_a_world_is_no_floor(mount):
         f'<child link="base"/><origin xyz="0 0 2.4" rpy="{mount}"/></joint></robot>'
     )
     collision = collision_model(robot_from_urdf(urdf(ABOVE).replace('</robot>', carried)))
-    with pytest.raises(TrajectoryError, match=r'base is mounted turned by (90|180) degrees'):
+    with pytest.raises(TrajectoryError, match=r'base.*(90|180) degrees'):
         find_floor(collision)
     assert find_floor(collision, '0').height == 0.0
 
 
 def test_an_arm_whose_only_link_is_below_its_base_is_asked_for():
-    with pytest.raises(TrajectoryError, match=r'0\.\d+ m below it \(upper\)'):
+    with pytest.raises(TrajectoryError, match=r'0\.\d+ m below.*upper'):
         find_floor(bodies(BELOW))
 
 

@@ -125,7 +125,7 @@ def test_rival_columns_that_a_motion_does_not_tell_apart_are_no_reason_to_stop(w
 
 def test_models_that_no_motion_can_tell_apart_are_refused(two_link, with_effects):
     arm = with_effects(two_link, 'torque_offset')
-    with pytest.raises(TrajectoryError, match=r'no motion can tell .* torque_offset'):
+    with pytest.raises(TrajectoryError, match='torque_offset'):
         DesignProblem.of(
             arm, DesignSettings(criterion='T'), np.random.default_rng(0), with_effects(two_link)
         )
@@ -150,7 +150,7 @@ def test_payload_is_visible_when_the_arm_is_known(humanoid, with_effects):
     arm = with_effects(humanoid, 'payload')
     rng = np.random.default_rng(0)
     assert DesignProblem.of(arm, DesignSettings(target='effects'), rng).base.rank == 10
-    with pytest.raises(TrajectoryError, match=r"no motion tells payload.*target 'effects'"):
+    with pytest.raises(TrajectoryError, match=r"payload.*'effects'"):
         DesignProblem.of(arm, DesignSettings(focus=('payload',)), rng)
 
 
@@ -161,7 +161,7 @@ def test_unknown_names_are_refused_with_those_that_exist(two_link_arm):
     ):
         with pytest.raises(TrajectoryError, match=f"no {kind} 'X'; there are"):
             DesignSettings(**settings)
-    with pytest.raises(TrajectoryError, match='it has viscous_friction, coulomb_friction'):
+    with pytest.raises(TrajectoryError, match='viscous_friction, coulomb_friction'):
         DesignProblem.of(
             two_link_arm, DesignSettings(focus=('backlash',)), np.random.default_rng(0)
         )

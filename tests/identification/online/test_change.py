@@ -7,11 +7,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
 from armid_ros.identification.online.change_score import (
     Block,
-    score_statistics,
+    projecting,
     ScoreStatistics,
+    weighing,
 )
 from armid_ros.identification.online.change_watch import ChangeWatch
 from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
@@ -44,11 +46,17 @@ def learned_and_block(
     return estimator, block, w, tau
 
 
+def score_statistics(block, directions, residual_scale=1.0):
+    """Weigh possible changes by a block, against what was known when it began."""
+    projected = at_once(projecting(block, directions))
+    return at_once(weighing([projected], projected, directions, residual_scale))
+
+
 def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
     """Before and after in one problem, with a column for the change: the same answer."""
     rng = np.random.default_rng(0)
     _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
-    found, covariance = score_statistics([block], block, CHANGED).size(slice(0, 1))
+    found, covariance = score_statistics(block, CHANGED).size(slice(0, 1))
     top = np.hstack([block.before.root, np.zeros((5, 1))])
     both = np.vstack([top, np.hstack([w, w @ CHANGED])])
     aim = np.concatenate([block.before.root @ block.before.values, tau])
@@ -61,8 +69,8 @@ def test_what_was_learned_in_another_unit_of_noise_is_as_certain():
     rng = np.random.default_rng(6)
     _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
     loud = replace(block, information=w.T @ w / 9.0, right=w.T @ tau / 9.0)
-    found, covariance = score_statistics([loud], block, CHANGED, 3.0).size(slice(0, 1))
-    expected, certain = score_statistics([block], block, CHANGED).size(slice(0, 1))
+    found, covariance = score_statistics(loud, CHANGED, 3.0).size(slice(0, 1))
+    expected, certain = score_statistics(block, CHANGED).size(slice(0, 1))
     assert found[0] == pytest.approx(expected[0], rel=1e-6)
     assert covariance[0, 0] == pytest.approx(9.0 * certain[0, 0], rel=1e-6)
 
@@ -72,7 +80,7 @@ def test_without_a_change_the_ratio_is_chi_square():
     ratios = []
     for _ in range(150):
         _, block, _, _ = learned_and_block(rng, 0.0, seen=5)
-        ratios.append(score_statistics([block], block, CHANGED).ratio(slice(0, 1)))
+        ratios.append(score_statistics(block, CHANGED).ratio(slice(0, 1)))
     assert stats.kstest(ratios, stats.chi2(1).cdf).pvalue > 1e-3
 
 
@@ -80,7 +88,7 @@ def test_what_was_never_known_cannot_be_seen_to_change():
     rng = np.random.default_rng(2)
     _, block, _, _ = learned_and_block(rng, 5.0)
     unknown = np.eye(5)[:, [4]]
-    assert score_statistics([block], block, unknown).ratio(slice(0, 1)) < 1e-3
+    assert score_statistics(block, unknown).ratio(slice(0, 1)) < 1e-3
 
 
 def test_reopening_forgets_one_direction_and_nothing_else():

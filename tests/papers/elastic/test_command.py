@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 
-from armid_ros.cli.signatures.record import simulate
+from armid_ros.cli.record import simulate
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation
 from armid_ros.papers.elastic.command import elastic

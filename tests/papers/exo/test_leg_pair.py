@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects.interaction import HumanInteraction
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics, random_motion
 from armid_ros.papers.exo.plant.gait import read_gait
@@ -23,7 +21,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import pytest
 
-from tests.effects.recorded_point import RecordedPoint
 from tests.model.newton_euler import joint_torques, Segment
 
 SIGNS = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
@@ -117,18 +114,6 @@ def test_slack_and_dampers(pair, motions) -> None:
     loose = replace(two, slack=np.array([0.005, 0.005]), damping=np.array([0.0, 10.0]))
     force = loose.law(way, np.full((1, 2, 3), 0.1))
     np.testing.assert_allclose(force[0], [[0.0, 0.0, 0.0], [-1.0, -1.0, -151.0]], atol=1e-9)
-
-
-def test_the_effect_of_the_catalogue_is_the_same_spring(pair) -> None:
-    t = np.linspace(0.0, 0.456, 229)
-    motions = walking(pair, read_gait(), t)
-    arm = ArmModel(pair.robot)
-    for tie, stiffness in zip(pair.ties, STIFFNESS, strict=True):
-        anchor = RecordedPoint(pair.other, motions.other, tie.other_joint, tie.other_point)
-        spring = HumanInteraction((tie.joint,), tie.point, anchor)
-        arm = arm.with_effect(spring, [stiffness, 0.0, 0.0, 0.0, 0.0])
-    expected = pair_torques(pair, *motions).tau
-    np.testing.assert_allclose(arm.torque(motions.own), expected, rtol=0.0, atol=1e-8)
 
 
 def test_the_shipped_pair_feels_tens_to_hundreds_of_newtons() -> None:

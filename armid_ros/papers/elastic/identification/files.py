@@ -25,8 +25,7 @@ from armid_ros.recording import (
     Recording,
     topics,
 )
-from armid_ros.recording.elastic_topics import imu_topic, LINK, MOTOR, REFERENCE
-from armid_ros.recording.imu import read_accelerations
+from armid_ros.recording.imu import imu_topic, LINK, MOTOR, read_accelerations, REFERENCE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.robots import Robot
 from armid_ros.simulation.accelerometers import LinkAccelerometers

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.papers.elastic.identification import (
     ideal_response,
     MeasuredJoint,
@@ -13,7 +14,6 @@ from armid_ros.papers.elastic.identification import (
 )
 from armid_ros.papers.elastic.identification.names import unpack
 from armid_ros.papers.elastic.identification.tuning import Tuning
-from armid_ros.report.figures.parameters import HALF_WIDTH
 from armid_ros.report.figures.style import (
     COLOURS,
     legend,

@@ -83,7 +83,7 @@ class InteractionIdentifierNode(ArmidNode):
         core = self.identifier
         self._orders = JointOrder(core.robot.joints), JointOrder(core.other.joints)
         self._gates = tuple(
-            joint_gate(robot.prismatic, signals)
+            joint_gate(robot.prismatic, signals, torque_limit=robot.torque_limit)
             for robot, signals in ((core.robot, 'qt'), (core.other, 'q'))
         )
         self._told: list[Counter[str]] = [Counter(), Counter()]

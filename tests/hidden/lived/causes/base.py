@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, Sized
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
 from tests.hidden.lived.wear import Wear
@@ -53,7 +53,7 @@ class Scene:
         return int(rng.choice(chosen if len(chosen) else [np.argmax(self.strength)]))
 
 
-class Cause(ABC):
+class Cause(Sized, ABC):
     """One cause with its true parameters; every hook leaves things as they are by default."""
 
     #: Name in the catalogue, or of something the catalogue does not have.
@@ -69,15 +69,6 @@ class Cause(ABC):
     @abstractmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         """Draw one of ordinary size."""
-
-    @abstractmethod
-    def scaled(self, factor: float) -> Self:
-        """Return it larger by a factor."""
-
-    @property
-    @abstractmethod
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Return the true parameters, as the catalogue names them."""
 
     def bodies(self, chain: Chain) -> Chain:
         """Change the rigid arm or its gravity."""
@@ -115,9 +106,6 @@ class JointCause(Cause):
     @property
     def joints(self) -> tuple[str, ...]:
         return (self.joint,)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
 
     def _column(self, like: FloatArray, values: FloatArray) -> FloatArray:
         torque = np.zeros_like(like)

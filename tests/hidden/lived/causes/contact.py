@@ -91,6 +91,7 @@ class Knocks(JointCause):
     """A person who pushes a link now and then, this way and that: in no catalogue."""
 
     name = 'pushes'
+    stated = (('force', 'value', 'N'),)
     in_catalogue = False
     attachment: tuple[float, float, float]
     pushes: tuple[tuple[float, float, float, float, float], ...]
@@ -106,10 +107,6 @@ class Knocks(JointCause):
             for time in times
         ]
         return cls(scene.chain.joints[j], j, scene.strength.max(), point, tuple(pushes))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('force', self.joint, self.value, 'N'),)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         force = np.zeros((3, len(path.t)))

@@ -20,15 +20,12 @@ class Coulomb(JointCause):
     """A gear that has become stiff."""
 
     name = 'coulomb_friction'
+    stated = (('coulomb_torque', 'value', 'N m'),)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng)
         return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j])
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('coulomb_torque', self.joint, self.value, 'N m'),)
 
     def wear(self, wear: Wear) -> Wear:
         return self._more(wear, 'coulomb')
@@ -38,15 +35,12 @@ class Viscous(JointCause):
     """A gear with other grease."""
 
     name = 'viscous_friction'
+    stated = (('viscous_coefficient', 'value', 'N m s/rad'),)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng)
         return cls(scene.chain.joints[j], j, 0.15 * scene.strength[j] / scene.speed[j])
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('viscous_coefficient', self.joint, self.value, 'N m s/rad'),)
 
     def wear(self, wear: Wear) -> Wear:
         return self._more(wear, 'viscous')
@@ -57,6 +51,10 @@ class Stribeck(JointCause):
     """A gear that sticks at low speed."""
 
     name = 'stribeck_friction'
+    stated = (
+        ('stribeck_torque', 'value', 'N m'),
+        ('stribeck_velocity', 'velocity', 'rad/s'),
+    )
     velocity: float = 0.1
 
     @classmethod
@@ -64,13 +62,6 @@ class Stribeck(JointCause):
         j = scene.joint(rng)
         velocity = float(scene.speed[j] * rng.uniform(0.15, 0.5))
         return cls(scene.chain.joints[j], j, 0.2 * scene.strength[j], velocity)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (
-            Parameter('stribeck_torque', self.joint, self.value, 'N m'),
-            Parameter('stribeck_velocity', self.joint, self.velocity, 'rad/s'),
-        )
 
     def dry(self, dq: FloatArray) -> FloatArray:
         return self._column(dq, self.value * np.exp(-((dq[:, self.index] / self.velocity) ** 2)))
@@ -80,16 +71,13 @@ class LoadFriction(JointCause):
     """A gear in which dry friction grows with the load."""
 
     name = 'load_dependent_friction'
+    stated = (('load_coefficient', 'value', ''),)
     factors = (0.02, 6.0)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng, loaded=True)
         return cls(scene.chain.joints[j], j, 0.1)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('load_coefficient', self.joint, self.value, ''),)
 
     def wear(self, wear: Wear) -> Wear:
         return self._more(wear, 'load_share')
@@ -99,15 +87,12 @@ class Rotor(JointCause):
     """A drive exchanged for one with a heavier rotor."""
 
     name = 'rotor_inertia'
+    stated = (('rotor_inertia', 'value', 'kg m^2'),)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng, first=1)
         return cls(scene.chain.joints[j], j, 0.05 * scene.strength[j] / scene.speed[j])
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('rotor_inertia', self.joint, self.value, 'kg m^2'),)
 
     def wear(self, wear: Wear) -> Wear:
         return self._more(wear, 'rotor')
@@ -142,16 +127,13 @@ class CubicDrag(JointCause):
     """Drag that grows with the cube of the speed: in no catalogue."""
 
     name = 'cubic_drag'
+    stated = (('cubic_coefficient', 'value', 'N m s^3/rad^3'),)
     in_catalogue = False
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng)
         return cls(scene.chain.joints[j], j, 0.1 * scene.strength[j] / scene.speed[j] ** 3)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('cubic_coefficient', self.joint, self.value, 'N m s^3/rad^3'),)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         return self._column(path.q, self.value * path.dq[:, self.index] ** 3)
@@ -162,6 +144,7 @@ class Bumps(JointCause):
     """Places in a gear that push one way where they are entered, the other way where left."""
 
     name = 'bumps'
+    stated = (('torque', 'value', 'N m'),)
     in_catalogue = False
     places: tuple[float, ...] = ()
     width: float = 0.1
@@ -178,10 +161,6 @@ class Bumps(JointCause):
             tuple(places.tolist()),
             0.05 * float(high - low),
         )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('torque', self.joint, self.value, 'N m'),)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         x = (path.q[:, self.index, np.newaxis] - np.array(self.places)) / self.width

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray
 from tests.hidden.lived.causes.base import JointCause, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import Path
@@ -20,6 +20,7 @@ class PositionFriction(JointCause):
     """Dry friction that grows towards one place of the range, as of a gear that is worn there."""
 
     name = 'position_friction'
+    stated = (('torque', 'value', 'N m'),)
     in_catalogue = False
     centre: float = 0.0
     width: float = 0.5
@@ -30,10 +31,6 @@ class PositionFriction(JointCause):
         low, high = float(scene.low[j]), float(scene.high[j])
         centre = low + (high - low) * float(rng.uniform(0.25, 0.75))
         return cls(scene.chain.joints[j], j, 0.3 * scene.strength[j], centre, 0.15 * (high - low))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('torque', self.joint, self.value, 'N m'),)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         q, dq = path.q[:, self.index], path.dq[:, self.index]
@@ -46,6 +43,7 @@ class CableSnag(JointCause):
     """A cable that snags beyond an angle: it pulls back, harder while it is drawn out."""
 
     name = 'cable_snag'
+    stated = (('stiffness', 'value', 'N m/rad'),)
     in_catalogue = False
     place: float = 0.0
     drag: float = 0.3
@@ -56,10 +54,6 @@ class CableSnag(JointCause):
         low, high = float(scene.low[j]), float(scene.high[j])
         place = low + (high - low) * float(rng.uniform(0.5, 0.7))
         return cls(scene.chain.joints[j], j, scene.strength[j] / (high - low), place)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('stiffness', self.joint, self.value, 'N m/rad'),)
 
     def torque(self, path: Path, chain: Chain) -> FloatArray:
         q, dq = path.q[:, self.index], path.dq[:, self.index]

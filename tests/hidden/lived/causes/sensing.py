@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray
 from tests.hidden.lived.causes.base import Cause, JointCause, Scene
 from tests.hidden.lived.motions import Path
 
@@ -18,16 +18,13 @@ class Gain(JointCause):
     """A torque reading of another scale."""
 
     name = 'torque_gain'
+    stated = (('gain_error', 'value', ''),)
     factors = (0.05, 6.0)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng, loaded=True)
         return cls(scene.chain.joints[j], j, float(rng.choice([-1.0, 1.0])) * 0.08)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('gain_error', self.joint, self.value, ''),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self._column(tau, self.value * tau[:, self.index])
@@ -37,6 +34,7 @@ class Offset(JointCause):
     """A torque reading of another zero."""
 
     name = 'torque_offset'
+    stated = (('torque_offset', 'value', 'N m'),)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
@@ -44,10 +42,6 @@ class Offset(JointCause):
         return cls(
             scene.chain.joints[j], j, float(rng.choice([-1.0, 1.0])) * 0.1 * scene.strength[j]
         )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('torque_offset', self.joint, self.value, 'N m'),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return tau + self._column(tau, np.full(len(tau), self.value))
@@ -58,19 +52,13 @@ class Delay(Cause):
     """Torques that are older than the positions they come with."""
 
     name = 'time_delay'
+    stated = (('delay', 'value', 's'),)
     factors = (0.05, 3.0)
     value: float
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         return cls(0.01)
-
-    def scaled(self, factor: float) -> Self:
-        return replace(self, value=self.value * factor)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('delay', '', self.value, 's'),)
 
     def reading(self, t: FloatArray, tau: FloatArray) -> FloatArray:
         return np.column_stack([np.interp(t - self.value, t, column) for column in tau.T])
@@ -80,16 +68,13 @@ class Encoder(JointCause):
     """An encoder that reads too little by a constant."""
 
     name = 'encoder_offset'
+    stated = (('encoder_offset', 'value', 'rad'),)
     factors = (0.02, 6.0)
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
         j = scene.joint(rng, loaded=True, first=1)
         return cls(scene.chain.joints[j], j, float(rng.choice([-1.0, 1.0])) * 0.03)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return (Parameter('encoder_offset', self.joint, self.value, 'rad'),)
 
     def truth(self, path: Path) -> Path:
         q = path.q.copy()

@@ -92,5 +92,5 @@ def test_a_missing_accelerometer_is_named(tmp_path, clean_steps) -> None:
     with BagWriter(tmp_path / 'bag') as writer:
         for topic in ('/motor/joint_states', '/link/joint_states', '/reference/joint_states'):
             write_joint_states(writer, topic, ROBOT.joints, stamps, link.q, link.dq)
-    with pytest.raises(RecordingError, match='there is no topic /link1/imu'):
+    with pytest.raises(RecordingError, match='/link1/imu'):
         read_runs(tmp_path / 'bag', ROBOT, SENSORS)

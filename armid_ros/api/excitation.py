@@ -1,0 +1,407 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories that show the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+import sys
+from typing import Any, TYPE_CHECKING
+
+from armid_ros.api.arguments import (
+    arm_of,
+    generator,
+    RecordingLike,
+    recordings_of,
+    Rng,
+    RobotLike,
+)
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    ClearanceModel,
+    CollisionScene,
+    Design,
+    design,
+    DesignProblem,
+    DesignProgress,
+    DesignSettings,
+    Excitation,
+    Fitness,
+    fitness,
+    plan_run,
+    Run,
+    save_excitation,
+    transfer_limits,
+    TransferPlanner,
+    whole_period,
+    with_joint_limits,
+)
+from armid_ros.files import json_text, settled, write_file
+from armid_ros.identification import SignalSettings
+from armid_ros.identification.rows.signals import conditioning, segments
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.recording import Recording, write_joint_trajectory
+from armid_ros.robots import joints_beside_arms
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas
+
+#: Waypoints per second of a JointTrajectory; controllers interpolate between them.
+WAYPOINT_RATE = 50.0
+SCHEMA = 'armid/excitation/1'
+#: Name of the bag.
+BAG = 'trajectory'
+#: Of the run-in and the run-out [s], and at most this share of the duration.
+_RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ExcitationResult(Shown):
+    """
+    A trajectory worth running.
+
+    Attributes
+    ----------
+    core : Design
+        Everything that the design found.
+    arm : ArmModel
+        What it was made for.
+    scene : CollisionScene
+        Bodies, floor and surroundings that it was checked against.
+    given_start : ndarray, shape (n,), or None
+        Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
+    after : tuple of str
+        Recordings that it adds to.
+    seed : int
+        Of the search.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> plan = ar.design_excitation('my_arm.urdf', duration=6.0, starts=1, iterations=1)
+    >>> sorted(path.name for path in plan.save('short_plan').iterdir())
+    ['excitation.csv', 'excitation.json', 'excitation.yaml', 'report.html', 'trajectory']
+
+    """
+
+    core: Design
+    arm: ArmModel
+    scene: CollisionScene
+    given_start: FloatArray | None = None
+    after: tuple[str, ...] = ()
+    seed: int = 0
+
+    @property
+    def trajectory(self) -> Excitation:
+        """Return what is to be run, from rest to rest."""
+        return self.core.excitation
+
+    @property
+    def duration(self) -> float:
+        """How long that takes [s]."""
+        return self.trajectory.duration
+
+    def motion(self, rate: float = WAYPOINT_RATE) -> Motion:
+        """Return positions, velocities and accelerations at a rate [Hz]."""
+        return self.trajectory.motion(rate)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """Return the waypoints as a pandas table: t, and q, dq, ddq of every joint."""
+        from pandas import DataFrame
+
+        motion = self.motion()
+        columns = {'t': motion.t}
+        for k, joint in enumerate(motion.joints):
+            parts = {'q': motion.q, 'dq': motion.dq, 'ddq': motion.ddq}
+            columns |= {f'{name}_{joint}': values[:, k] for name, values in parts.items()}
+        return DataFrame(columns)
+
+    @cached_property
+    def planner(self) -> TransferPlanner:
+        """Return what plans the ways to the trajectory and back."""
+        return transfer_planner(self.arm, self.core.settings, self.scene)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """Return the pose that the run leaves from and returns to, shape (n,) [rad or m]."""
+        return self.planner.free_start()[0] if self.given_start is None else self.given_start
+
+    @cached_property
+    def run(self) -> Run:
+        """Return the trajectory with the way there and back; TrajectoryError if there is none."""
+        excitation = self.core.excitation
+        return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
+
+    @cached_property
+    def fitness(self) -> Fitness:
+        """Return what was checked of the run."""
+        scene = self.scene
+        return fitness(self.run, self.core.limits, scene.collision, scene.floor, scene.obstacles)
+
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Return what excitation.json holds."""
+        core = replace(self.core, excitation=self.run.excitation)
+        information, settings = core.information, core.settings
+        used = core.limits_used(self.arm)
+        nearest, floor = self.fitness.nearest, self.scene.floor
+        return {
+            'schema': SCHEMA,
+            'robot': origin.of(self.arm.robot).robot,
+            'verdict': self.fitness.word,
+            'summary': str(self.fitness),
+            'not_checked': list(self.fitness.unchecked),
+            'joints': list(core.excitation.joints),
+            'duration': core.excitation.duration,
+            'period': settings.period,
+            'start': self.start.tolist(),
+            'approach': self.run.approach.duration,
+            'trajectory_duration': self.run.duration,
+            'floor': {'height': floor.height, 'source': floor.source},
+            'lowest_point': {
+                'height': _finite(self.fitness.lowest.height),
+                'link': self.fitness.lowest.link,
+                'time': self.fitness.lowest.time,
+            },
+            'speed': settings.speed,
+            'criterion': settings.criterion,
+            'cost': core.cost,
+            'stopped': core.stopped,
+            'seed': self.seed,
+            'condition_number': _finite(information.condition),
+            'log_det': _finite(information.log_det),
+            'rank': int(np.count_nonzero(np.isfinite(information.std))),
+            'clearance': None if nearest is None else nearest.distance,
+            'limits_used': {name: share.tolist() for name, share in used.items()},
+            'parameters': [
+                {'name': name.name, 'joint': name.joint, 'std': _finite(std), 'unit': name.unit}
+                for name, std in zip(information.parameters, information.std, strict=True)
+            ],
+        }
+
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return report.html on the quality of the run."""
+        from armid_ros.report.excitation_report import CheckedRun, excitation_report
+
+        return excitation_report(
+            replace(self.core, excitation=self.run.excitation),
+            self.arm,
+            robot=origin.of(self.arm.robot).robot,
+            scene=self.scene,
+            after=self.after,
+            provenance=origin.provenance,
+            planned=CheckedRun(self.run, self.fitness),
+        )
+
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """
+        Write excitation.yaml, .csv and .json, a bag with the run, and report.html into a folder.
+
+        What takes longest to find is written first.
+
+        Raises
+        ------
+        TrajectoryError
+            If no way leads from the start to the trajectory; its coefficients are written then.
+
+        """
+        _save_coefficients(self.core.excitation, folder)
+        _save_coefficients(self.run.excitation, folder)
+        urdf = self.arm.robot.urdf
+        write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
+        document = self.document(origin)
+        write_file(folder / 'excitation.json', json_text(document, indent=1))
+        path = folder / 'report.html'
+        try:
+            write_file(path, self.page(origin))
+        except Exception as error:  # whatever it is, the trajectory is written and good
+            said = f'{settled(path)}: not written: {type(error).__name__}: {error}'
+            print(said, file=sys.stderr)
+        return document
+
+    def summary(self) -> Summary:
+        """Return how much of its limits every joint uses."""
+        shares = self.core.limits_used(self.arm)
+        joints, unchecked = self.arm.robot.joints, self.scene.unchecked
+        rows = [
+            (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
+            for k, joint in enumerate(joints)
+        ]
+        return Summary(
+            f'{self.arm.robot.name}: {self.duration:.1f} s, condition number '
+            f'{self.core.information.condition:.4g}, {len(self.core.information.parameters)} '
+            'parameters',
+            heads=('joint', *(f'{name} used' for name in shares)),
+            rows=rows,
+            lines=['not checked: ' + '; '.join(unchecked)] if unchecked else [],
+        )
+
+
+def design_excitation(
+    arm: RobotLike,
+    *,
+    duration: float = 24.0,
+    periods: int = 2,
+    rng: Rng = 0,
+    time_budget: float = 60.0,
+    floor: str | float | None = None,
+    environment: str | Path | None = None,
+    joint_limits: str | Path | Mapping[str, float] | None = None,
+    scene: CollisionScene | None = None,
+    start: FloatArray | None = None,
+    after: RecordingLike | Sequence[RecordingLike] = (),
+    rival: ArmModel | None = None,
+    progress: Callable[[DesignProgress], None] | None = None,
+    **settings: Any,
+) -> ExcitationResult:
+    """
+    Find a trajectory that shows the parameters, inside all limits and free of collisions.
+
+    The arm, its floor and its surroundings are checked as by ``armid excite``.
+
+    Parameters
+    ----------
+    arm : model, robot, name or path
+        What is to be identified.
+    duration : float
+        Of the whole run [s].
+    periods : int
+        How often the trajectory is run through; two tell noise from what a model lacks.
+    rng : int or Generator
+        Seed, or source of randomness.
+    time_budget : float
+        Processor time of each search process [s]; the best so far is kept.
+    floor : str or float, optional
+        Height of the floor above the origin of the base [m], or 'none'; by default the base plane
+        of an arm that stands, or what is shipped with the robot.
+    environment : str or Path, optional
+        YAML with what stands around the arm, or a planning scene of MoveIt.
+    joint_limits : str, Path or mapping of str to float, optional
+        ``joint_limits.yaml`` of MoveIt, or the velocity limit of joints by name [rad/s or m/s].
+        A joint without any velocity limit gets a slow one, which the summary names.
+    scene : CollisionScene, optional
+        Bodies, floor and surroundings, in place of ``floor`` and ``environment``.
+    start : ndarray, shape (n,), optional
+        Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
+    after : recording or path, or several
+        Recordings whose information the trajectory adds to.
+    rival : ArmModel, optional
+        With ``criterion='T'``: what may be there in place of the effects of ``arm``.
+    progress : callable, optional
+        Called with the progress of the search.
+    **settings
+        Further ones of ``armid_ros.excitation.DesignSettings``: ``speed='slow'``, ``starts=1``,
+        ``iterations=20``, ``criterion='D'``.
+
+    Returns
+    -------
+    ExcitationResult
+        Prints as a table; ``motion``, ``report``, ``save``.
+
+    Raises
+    ------
+    TrajectoryError
+        No trajectory is inside the limits, with the limit or the bodies that touch; or the height
+        of the floor is unknown.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> plan = ar.design_excitation('my_arm.urdf', duration=12.0, starts=1, iterations=5)
+    >>> round(plan.duration, 1)
+    12.0
+
+    """
+    model = arm_of(arm)
+    others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
+    if others:
+        kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
+        raise TrajectoryError(
+            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
+        )
+    if joint_limits is not None:
+        velocity = joint_limits if isinstance(joint_limits, Mapping) else {}
+        file = None if isinstance(joint_limits, Mapping) else joint_limits
+        given = [f'{joint}:={limit}' for joint, limit in velocity.items()]
+        robot, acceleration = with_joint_limits(model.robot, file, given)
+        model = replace(model, robot=robot)
+        settings = {'acceleration': acceleration, **settings}
+    known = design_settings(duration, periods, time_budget=time_budget, **settings)
+    if scene is None:
+        height = None if floor is None else str(floor)
+        scene = CollisionScene.of(model.robot, known.clearance, height, environment)
+    earlier = recordings_of(after, model.robot)
+    found = design(
+        model,
+        known,
+        generator(rng),
+        collision=scene.bodies,
+        prior_information=_information(model, known, earlier, rng) if earlier else None,
+        rival=rival,
+        progress=progress,
+    )
+    names = tuple(recording.source for recording in earlier)
+    return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
+
+
+def design_settings(duration: float, periods: int, **settings: Any) -> DesignSettings:
+    """
+    Return the settings of a design that lasts from rest to rest.
+
+    Parameters
+    ----------
+    duration : float
+        Of the whole run [s].
+    periods : int
+        Identical periods in it.
+    **settings
+        Further ones of `DesignSettings`.
+
+    """
+    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
+    period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
+    return DesignSettings(period=period, n_periods=periods, run_in=run_in, **settings)
+
+
+def transfer_planner(
+    arm: ArmModel, settings: DesignSettings, scene: CollisionScene
+) -> TransferPlanner:
+    """Return what plans the ways of an arm to a run with such settings, and back."""
+    return TransferPlanner(
+        arm,
+        transfer_limits(arm.robot, settings.speed, settings.acceleration),
+        ClearanceModel.of(scene.bodies),
+        settings.clearance,
+    )
+
+
+def _save_coefficients(excitation: Excitation, folder: Path) -> None:
+    for name in ('excitation.yaml', 'excitation.csv'):
+        save_excitation(excitation, folder / name)
+
+
+def _information(
+    arm: ArmModel, settings: DesignSettings, recordings: Sequence[Recording], rng: Rng
+) -> FloatArray:
+    """Return the information that recordings hold already, shape (r, r)."""
+    used = conditioning(list(recordings), SignalSettings())
+    problem = DesignProblem.of(arm, settings, generator(rng))
+    size = len(problem.base.parameters)
+    matrix = np.zeros((size, size))
+    for recording in recordings:
+        for motion in segments(recording, used):
+            thinned = motion.select(slice(None, None, used.decimation))
+            duration = float(motion.t[-1] - motion.t[0])
+            matrix += problem.information(thinned, duration * settings.rate).matrix
+    return matrix
+
+
+def _finite(value: float) -> float | None:
+    """Return a number, or None where JSON has none for it."""
+    return float(value) if np.isfinite(value) else None

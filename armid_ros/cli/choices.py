@@ -1,0 +1,41 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What options offer, as the packages have it: help shows it without importing them.
+
+A test holds each against what the package says.
+
+"""
+
+from __future__ import annotations
+
+#: Effects that are fitted if none are named; `armid_ros.effects.USUAL_EFFECTS`.
+USUAL_EFFECTS = ('viscous_friction', 'coulomb_friction', 'torque_offset')
+#: Effects of some size; `armid_ros.effects.catalogue.EXAMPLES`.
+EFFECT_EXAMPLES = 'viscous_friction:viscous_coefficient=0.1 or payload@wrist:payload_m=0.3'
+#: `armid_ros.identification.fitting.least_squares.ESTIMATORS`.
+ESTIMATORS = ('ols', 'wls', 'irls', 'iv')
+#: Units of time of a table; `armid_ros.recording.tables.settings.TIME_UNITS`.
+TIME_UNITS = ('s', 'ms', 'us', 'ns')
+#: `armid_ros.excitation.SPEED_CLASSES`.
+SPEED_CLASSES = ('slow', 'medium', 'fast')
+#: The longest run [s]; `armid_ros.excitation.schedule.MAX_DURATION`.
+MAX_DURATION = 86400.0
+#: What a design makes best, with what it is; `armid_ros.excitation.CRITERIA`.
+CRITERIA = {
+    'D': 'volume of the confidence ellipsoid, log det of the information',
+    'A': 'mean variance of the parameters, each scaled to the torque it makes',
+    'E': 'variance along the worst direction, parameters scaled to the torque they make',
+    'condition': 'condition number of the weighted regressor',
+    'T': 'torque that a rival model cannot explain',
+}
+#: Of which parameters; `armid_ros.excitation.TARGETS`.
+TARGETS = {
+    'all': 'all base parameters of the rigid body, and those of the effects',
+    'gravity': 'masses and first moments as an arm moving slowly shows them, and the effects',
+    'effects': 'those of the effects alone, the rigid body being known',
+}
+#: The kind of trajectory that is designed, and those for elastic joints;
+#: `armid_ros.cli.excite.springs.COURSES`.
+FOURIER = 'fourier'
+COURSES = ('multisine', 'steps')

@@ -1,0 +1,150 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+import shlex
+from typing import Any, TypeVar
+
+from armid_ros.cli.choices import USUAL_EFFECTS
+import click
+
+_Command = TypeVar('_Command', bound=Callable[..., Any])
+
+#: Where the context keeps what its commands share.
+FORCE, CRC, MEMORY = 'armid.force', 'armid.crc', 'armid.memory'
+PACKAGES = 'armid.packages'
+
+
+class OutPath(click.Path):
+    """A path to write to: an empty one, which would be the current folder, is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path."""
+        if not str(value).strip():
+            self.fail('the path is empty; name a folder, or . for this one', param, ctx)
+        return super().convert(value, param, ctx)
+
+
+gravity = click.option(
+    '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
+)
+joints = click.option(
+    '--joints',
+    default=None,
+    metavar='A,B,...',
+    help='Driven joints; all but grippers by default. A name with a comma is in double quotes.',
+)
+effects = click.option(
+    '--effects',
+    default=','.join(USUAL_EFFECTS),
+    show_default=True,
+    metavar='E,...',
+    help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
+)
+_out = click.option(
+    '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
+)
+force = click.option(
+    '--force',
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({FORCE: value}),
+    help='Write over results of another kind or robot, and over files of others.',
+)
+_crc = click.option(
+    '--crc/--no-crc',
+    default=True,
+    show_default=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({CRC: value}),
+    help='Compare the checksums of bags, and leave out what is damaged.',
+)
+_memory = click.option(
+    '--memory-limit',
+    type=click.FloatRange(0.0, min_open=True),
+    metavar='MB',
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({MEMORY: value}),
+    help='That a bag may take [MB]; a quarter of the memory by default.',
+)
+bag = click.option(
+    '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
+)
+bags = click.argument('bags', nargs=-1, required=True, type=click.Path(path_type=Path))
+validate = click.option(
+    '--validate',
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar='BAG',
+    help='A bag to predict and not to fit; may be given several times.',
+)
+cutoff = click.option(
+    '--cutoff', type=float, help='Of the position filter [Hz]; from the data by default.'
+)
+decimation = click.option('--decimation', type=int, help='Keep one sample of this many.')
+topic = click.option('--topic', help='JointState topic, where a bag has several.')
+seed = click.option(
+    '--seed',
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help='Of every random number.',
+)
+as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
+
+
+def robot_described(**values: Any) -> Callable[[_Command], _Command]:
+    """Add --robot, with what differs from any other option, and --package for its description."""
+    source = click.option(
+        '--robot',
+        'robot_source',
+        metavar='R',
+        callback=lambda context, _, value: _with_packages(value, context.meta.get(PACKAGES, [])),
+        **values,
+    )
+    packages = click.option(
+        '--package',
+        multiple=True,
+        metavar='P=FOLDER',
+        is_eager=True,
+        expose_value=False,
+        callback=lambda context, _, values: context.meta.update({PACKAGES: values}),
+        help='Folder of a ROS package that the description refers to; may be given several times.',
+    )
+    return lambda command: source(packages(command))
+
+
+def _with_packages(source: str | None, packages: Sequence[str]) -> str | None:
+    """Write packages behind the path of a description, where any program takes them."""
+    written = []
+    for text in packages:
+        name, _, folder = text.partition('=')
+        if not name or not folder or source in (None, '-'):
+            raise click.BadParameter(
+                f"'{text}' has to be P=FOLDER, with the file of a description as --robot",
+                param_hint='--package',
+            )
+        written.append(shlex.quote(f'package:{name}:={Path(folder).resolve()}'))
+    return ' '.join([source, *written]) if source and written else source
+
+
+robot = robot_described(
+    required=True,
+    help='Shipped name, path of a URDF, MJCF or xacro ("arm.xacro tool:=true" with '
+    'arguments), or - for the /robot_description in the bag. '
+    'A xacro is a program, which can read any file: name only one that you trust.',
+)
+
+
+def folder(command: _Command) -> _Command:
+    """Add --out, a folder of results, and --force, to write over others."""
+    return _out(force(command))
+
+
+def reading(command: _Command) -> _Command:
+    """Add the options that say how bags are read."""
+    return _crc(_memory(command))

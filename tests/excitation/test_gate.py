@@ -1,0 +1,54 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The check before a motion is sent always leaves a way to rest."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    Excitation,
+    Limits,
+    plan_run,
+    random_feasible,
+    transfer_limits,
+    TransferPlanner,
+)
+from armid_ros.excitation.gate import MotionGate
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope='module')
+def gate(two_link):
+    arm = ArmModel(two_link)
+    path = random_feasible(arm, Limits.of(two_link), 2.0, 3, np.random.default_rng(1))
+    excitation = Excitation(path, 1, 0.5)
+    planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0)
+    run = plan_run(excitation, planner, excitation.at([0.0]).q[0], 100.0)
+    return MotionGate.of(run, planner, 100.0)
+
+
+@pytest.mark.parametrize('share', [1.0, 1e-6])
+@pytest.mark.parametrize('where', [-1.0, 0.3, 0.7, 2.0])
+def test_a_stop_is_sent_on_the_path_whatever_the_acceleration_limit(gate, share, where):
+    strict = replace(
+        gate, limits=replace(gate.limits, acceleration=share * gate.limits.acceleration)
+    )
+    phase = float(np.clip(where, 0.0, 1.0)) * gate.run.duration
+    motion = strict.stop(where * gate.run.duration, 0.3, *np.full((2, 2), np.nan))
+    path = gate.run.at(np.arange(0.0, gate.run.duration + 1e-3, 1e-3)).q
+    away = np.abs(motion.q[:, np.newaxis] - path).max(axis=2).min(axis=1)
+    assert away.max() < 0.01
+    np.testing.assert_allclose(motion.dq[-1], 0.0, atol=1e-9)
+    assert np.all(np.abs(motion.dq) <= np.abs(gate.run.motion().dq).max(axis=0) + 1e-9)
+    assert np.abs(motion.q[0] - gate.run.at([phase]).q[0]).max() < 0.1
+
+
+def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
+    peak = np.abs(gate.run.motion().ddq).max(axis=0)
+    given = np.array([np.nan, 0.9 * peak[1]])
+    arm = ArmModel(two_link)
+    planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0, given)
+    with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
+        MotionGate.of(gate.run, planner, 100.0)

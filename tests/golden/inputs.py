@@ -1,0 +1,73 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recordings that the commands are tried on: the arm of the examples in closed-form motion.
+
+Monday, Tuesday: friction that the description lacks. Friday: 0.4 kg at the elbow as well. today_1,
+today_2: a spring at the shoulder. log.csv: Monday in degrees and amperes. fleet: two arms with
+four bags each, one of them damaged.
+
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+import shutil
+
+import armid_ros as ar
+from armid_ros.motion import Motion
+import numpy as np
+
+from benchmarks.fleet import generate
+from benchmarks.real_recordings import EMPS_URDF
+from docsite.desk import ARM, FRICTION, GAIN, LOAD
+
+SPRING = 'joint_spring@shoulder:spring_stiffness=2'
+DAYS = {
+    'monday': FRICTION,
+    'tuesday': FRICTION,
+    'friday': (*FRICTION, LOAD),
+    'today_1': (*FRICTION, SPRING),
+    'today_2': (*FRICTION, SPRING),
+}
+_RATE = 200.0  # Hz
+_DURATION = 16.0  # s
+_NOISE = 0.05  # N m
+
+
+def lay_out(folder: Path) -> None:
+    """Write the description, the bags and the table into a folder."""
+    urdf = folder / 'my_arm.urdf'
+    shutil.copy(ARM, urdf)
+    for seed, (day, effects) in enumerate(DAYS.items()):
+        run = recorded(ar.ArmModel.of(urdf, effects=effects), seed)
+        ar.write_recording(folder / day, run, robot_description=urdf.read_text())
+        if day == 'monday':
+            _write_table(folder / 'log.csv', run)
+    (folder / 'emps.urdf').write_text(EMPS_URDF, encoding='utf-8')
+    generate(folder / 'fleet', arms=2, bags=4, changed=0, damaged=1, seconds=12.0)
+
+
+def recorded(arm: ar.ArmModel, seed: int) -> ar.Recording:
+    """Return what noisy sensors record of a motion in closed form."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(_RATE * _DURATION)) / _RATE
+    q, dq, ddq = np.zeros((3, len(t), arm.robot.n_joints))
+    for hertz, size in ((0.125, 0.9), (0.4375, 0.4), (0.9375, 0.08)):
+        w = 2.0 * np.pi * hertz
+        angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, arm.robot.n_joints)
+        q += size * np.sin(angle)
+        dq += size * w * np.cos(angle)
+        ddq -= size * w * w * np.sin(angle)
+    motion = Motion(arm.robot.joints, t, q, dq, ddq)
+    tau = arm.torque(motion) + _NOISE * rng.normal(size=q.shape)
+    return ar.Recording(
+        joints=arm.robot.joints, t=t, q=q, dq=dq, tau=tau, start_ns=1_700_000_000 * 10**9
+    )
+
+
+def _write_table(path: Path, run: ar.Recording) -> None:
+    numbers = range(1, run.n_joints + 1)
+    names = ['t_ms', *(f'angle_deg_{k}' for k in numbers), *(f'amps_{k}' for k in numbers)]
+    rows = np.column_stack([1e3 * run.t, np.degrees(run.q), run.tau / GAIN])
+    np.savetxt(path, rows, fmt='%.9g', delimiter=',', header=','.join(names), comments='')

@@ -1,0 +1,204 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""An encoder that reads the same while its joint moves is dead; a joint that is held is not."""
+
+from dataclasses import replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis import diagnose
+from armid_ros.identification import grade, identify
+from armid_ros.identification.assess.dead_sensors import dead_encoders
+from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
+from armid_ros.inspection import inspect
+from armid_ros.recording import Recording
+import numpy as np
+import pytest
+
+from ..conftest import multisine
+
+RATE = 100.0
+JOINTS = range(6)
+
+
+def record(arm, seed, held=None, source='run', noise=0.01):
+    """Record a motion with velocities; one joint may be locked."""
+    motion = multisine(arm.robot.joints, 20.0, RATE, seed=seed, base_hz=0.12)
+    q, dq, ddq = (getattr(motion, name).copy() for name in ('q', 'dq', 'ddq'))
+    if held is not None:
+        q[:, held], dq[:, held], ddq[:, held] = 0.3, 0.0, 0.0
+    motion = replace(motion, q=q, dq=dq, ddq=ddq)
+    rng = np.random.default_rng(seed)
+    tau = arm.torque(motion)
+    tau = tau + noise * np.std(tau, axis=0) * rng.normal(size=tau.shape)
+    reads = 1e-5 * rng.normal(size=q.shape) * (np.arange(6) != held)
+    return Recording(joints=motion.joints, t=motion.t, q=q + reads, dq=dq, tau=tau, source=source)
+
+
+def stuck(recording, joint, since=0, velocity=True):
+    """Return a recording in which the position of a joint does not change any more."""
+    q, dq = recording.q.copy(), recording.dq.copy()
+    q[since:, joint] = q[since, joint]
+    if not velocity:
+        dq[since:, joint] = 0.0
+    return replace(recording, q=q, dq=dq)
+
+
+def said(robot, recording):
+    used = conditioning([recording], SignalSettings())
+    return list(dead_encoders(robot, recording, list(segments(recording, used))))
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+@pytest.mark.parametrize('since', [0, 1000])
+def test_a_velocity_that_goes_on_shows_a_dead_encoder(arm, joint, since):
+    (text,) = said(arm.robot, stuck(record(arm, 1), joint, since))
+    assert f'in run the position of {arm.robot.joints[joint]} stays at' in text
+    assert ('from 10.000 s' if since else 'throughout') in text
+    assert 'its encoder is dead' in text
+
+
+@pytest.mark.parametrize('joint', [4, 5])
+@pytest.mark.parametrize('seed', [1, 2])
+def test_a_torque_of_no_joint_at_rest_shows_a_dead_encoder(arm, joint, seed):
+    """The driver makes the velocity of the position, and has none."""
+    (text,) = said(arm.robot, stuck(record(arm, seed), joint, velocity=False))
+    assert f'the position of {arm.robot.joints[joint]} stays at' in text
+    assert 'its torque is not what' in text
+
+
+@pytest.mark.parametrize('joint', [4, 5])
+def test_an_encoder_that_dies_during_a_recording_is_dead_from_then_on(arm, joint):
+    (text,) = said(arm.robot, stuck(record(arm, 1), joint, since=1000, velocity=False))
+    assert f'the position of {arm.robot.joints[joint]} stays at' in text
+    assert 'from 10.000 s to 19.9' in text
+    assert text.endswith('its encoder is dead; leave that time out')
+
+
+def test_a_joint_that_turns_round_under_a_coarse_encoder_is_not_dead(arm):
+    """Its friction goes from one end to the other meanwhile, and it moves on afterwards."""
+    recording = stuck(record(arm, 1), 5, since=800, velocity=False)
+    q, dq, moves = recording.q.copy(), recording.dq.copy(), record(arm, 1)
+    q[1400:, 5], dq[1400:, 5] = moves.q[1400:, 5], moves.dq[1400:, 5]
+    assert said(arm.robot, replace(recording, q=q, dq=dq)) == []
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+def test_a_joint_that_waits_for_the_others_is_not_dead(arm, joint):
+    moves, waits = record(arm, 1), record(arm, 1, held=joint)
+    q, dq, tau = (
+        np.concatenate([getattr(moves, name)[:1000], getattr(waits, name)[1000:]])
+        for name in ('q', 'dq', 'tau')
+    )
+    assert said(arm.robot, replace(moves, q=q, dq=dq, tau=tau)) == []
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+def test_a_velocity_that_stays_while_its_position_moves_is_dead(arm, joint):
+    recording = record(arm, 1)
+    (text,) = said(arm.robot, replace(recording, dq=recording.dq * (np.arange(6) != joint)))
+    assert f'in run the velocity of {arm.robot.joints[joint]} stays at 0' in text
+
+
+@pytest.mark.parametrize(
+    ('stated', 'dead'), [(1.0, False), (0.98, False), (0.0, True), (-1.0, True)]
+)
+def test_a_constant_speed_is_dead_where_it_is_not_the_way_gone(arm, stated, dead):
+    """A turntable goes round; its velocity does not change by one count."""
+    run, speed = record(arm, 1), 0.7
+    q, dq = run.q.copy(), run.dq.copy()
+    q[:, 0] = q[0, 0] + speed * run.t
+    dq[:, 0] = stated * speed
+    turning = replace(run, q=q, dq=dq)
+    found = [text for text in dead_encoders(arm.robot, turning) if 'velocity' in text]
+    assert bool(found) == dead
+    remarks = [one.text for one in inspect(turning, rng=np.random.default_rng(0)).remarks]
+    assert any('one of the two is dead' in text for text in remarks) == dead
+    assert not any('are zero while' in text for text in remarks)
+
+
+def test_a_driver_that_measures_no_velocities_is_not_dead(arm):
+    recording = record(arm, 1)
+    assert said(arm.robot, replace(recording, dq=0.0 * recording.dq)) == []
+    assert said(arm.robot, replace(recording, dq=None)) == []
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_a_joint_that_is_held_is_not_dead(arm, joint, seed):
+    """Weight and the other joints make its torque, with masses that are described wrongly."""
+    links = arm.robot.rigid_parameters.reshape(-1, 10)
+    scale = np.random.default_rng(seed).uniform(0.8, 1.2, (6, 1))
+    other = ArmModel(arm.robot.with_inertias((links * scale).ravel()), arm.effects, arm.values)
+    recording = record(other, seed, held=joint)
+    assert said(arm.robot, recording) == []
+    noise = np.random.default_rng(0).normal(size=len(recording)) * 5e-3
+    dq = recording.dq.copy()
+    dq[:, joint] = 1e-3 + noise
+    assert said(arm.robot, replace(recording, dq=dq)) == []
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+def test_friction_that_takes_a_part_of_what_it_holds_is_not_dead(arm, joint):
+    """The drive gives the load less what friction holds, which lags behind it."""
+    recording = record(arm, 1, held=joint)
+    load = recording.tau[:, joint]
+    most, given = 0.3 * np.ptp(load), np.empty_like(load)
+    given[0] = load[0]
+    for k in range(1, len(load)):
+        given[k] = np.clip(given[k - 1], load[k] - most, load[k] + most)
+    tau = recording.tau.copy()
+    tau[:, joint] = given
+    assert said(arm.robot, replace(recording, tau=tau)) == []
+
+
+@pytest.mark.parametrize('joint', JOINTS)
+def test_a_brake_with_the_noise_of_its_sensor_is_not_dead(arm, joint):
+    """Noise that drifts is no motion, as long as it is as small as noise of torques is."""
+    recording = record(arm, 1, held=joint)
+    walk = np.cumsum(np.random.default_rng(0).normal(size=len(recording)))
+    tau = recording.tau.copy()
+    tau[:, joint] = 0.005 * arm.robot.torque_limit[joint] * walk / np.std(walk)
+    assert said(arm.robot, replace(recording, tau=tau)) == []
+
+
+def test_a_coarse_encoder_of_slow_motion_is_not_dead(arm):
+    recording = record(arm, 1)
+    step = 5e-3
+    assert said(arm.robot, replace(recording, q=step * np.round(recording.q / step))) == []
+
+
+@pytest.fixture(scope='module')
+def blind(arm):
+    return stuck(record(arm, 1), 5)
+
+
+@pytest.fixture(scope='module')
+def locked(arm):
+    return record(arm, 1, held=5)
+
+
+def test_identification_grades_the_one_as_unusable_and_not_the_other(structure, blind, locked):
+    for recording, word in ((blind, 'unusable'), (locked, 'poor')):
+        result = identify(structure, [recording], rng=np.random.default_rng(0))
+        found = grade(result, structure, [recording], {})
+        assert found.word == word
+        assert ('encoder is dead' in ' '.join(found.reasons)) == (word == 'unusable')
+        assert word == 'unusable' or found.reasons[0].startswith('Not identified')
+
+
+def test_inspection_says_so_with_and_without_a_robot(arm, blind, locked):
+    for robot in (arm.robot, None):
+        found = inspect(blind, robot, rng=np.random.default_rng(0))
+        assert found.remarks[0].weight == 'bad'
+        assert 'encoder is dead' in found.remarks[0].text
+        sound = inspect(locked, robot, rng=np.random.default_rng(0))
+        assert not any(remark.weight == 'bad' for remark in sound.remarks)
+
+
+def test_a_diagnosis_calls_it_bad_data(arm, blind, locked):
+    before = [record(arm, 2, source='before')]
+    found = diagnose(arm, [blind], baseline=before, rng=np.random.default_rng(0))
+    assert found.verdict == 'bad_data'
+    assert 'in run the position of wrist_pitch stays' in found.summary
+    sound = diagnose(arm, [locked], baseline=before, rng=np.random.default_rng(0))
+    assert sound.verdict != 'bad_data'

@@ -1,0 +1,62 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""No sample of an arm without noise is left out: at rest its signals tell nothing of the noise."""
+
+from __future__ import annotations
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.excitation import Excitation, Limits, random_feasible
+from armid_ros.identification.online.identifier import OnlineIdentifier
+from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.robots import load_robot
+from armid_ros.simulation import Reference, SimulatedArm
+import numpy as np
+import pytest
+
+REST = 0.6
+
+
+def clean(rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return stamps, and position and torque of a joint that stands still and then moves."""
+    t = np.arange(0.0, 4.0, 1.0 / rate)
+    phase = np.clip((t - REST) / 3.0, 0.0, 1.0)
+    q = 1.2 + 0.8 * phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
+    ddq = np.gradient(np.gradient(q, t), t)
+    return t, np.column_stack([q, 2.0 * ddq + 5.0 * np.cos(q)])
+
+
+@pytest.mark.parametrize('rate', [100.0, 200.0, 500.0, 1000.0])
+@pytest.mark.parametrize('rounding', [0.0, 1e-12, 1e-8])
+def test_a_joint_that_begins_to_move_keeps_all_samples(rate: float, rounding: float) -> None:
+    t, signals = clean(rate)
+    signals = signals + rounding * np.random.default_rng(0).standard_normal(signals.shape)
+    gate = joint_gate([False], 'qt', torque_limit=[50.0])
+    good = [one for at, x in zip(t, signals, strict=True) for one in gate.take(at, x)]
+    assert len(good) + len(gate.rest()) == len(t)
+    assert not gate.rejected
+    assert not any(one.begins for one in good)
+
+
+def test_damage_of_a_clean_stream_is_left_out() -> None:
+    t, signals = clean(500.0)
+    signals[1000, 0] += 0.01
+    gate = joint_gate([False], 'qt', torque_limit=[50.0])
+    good = [one.t for at, x in zip(t, signals, strict=True) for one in gate.take(at, x)]
+    assert t[1000] not in good and gate.rejected == {'spike': 1}
+
+
+def test_the_identifier_uses_every_state_of_a_simulation_without_noise() -> None:
+    robot = load_robot('humanoid_arm', gravity='moon')
+    arm = ArmModel(robot).with_effect(make_effect('torque_offset', robot))
+    rng = np.random.default_rng(0)
+    motion = random_feasible(arm, Limits.of(robot, speed='medium'), 2.0, 3, rng)
+    run = Excitation(motion, 1, 0.5)
+    plant = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
+    identifier = OnlineIdentifier(arm, rng=rng)
+    for k in range(700):
+        if k == 200:
+            plant.set_trajectory(Reference.of(run.motion(100.0)))
+        sample = plant.advance(2)
+        identifier.update(plant.state.t, sample.q, sample.dq, sample.tau)
+    assert not identifier.rejected and not identifier.restarts and not identifier.missing
