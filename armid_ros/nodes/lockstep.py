@@ -146,7 +146,9 @@ def run_lockstep(
     """
     with Stage(domain) as stage:
         learner = stage.add(OnlineIdentifierNode, identifier)
-        run = _Run(stage, arm, excitation, bag, topics, rate, approach, start_ns, learner)
+        recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
+        run = _Run(stage, arm, start_ns, rate, recorder, learner)
+        run.begin(excitation, approach)
         watch = _Watch(learner, run.duration, on_progress, period)
         while watch.t < watch.duration:
             watch.see(run.step() - start_ns)
@@ -183,7 +185,9 @@ def record_lockstep(
 
     """
     with Stage(domain) as stage:
-        run, t = _Run(stage, arm, excitation, bag, topics, rate, approach, EPOCH_NS), 0.0
+        recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
+        run, t = _Run(stage, arm, EPOCH_NS, rate, recorder), 0.0
+        run.begin(excitation, approach)
         while t < run.duration:
             t = (run.step() - EPOCH_NS) * 1e-9
             if on_progress is not None:
@@ -299,38 +303,39 @@ class Stage:
 
 
 class _Run:
-    """An excitation that is under way: duration is the time from the first stamp on [s]."""
+    """An excitation of an arm; duration is the time from the first stamp to its end [s]."""
 
     def __init__(
         self,
         stage: Stage,
         arm: SimulatedArm,
-        excitation: Excitation,
-        bag: Path,
-        topics: Sequence[str],
-        rate: float,
-        approach: float,
         start_ns: int,
+        rate: float,
+        recorder: RecorderNode,
         learner: OnlineIdentifierNode | None = None,
     ) -> None:
-        self._stage, self._learner = stage, learner
+        self._stage, self._recorder, self._learner = stage, recorder, learner
+        self._robot, self._start_ns = arm.plant.robot, start_ns
         self._plant = stage.add(
             SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
         )
-        self._recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
+        self.duration = 0.0
+
+    def begin(self, excitation: Excitation, approach: float) -> None:
+        """Wait until everybody hears everybody, and start the excitation."""
+        stage, plant = self._stage, self._plant
         # The simulated arm looks at the limits, and nothing in a simulation can be hit.
-        planner = TransferPlanner(ArmModel(arm.plant.robot), None, None, 0.0)
+        planner = TransferPlanner(ArmModel(self._robot), None, None, 0.0)
         publisher = stage.add(
             ExcitationPublisherNode, excitation, planner, start=False, approach=approach
         )
         stage.spin_until(lambda: self._connected(publisher), 'discovery')
-        for _ in range(max(math.ceil(_SEEN * rate), AGREEING) + 1):
+        for _ in range(max(math.ceil(_SEEN * plant.value('rate')), AGREEING) + 1):
             begun = self.step()
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()
-        plant = self._plant
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        self.duration = publisher.duration + (begun - start_ns) * 1e-9 + _REST
+        self.duration = publisher.duration + (begun - self._start_ns) * 1e-9 + _REST
 
     def _connected(self, publisher: ExcitationPublisherNode) -> bool:
         """Whether everybody hears everybody, and the clock."""

@@ -16,6 +16,7 @@ from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.recording import (
+    Clock,
     PositionRange,
     ReadReport,
     Recording,
@@ -130,13 +131,7 @@ def assemble(
     counts: Counter[str] = Counter()
     gathered = gather(pieces)
     pieces.clear()
-    clock, note = choose_clock(gathered)
-    for states in gathered if clock == 'receive' else ():
-        problem = clock_problem(states.receive, states.position)
-        if problem:
-            raise RecordingError(
-                f'{where} has no usable time: {note}, and receive times {problem}'
-            )
+    clock, note = _usable_clock(where, gathered)
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
     q, dq, tau, absent = _measured_quantities(where, series)
     kept, culprits = _finite(where, joints, series.stamps, (q, dq, tau), counts)
@@ -180,6 +175,18 @@ def assemble(
         report=report,
         others=tuple(PositionRange(name, *ends) for name, ends in decoder.others.items()),
     )
+
+
+def _usable_clock(where: str, gathered: Sequence[JointStates]) -> tuple[Clock, str]:
+    """Return whose time to use, and why not the header's; refuse a recording without a time."""
+    clock, note = choose_clock(gathered)
+    for states in gathered if clock == 'receive' else ():
+        problem = clock_problem(states.receive, states.position)
+        if problem:
+            raise RecordingError(
+                f'{where} has no usable time: {note}, and receive times {problem}'
+            )
+    return clock, note
 
 
 def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:

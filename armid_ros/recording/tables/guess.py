@@ -32,24 +32,6 @@ _NUMBER = re.compile(r'\d+')
 
 
 @dataclass(frozen=True)
-class Guess:
-    """
-    A family of columns that may be a quantity.
-
-    Attributes
-    ----------
-    chosen : ChosenColumns
-        Its columns.
-    score : float
-        How much speaks for it.
-
-    """
-
-    chosen: ChosenColumns
-    score: float
-
-
-@dataclass(frozen=True)
 class Incomplete:
     """
     A family of columns that may be a quantity, but for some joints.
@@ -79,7 +61,7 @@ def guess(
     quantity: QuantityName,
     joints: Sequence[str] | None,
     rename: Sequence[tuple[str, str]] = (),
-) -> list[Guess]:
+) -> list[ChosenColumns]:
     """
     Return the families that may be a quantity, the likeliest first.
 
@@ -98,14 +80,14 @@ def guess(
     groups = _groups(table, joints, rename).items()
     families = (_in_order(pattern, members, joints, rename) for pattern, members in groups)
     scored = [
-        Guess(chosen, _score(chosen.pattern, quantity) - _still(chosen))
+        (_score(chosen.pattern, quantity) - _still(chosen), chosen)
         for chosen in families
         if chosen is not None
     ]
-    likely = [one for one in scored if one.score > 0.0]
-    best: dict[tuple[TableColumn, ...], Guess] = {}
-    for one in sorted(likely, key=lambda one: (-one.score, -len(one.chosen.columns))):
-        best.setdefault(one.chosen.columns, one)
+    likely = [one for one in scored if one[0] > 0.0]
+    best: dict[tuple[TableColumn, ...], ChosenColumns] = {}
+    for _, one in sorted(likely, key=lambda one: (-one[0], -len(one[1].columns))):
+        best.setdefault(one.columns, one)
     return list(best.values())
 
 

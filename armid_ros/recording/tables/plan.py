@@ -260,16 +260,16 @@ def _source(
         guesses = guess(table, quantity, joints, settings.rename)
         if not guesses:
             return None
-        chosen = guesses[0].chosen
+        chosen = guesses[0]
         for column in chosen.columns:
             table.column(column.bare_name)  # which has to be one
         taken = {id(column) for column in chosen.columns}
         rivals = tuple(
             dict.fromkeys(
-                one.chosen.pattern
+                one.pattern
                 for one in guesses[1:]
-                if not taken & {id(column) for column in one.chosen.columns}
-                and len(one.chosen.columns) == len(chosen.columns)
+                if not taken & {id(column) for column in one.columns}
+                and len(one.columns) == len(chosen.columns)
             )
         )[:4]
     unit = next((column.unit for column in chosen.columns if column.unit), '')

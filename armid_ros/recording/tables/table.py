@@ -49,6 +49,8 @@ class TableColumn:
         Name of the array it is an element of; empty for a column of its own.
     unit : str
         What the name, or a line below the names, says; empty where nothing does.
+    filled : bool
+        Whether the file has a finite number in it, be it beyond all quantities.
 
     """
 
@@ -56,9 +58,11 @@ class TableColumn:
     values: FloatArray
     array: str = ''
     unit: str = ''
+    filled: bool = field(init=False)
 
     def __post_init__(self) -> None:
         """Freeze the values, and take the unit from the name where none was given."""
+        object.__setattr__(self, 'filled', bool(np.isfinite(self.values).any()))
         with np.errstate(invalid='ignore'):  # of rubbish that is a signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
@@ -106,7 +110,7 @@ class Table:
 
     def __post_init__(self) -> None:
         """Set columns without numbers apart; refuse tables that are empty or ragged."""
-        there = tuple(one for one in self.columns if np.isfinite(one.values).any())
+        there = tuple(one for one in self.columns if one.filled)
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
         object.__setattr__(self, 'words', {**empty, **self.words})
