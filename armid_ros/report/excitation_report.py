@@ -222,7 +222,7 @@ def _kept(shares: Mapping[str, FloatArray], limits: Limits, checked: Fitness) ->
         text += f'; {checked.height()} at {checked.lowest.time:.1f} s'
     if checked.unchecked:
         missing = '; '.join(checked.unchecked)
-        text += f'. Not checked, confirm before running: {missing}'
+        text += f'. It is fit to run only if you confirm what was not checked: {missing}'
     return f'{text}.'
 
 

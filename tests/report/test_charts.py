@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Charts are small, true to the data, and cannot break out of their script."""
 
+from base64 import b64decode
+from io import BytesIO
 import json
 import re
 
 from armid_ros.report import Bar, BarChart, Chart, Series, thinned
-from armid_ros.report.charts import joined, joined_time, rounded
+from armid_ros.report.charts import image_data, joined, joined_time, rounded
+from matplotlib.image import imread
 import numpy as np
 
 
@@ -76,3 +79,12 @@ def test_bars_of_nothing_have_no_length():
     chart = BarChart([('<b>', [Bar(0.0, 'floor')])], 'N m')
     assert 'width: 0.0%' in chart.html()
     assert '<b>' not in chart.html() and '&lt;b&gt;' in chart.html()
+
+
+def test_an_image_is_a_png_of_its_pixels():
+    colour = np.array([[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    data = image_data(colour, np.array([[1.0, -0.5]]))
+    kind, _, content = data.partition(',')
+    assert kind == 'data:image/png;base64'
+    pixels = imread(BytesIO(b64decode(content)), format='png')
+    np.testing.assert_allclose(pixels, [[[1, 0, 0, 1], [0, 0, 1, 0.5]]], atol=1 / 255)

@@ -107,11 +107,11 @@ def test_what_the_run_does_not_show_comes_first(case, planned):
     matrix[0], matrix[:, 0] = 0.0, 0.0
     blind = replace(planned, information=replace(planned.information, matrix=matrix))
     page = excitation_report(blind, case.truth, robot='r', scene=scene_of(case.truth.robot))
-    assert 'Not seen at all: ' in page and '>blind<' in page
+    assert 'Not identifiable from this run: ' in page and '>blind<' in page
 
 
 def test_nothing_to_keep_apart_is_said(planned):
-    assert 'nothing to keep apart' in PlannedClearance(np.arange(3.0), {}, 0.01, ()).html()
+    assert 'Clearance is not checked' in PlannedClearance(np.arange(3.0), {}, 0.01, ()).html()
 
 
 def test_bodies_are_drawn_where_they_are():
@@ -142,4 +142,4 @@ def test_an_arm_without_bodies_is_drawn_though_its_links_are_points_for_the_floo
     whole = with_obstacles(collision, floor_obstacles(collision, floor, 0.01))
     poses = np.zeros((1, robot.n_joints))
     drawn = draw_silhouettes(whole, poses, ['now'], poses)
-    assert sum(share >= 0 for _, share in drawn.bodies) == 2 * robot.n_joints
+    assert sum(share >= 0 for _, share in drawn.bodies) == robot.n_joints + 1

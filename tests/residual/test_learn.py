@@ -122,8 +122,10 @@ def test_the_page_says_what_is_in_the_model_that_is_written(unknown):
         asked, DiagnosedRecordings(), robot='two_links', extras=Extras(residual=learned)
     )
     joint = asked.arm.robot.joints[1]
-    assert f'learned of {joint}' in page and f'{joint}: the map' in page
-    assert 'was learned' not in plain
+    assert 'The model is unchanged.' not in page
+    assert f'the learned residual of {joint}' in page
+    assert f'{joint}: the map predicts' in page
+    assert 'the learned residual of' not in plain
     begin, end = page.index('>What to do next</h2>'), page.index('>Data quality</h2>')
     assert joint in page[begin:end]
 

@@ -90,18 +90,12 @@ class JointErrors(Section):
 
 
 @dataclass(frozen=True)
-class FitSection(Section):
+class FitSection(JointErrors):
     """
-    How well the model predicts the torques.
+    How well the model predicts the torques: `JointErrors` with curves.
 
     Attributes
     ----------
-    robot : Robot
-        Gives joints and units.
-    training : mapping of str to sequence of Fit
-        Data it was fitted to, by recording.
-    validation : mapping of str to sequence of Fit
-        Held-out data, by recording.
     reach : ndarray, shape (n,)
         Half width of the 95 % interval of the predicted torque [N m].
 
@@ -110,9 +104,6 @@ class FitSection(Section):
     title: ClassVar[str] = 'Fit'
     template: ClassVar[str] = 'fit.html'
 
-    robot: Robot
-    training: Mapping[str, Sequence[Fit]]
-    validation: Mapping[str, Sequence[Fit]]
     reach: FloatArray
 
     @property
@@ -122,11 +113,6 @@ class FitSection(Section):
             f'{name} ±{digits(self.reach[joint])} {torque_unit(self.robot, joint)}'
             for joint, name in enumerate(self.robot.joints)
         )
-
-    @property
-    def bars(self) -> BarChart:
-        """Relative error of each joint, held-out and training."""
-        return JointErrors(self.robot, self.training, self.validation).bars
 
     @property
     def errors(self) -> list[tuple[str, str, float]]:
