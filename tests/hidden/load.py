@@ -12,11 +12,8 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, named_body, Parameter
 from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, pick, Setting
-
-_NAMES = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
-_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
 @dataclass(frozen=True)
@@ -41,10 +38,7 @@ class _Ball(InJoint):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         values = body_parameters(self.mass, np.array(self.centre), self.inertia * np.eye(3))
-        return tuple(
-            Parameter(self.label.format(name), self.joint, float(value), unit)
-            for name, value, unit in zip(_NAMES, values, _UNITS, strict=True)
-        )
+        return named_body(self.label, self.joint, values)
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         body = spec.joint(self.joint).parent.add_body(name=self.name, ipos=self.centre)
