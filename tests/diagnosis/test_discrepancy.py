@@ -86,7 +86,6 @@ def by_load(bench, motion):
     ('curve', 'before', 'today'),
     [
         (slow_at_low_speed, 0, 2),
-        (saturating, 0, 2),
         (saturating, 0, 1),
         (of_position, 1, 2),
         (by_load, 2, 0),

@@ -40,8 +40,7 @@ def coming_to_rest(bench, held, seed=0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('baseline', [False, True])
-@pytest.mark.parametrize('held', [0.28, -0.28])
+@pytest.mark.parametrize(('held', 'baseline'), [(0.28, False), (-0.28, True)])
 def test_what_friction_holds_is_no_gap(bench, held, baseline):
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
     found = diagnose(
@@ -54,8 +53,9 @@ def test_what_friction_holds_is_no_gap(bench, held, baseline):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('baseline', [False, True])
-@pytest.mark.parametrize('part', ['recordings', 'validate'])
+@pytest.mark.parametrize(
+    ('part', 'baseline'), [('recordings', False), ('recordings', True), ('validate', True)]
+)
 def test_more_than_friction_holds_is_said(bench, baseline, part):
     """An arm that leans on a table stands still, and no row of it tells a model anything."""
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []

@@ -129,7 +129,7 @@ def test_interrupt_keeps_the_best_so_far(two_link_arm, quick):
     assert check_limits(result.limits, motion, two_link_arm.torque(motion)) == ()
 
 
-@pytest.mark.parametrize('processes', [1, 2])
+@pytest.mark.parametrize('processes', [1, pytest.param(2, marks=pytest.mark.long)])
 def test_time_budget_ends_the_search_with_the_best_so_far(two_link_arm, quick, processes):
     """One that is used up before anything is found is of a slow computer, and no error."""
     settings = replace(quick, time_budget=1e-9, processes=processes, iterations=100000)

@@ -55,9 +55,7 @@ def test_limits_that_no_pose_keeps_together_are_named(two_link_arm):
         random_feasible(two_link_arm, limits, 6.0, 3, np.random.default_rng(0))
 
 
-@pytest.mark.parametrize(
-    'name', ['coulomb_friction', 'presliding_hysteresis', 'stribeck_friction']
-)
+@pytest.mark.parametrize('name', ['coulomb_friction', 'presliding_hysteresis'])
 def test_friction_beyond_the_torque_limit_is_no_room_to_move(two_link, name):
     arm = ArmModel(two_link).with_effect(make_effect(name, two_link), [100.0, 0.0])
     with pytest.raises(TrajectoryError, match=r'standing still.*shoulder: torque'):

@@ -11,6 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+#: Name and unit of the ten parameters of a body.
+BODY = {
+    **{'m': 'kg', 'mx': 'kg m', 'my': 'kg m', 'mz': 'kg m'},
+    **dict.fromkeys(('Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz'), 'kg m^2'),
+}
 
 
 @dataclass(frozen=True)
@@ -86,3 +91,11 @@ class Sized:
             Parameter(name, joint, getattr(self, attribute), unit)
             for name, attribute, unit in self.stated
         )
+
+
+def named_body(label: str, joint: str, values: FloatArray) -> tuple[Parameter, ...]:
+    """Return the ten parameters of a body, named after a label with a place for each name."""
+    return tuple(
+        Parameter(label.format(name), joint, float(value), unit)
+        for (name, unit), value in zip(BODY.items(), values, strict=True)
+    )

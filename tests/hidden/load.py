@@ -5,89 +5,68 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 from armid_ros.robots import Robot
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, named_body, Parameter
 from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, pick, Setting
 
-_NAMES = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
-_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
-
 
 @dataclass(frozen=True)
-class Payload(InJoint):
+class _Ball(InJoint):
+    """A body welded to a link, of equal inertia about all axes."""
+
+    rigid = True
+    sized_by = 'mass'
+    #: What the names of the ten parameters are made of.
+    label: ClassVar[str]
+    #: Inertia over mass times squared radius, and the radius [m].
+    shape: ClassVar[tuple[float, float]]
+    mass: float
+    centre: tuple[float, float, float]
+
+    @property
+    def inertia(self) -> float:
+        """Inertia about any axis through the centre of mass [kg m^2]."""
+        share, radius = self.shape
+        return share * self.mass * radius**2
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        values = body_parameters(self.mass, np.array(self.centre), self.inertia * np.eye(3))
+        return named_body(self.label, self.joint, values)
+
+    def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
+        body = spec.joint(self.joint).parent.add_body(name=self.name, ipos=self.centre)
+        body.mass, body.inertia = self.mass, np.full(3, self.inertia)
+        body.explicitinertial = True
+
+
+class Payload(_Ball):
     """A solid ball welded to the last link."""
 
-    name = 'payload'
-    sized_by = 'mass'
-    rigid = True
-    mass: float
-    centre: tuple[float, float, float]
-    radius: float = 0.03
+    name, label, shape = 'payload', 'payload_{}', (0.4, 0.03)
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        joint = setting.robot.joints[-1]
         mass = 0.003 * float(setting.robot.rigid_parameters[::10].sum())
-        direction = rng.normal(size=3)
-        centre = 0.1 * direction / np.linalg.norm(direction)
-        return cls(joint, mass, tuple(centre.tolist()))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        inertia = 0.4 * self.mass * self.radius**2 * np.eye(3)
-        values = body_parameters(self.mass, np.array(self.centre), inertia)
-        return tuple(
-            Parameter(f'payload_{name}', self.joint, float(value), unit)
-            for name, value, unit in zip(_NAMES, values, _UNITS, strict=True)
-        )
-
-    def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
-        body = spec.joint(self.joint).parent.add_body(name='payload', ipos=self.centre)
-        body.mass = self.mass
-        body.inertia = np.full(3, 0.4 * self.mass * self.radius**2)
-        body.explicitinertial = True
+        return cls(setting.robot.joints[-1], mass, _centre(rng))
 
 
-@dataclass(frozen=True)
-class LinkInertia(InJoint):
+class LinkInertia(_Ball):
     """One link heavier, its centre of mass elsewhere, than the description says."""
 
-    name = 'link_inertia'
-    sized_by = 'mass'
-    rigid = True
-    index: int
-    mass: float
-    centre: tuple[float, float, float]
+    name, label, shape = 'link_inertia', '{}_difference', (0.1, 0.05)
 
     @classmethod
     def draw(cls, setting: Setting, rng: np.random.Generator) -> Self:
-        n = setting.robot.n_joints
-        j = int(rng.integers(1, n - 1))
+        j = int(rng.integers(1, setting.robot.n_joints - 1))
         mass = 0.02 * float(setting.robot.rigid_parameters.reshape(-1, 10)[1:, 0].mean())
-        direction = rng.normal(size=3)
-        centre = 0.1 * direction / np.linalg.norm(direction)
-        return cls(setting.robot.joints[j], j, mass, tuple(centre.tolist()))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        inertia = 0.1 * self.mass * 0.05**2 * np.eye(3)
-        values = body_parameters(self.mass, np.array(self.centre), inertia)
-        return tuple(
-            Parameter(f'{name}_difference', self.joint, float(value), unit)
-            for name, value, unit in zip(_NAMES, values, _UNITS, strict=True)
-        )
-
-    def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
-        body = spec.joint(self.joint).parent.add_body(name='difference', ipos=self.centre)
-        body.mass = self.mass
-        body.inertia = np.full(3, 0.1 * self.mass * 0.05**2)
-        body.explicitinertial = True
+        return cls(setting.robot.joints[j], mass, _centre(rng))
 
 
 @dataclass(frozen=True)
@@ -152,6 +131,12 @@ class RotorInertia(OneJoint):
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
         spec.joint(self.joint).armature += self.value
+
+
+def _centre(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Draw a place 0.1 m from the frame of a joint."""
+    direction = rng.normal(size=3)
+    return tuple((0.1 * direction / np.linalg.norm(direction)).tolist())
 
 
 def body_parameters(mass: float, centre: FloatArray, inertia: FloatArray) -> FloatArray:

@@ -17,19 +17,6 @@ from tests.hidden.specification import case_list, find_case, SETS
 
 pytestmark = pytest.mark.long
 
-DESIGNED = (
-    'viscous_friction coulomb_friction stribeck_friction asymmetric_friction quadratic_friction '
-    'load_dependent_friction presliding_hysteresis thermal_friction coupled_joint_friction '
-    'torque_offset torque_drift torque_gain torque_crosstalk torque_lag time_delay encoder_offset '
-    'rotor_inertia payload link_inertia gravity_magnitude base_tilt joint_elasticity backlash '
-    'torque_ripple joint_spring joint_coupling soft_limit actuator_saturation human_interaction '
-    'interface_slack'
-).split()
-
-
-def test_every_name_of_the_catalogue_is_hidden():
-    assert sorted(CATALOGUED) == sorted(DESIGNED)
-
 
 @pytest.mark.parametrize('name', SETS)
 def test_lists_have_what_was_asked_for(name):

@@ -5,23 +5,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.hidden.arrays import FloatArray, Parameter
+from tests.hidden.arrays import FloatArray, named_body, Parameter
 from tests.hidden.lived.causes.base import Cause, JointCause, Scene
 from tests.hidden.lived.chain import body_vector, Chain
-
-_BODY = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
-_BODY_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
 @dataclass(frozen=True)
 class Body(JointCause):
     """A ball fixed to a link; the value is its mass [kg]."""
 
+    #: What the names of the ten parameters are made of.
+    label: ClassVar[str]
     centre: tuple[float, float, float]
     radius: float
 
@@ -31,6 +30,10 @@ class Body(JointCause):
         central = 0.4 * self.value * self.radius**2 * np.eye(3)
         return body_vector(self.value, np.array(self.centre), central)
 
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return named_body(self.label, self.joint, self.body)
+
     def bodies(self, chain: Chain) -> Chain:
         return chain.with_body(self.index, self.body)
 
@@ -38,7 +41,7 @@ class Body(JointCause):
 class Payload(Body):
     """Something in the hand."""
 
-    name = 'payload'
+    name, label = 'payload', 'payload_{}'
     factors = (0.01, 20.0)
 
     @classmethod
@@ -49,18 +52,11 @@ class Payload(Body):
         centre *= rng.uniform(0.03, 0.15) / np.linalg.norm(centre)
         return cls(scene.chain.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.02, 0.06))
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(
-            Parameter(f'payload_{name}', self.joint, float(value), unit)
-            for name, value, unit in zip(_BODY, self.body, _BODY_UNITS, strict=True)
-        )
-
 
 class Link(Body):
     """Something mounted on a link in the middle of the arm."""
 
-    name = 'link_inertia'
+    name, label = 'link_inertia', '{}_difference'
 
     @classmethod
     def draw(cls, scene: Scene, rng: np.random.Generator) -> Self:
@@ -70,13 +66,6 @@ class Link(Body):
         centre *= rng.uniform(0.08, 0.2) / np.linalg.norm(centre)
         mass = 0.08 * float(scene.chain.bodies[1:, 0].sum())
         return cls(scene.chain.joints[j], j, mass, tuple(centre.tolist()), rng.uniform(0.03, 0.06))
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(
-            Parameter(f'{name}_difference', self.joint, float(value), unit)
-            for name, value, unit in zip(_BODY, self.body, _BODY_UNITS, strict=True)
-        )
 
 
 @dataclass(frozen=True)
