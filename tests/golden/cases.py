@@ -16,6 +16,7 @@ from click.testing import CliRunner
 import numpy as np
 
 from benchmarks.lived import judge
+from benchmarks.two_days import Answer
 from tests.golden.facts import facts
 
 ROOT = Path(__file__).parents[2]
@@ -202,4 +203,21 @@ def lived_answer(kind: str, index: int) -> Any:
     if judged is None:
         return {}
     pair = {'answer': judged.answer, 'day_before': judged.again}
-    return facts({key: asdict(value) for key, value in pair.items() if value is not None})
+    return facts({key: _of_answer(value) for key, value in pair.items() if value is not None})
+
+
+def _of_answer(answer: Answer) -> dict[str, Any]:
+    """Return verdict and headline, with the parameters as records of a value and its deviation."""
+    return {
+        'verdict': answer.verdict,
+        'headline': [
+            {
+                **asdict(named),
+                'parameters': [
+                    dict(zip(('name', 'joint', 'value', 'std'), row, strict=True))
+                    for row in named.parameters
+                ],
+            }
+            for named in answer.headline
+        ],
+    }
