@@ -72,6 +72,14 @@ def test_contract_lists_the_layers_in_order(root):
         ('effects/x.py', 'from rclpy.node import Node', 'is not allowed to import rclpy'),
         ('model/x.py', 'import sensor_msgs.msg', 'is not allowed to import sensor_msgs'),
         ('novelty.py', 'import numpy', 'novelty'),
+        (
+            'cli/x.py',
+            'import armid_ros.papers.exo.plant',
+            'armid_ros.cli is not allowed to import',
+        ),
+        ('cli/x.py', 'import armid_ros.fleet.bags', 'armid_ros.cli is not allowed'),
+        ('papers/lunar/x.py', 'import armid_ros.papers.exo', 'not allowed to import'),
+        ('papers/exo/plant/x.py', 'import rclpy', 'is not allowed to import rclpy'),
     ],
 )
 def test_breach_is_seen(project, place, line, offence):
