@@ -12,8 +12,7 @@ from __future__ import annotations
 import argparse
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import Diagnosis
-from armid_ros.diagnosis.ties.diagnosis import diagnose_beside
+from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings
 from armid_ros.effects.tied import Partner
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.identification.ties.recorded import (
@@ -121,7 +120,8 @@ def recorded_pair(partner: Partner, straps: Straps, seed: int) -> list[Recording
 
 def _diagnosis(partner: Partner, recordings: list[Recording]) -> Diagnosis:
     arm = ArmModel(load_robot('exoskeleton_legs'))
-    return diagnose_beside(arm, recordings, partner, rng=np.random.default_rng(0))
+    settings = DiagnosisSettings(partner=partner)
+    return diagnose(arm, recordings, settings=settings, rng=np.random.default_rng(0))
 
 
 def _said(found: Diagnosis) -> str:

@@ -269,7 +269,6 @@ def diagnose(
     everything: bool = False,
     misfit: Misfit | None = None,
     partner: Partner | None = None,
-    tied: Any = None,
     rng: Rng = 0,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -306,8 +305,6 @@ def diagnose(
         What the model left when it was identified; by default as ``arm`` tells it.
     partner : Partner, optional
         A machine or person recorded with the arm, to which it may be tied.
-    tied : callable, optional
-        Diagnoses ties to the partner.
     rng : int or Generator
         Seed, or source of randomness.
     progress : callable, optional
@@ -360,7 +357,6 @@ def diagnose(
         settings=settings,
         rng=generator(rng),
         progress=progress,
-        tied=tied if partner is not None else None,
     )
     found = DiagnosisResult(
         result,

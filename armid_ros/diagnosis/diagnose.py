@@ -28,6 +28,7 @@ from armid_ros.diagnosis.search.explanation import (
     NOISE,
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Names
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.gap import (
@@ -41,7 +42,6 @@ from armid_ros.diagnosis.verdict.leaving import Leaving
 from armid_ros.diagnosis.verdict.naming import findings, not_named
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
-from armid_ros.errors import ModelError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
@@ -51,8 +51,6 @@ import numpy.typing as npt
 
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
-#: Explains a gap by ties to another machine; returns None where they do not.
-Explain = Callable[[ArmModel, Sequence[Recording], Prepared, DiagnosisSettings], Chosen | None]
 
 #: Note where no two equal periods measure the noise.
 _ASSUMED = (
@@ -70,11 +68,6 @@ _HARDLY_SHOWN = (
     'the recordings to validate hardly show what is named: gap and shares are of the recordings '
     'that it was found in; validate with a motion that shows it'
 )
-#: Error where a partner was set and its ties would be left out.
-_ALONE = (
-    'the settings have a partner, and nothing explains ties to it: call diagnose_beside of '
-    'armid_ros.diagnosis.ties.diagnosis with it'
-)
 
 
 def diagnose(
@@ -87,7 +80,6 @@ def diagnose(
     settings: DiagnosisSettings | None = None,
     rng: np.random.Generator,
     progress: Progress | None = None,
-    tied: Explain | None = None,
 ) -> Diagnosis:
     """
     Find what a model lacks.
@@ -112,10 +104,6 @@ def diagnose(
         Draws the states over which base parameters are found, and resamplings of the data.
     progress : callable, optional
         Called with the share that is done and what is being done.
-    tied : callable, optional
-        Explains the gap by ties to the partner of the settings, before anything else is tried;
-        needed if there is a partner. `diagnose_beside` of `armid_ros.diagnosis.ties.diagnosis`
-        gives both.
 
     Returns
     -------
@@ -126,13 +114,9 @@ def diagnose(
     ------
     IdentificationError
         If there is nothing to diagnose: no torque, no motion, too short.
-    ModelError
-        If the settings have a partner, and nothing explains ties to it.
 
     """
     settings = settings or DiagnosisSettings()
-    if settings.partner is not None and tied is None:
-        raise ModelError(_ALONE)
     tell = progress or _silent
     if settings.everything:
         result = diagnose(
@@ -144,7 +128,6 @@ def diagnose(
             settings=settings.without_small_print(),
             rng=rng,
             progress=tell,
-            tied=tied,
         )
         return _with_small_print(result, settings.thresholds.headline)
     tell(0.02, 'filtering')
@@ -158,7 +141,7 @@ def diagnose(
     if faults:
         return _bad(given, data, faults, notes)
     tell(0.1, 'noise floor')
-    by_misfit = bool(baseline) and tied is None
+    by_misfit = bool(baseline) and settings.partner is None
     prepared = prepare(arm, recordings, used, data, settings, rng, by_misfit)
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
@@ -168,9 +151,9 @@ def diagnose(
         return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
     doubt = doubt_of(given, known, baseline, misfit, settings.thresholds)
     asked = _Asked(arm, given, prepared, known, doubt, validate, settings, rng, tell)
-    if settings.partner is not None and tied is not None:
+    if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        found = tied(arm, recordings, prepared, settings)
+        found = diagnose_ties(arm, recordings, prepared, settings)
         if found is not None:
             return _said(found, notes, asked)
     result = _said(_explainer(asked, misfit).chosen(), notes, asked)

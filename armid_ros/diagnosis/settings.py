@@ -141,8 +141,7 @@ class DiagnosisSettings:
         Effects of one's own that may be named besides.
     partner : Partner or None
         Another machine that was recorded beside the arm, to which it may be tied. What holds the
-        arm is then looked for between the two, and not at unknown places. `diagnose_beside` of
-        `armid_ros.diagnosis.ties.diagnosis` sets it.
+        arm is then looked for between the two, and not at unknown places.
     signals : SignalSettings
         Filters; chosen from the recordings by default.
     material : float

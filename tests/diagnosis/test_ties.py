@@ -1,14 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A diagnosis beside another machine asks for ties to it, and is refused where nothing can."""
+"""A diagnosis of an arm with another machine names the ties between them."""
 
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.ties.diagnosis import diagnose_beside
 from armid_ros.effects.tied import Partner
-from armid_ros.errors import ModelError
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.recording import recorded_together, Recording
 import numpy as np
@@ -44,11 +42,10 @@ def together(arm, partner) -> list[Recording]:
 
 
 def test_springs_are_named_where_all_effects_are_asked_for(arm, partner, together) -> None:
-    found = diagnose_beside(
+    found = diagnose(
         arm,
         together,
-        partner,
-        settings=DiagnosisSettings(everything=True),
+        settings=DiagnosisSettings(everything=True, partner=partner),
         rng=np.random.default_rng(0),
     )
     assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)
@@ -56,21 +53,11 @@ def test_springs_are_named_where_all_effects_are_asked_for(arm, partner, togethe
 
 def test_recordings_from_before_do_not_hide_springs(arm, partner, together) -> None:
     before = together[:1]
-    found = diagnose_beside(arm, together, partner, baseline=before, rng=np.random.default_rng(0))
-    assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)
-
-
-def test_a_partner_to_which_nothing_explains_ties_is_refused(arm, partner, together) -> None:
-    settings = DiagnosisSettings(partner=partner)
-    with pytest.raises(ModelError, match='diagnose_beside'):
-        diagnose(arm, together, settings=settings, rng=np.random.default_rng(0))
-
-
-def test_without_a_partner_it_is_the_diagnosis_of_the_arm_alone(monkeypatch, arm) -> None:
-    asked = {}
-    monkeypatch.setattr(
-        'armid_ros.diagnosis.ties.diagnosis.diagnose', lambda *_, **more: asked.update(more)
+    found = diagnose(
+        arm,
+        together,
+        baseline=before,
+        settings=DiagnosisSettings(partner=partner),
+        rng=np.random.default_rng(0),
     )
-    diagnose_beside(arm, [], None, rng=np.random.default_rng(0))
-    assert asked['tied'] is None
-    assert asked['settings'] == DiagnosisSettings()
+    assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)

@@ -18,7 +18,6 @@ MANY = {
     'api/identification.py:identify',
     'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
     'nodes/lockstep.py:run_lockstep',
-    'diagnosis/ties/diagnosis.py:diagnose_beside',
 }
 
 #: Lines that a room of the package may have. A room that shrinks takes its number along: a budget

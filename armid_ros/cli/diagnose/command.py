@@ -133,7 +133,6 @@ def diagnose(
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.diagnosis.ties.ties import diagnose_ties
     from armid_ros.diagnosis.verdict.document import SCHEMA
     from armid_ros.files import json_text
     from armid_ros.identification.parameters_file import read_misfit
@@ -166,7 +165,6 @@ def diagnose(
             baseline=before,
             misfit=misfit,
             partner=beside,
-            tied=diagnose_ties,
             rng=seed,
             progress=tick,
             **asked,

@@ -1,8 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Ties to another machine that was recorded with the arm.
-
-`diagnose_beside` diagnoses an arm that may be tied to one.
-
-"""
+"""Ties to another machine that was recorded with the arm."""
