@@ -203,7 +203,8 @@ def lived_answer(kind: str, index: int) -> Any:
     if judged is None:
         return {}
     pair = {'answer': judged.answer, 'day_before': judged.again}
-    return facts({key: _of_answer(value) for key, value in pair.items() if value is not None})
+    answers = {key: _of_answer(value) for key, value in pair.items() if value is not None}
+    return facts(json.loads(json.dumps(answers)))  # tuples are lists, as in the stored results
 
 
 def _of_answer(answer: Answer) -> dict[str, Any]:
