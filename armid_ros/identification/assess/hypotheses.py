@@ -182,6 +182,11 @@ class InDegrees(Hypothesis):
 
     joint: int | None = None
 
+    def possible(self, motions: Sequence[Motion]) -> bool:
+        """Whether some position is beyond a turn, as an arm that moves by a few degrees has it."""
+        joint = slice(None) if self.joint is None else self.joint
+        return max(float(np.abs(one.q[:, joint]).max()) for one in motions) > 2.0 * np.pi
+
     def motion(self, motion: Motion) -> Motion:
         """Convert them."""
         joint = slice(None) if self.joint is None else self.joint

@@ -46,6 +46,10 @@ class Hypothesis(ABC):
         parts = (getattr(self, part.name) for part in fields(self) if part.compare)  # type: ignore
         return (type(self).__name__, *(v for v in parts if not isinstance(v, float | tuple)))
 
+    def possible(self, motions: Sequence[Motion]) -> bool:
+        """Return whether recorded motions allow it at all."""
+        return True
+
     def motion(self, motion: Motion) -> Motion:
         """Return a motion and its torque as they would be without the mistake."""
         return motion

@@ -136,7 +136,7 @@ def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) ->
     slow = slow_motions(recording, used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
-    tried = list(hypotheses(robot))
+    tried = [one for one in hypotheses(robot) if one.possible(slow)]
     late = late_torque(robot, recording, used)
     tried += [] if late is None else [late]
     faulty = faulty_samples(robot, recording, used)

@@ -11,6 +11,7 @@ from armid_ros.identification.assess import mistakes
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
     hypotheses,
+    InDegrees,
     InUnit,
     known_gravity,
     LateTorque,
@@ -345,6 +346,15 @@ def test_names_of_two_light_joints_exchanged_beside_a_heavy_slide():
 
 def test_degrees(robot, sound):
     assert 'in degrees' in mistake_in(robot, replace(sound, q=np.rad2deg(sound.q)))
+
+
+def test_positions_within_a_turn_are_not_in_degrees(robot, sound):
+    rest = np.zeros_like(sound.q)
+    motion = Motion(sound.joints, sound.t, sound.q, rest, rest, sound.tau)
+    turned = replace(motion, q=with_column(sound.q, 2, np.rad2deg))
+    for joint in range(robot.n_joints):
+        assert not InDegrees(joint).possible([motion])
+        assert InDegrees(joint).possible([motion, turned]) == (joint == 2)
 
 
 def test_gravity_of_the_earth_on_a_recording_from_the_moon(robot):
