@@ -12,18 +12,18 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 160,
-    'said': 319,
-    'says': 171,
-    'tells': 83,
+    'told': 154,
+    'said': 308,
+    'says': 163,
+    'tells': 80,
     'asks': 21,
-    'asked': 261,
-    'believes': 4,
-    'believed': 77,
+    'asked': 245,
+    'believes': 3,
+    'believed': 75,
     'denies': 5,
     'denied': 11,
-    'beside': 210,
-    'knows': 33,
+    'beside': 197,
+    'knows': 29,
     'heard': 15,
 }
 #: Count in the pages: one quotes a message of the package.
