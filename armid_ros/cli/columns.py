@@ -60,9 +60,14 @@ _OPTIONS = (
     _option('--velocity', metavar='C', help="The same of velocities; 'none' leaves them out."),
     _option('--effort', metavar='C', help='The same of torques, forces or currents.'),
     _option(
-        '--time-unit', type=click.Choice(TIME_UNITS), help='Of the column of time of a table.'
+        '--time-unit', type=click.Choice(TIME_UNITS), help='Unit of the time column of a table.'
     ),
-    _option('--rate', type=float, metavar='HZ', help='Rows per second of a table, without it.'),
+    _option(
+        '--rate',
+        type=float,
+        metavar='HZ',
+        help='Sample rate [Hz] of a table without a time column.',
+    ),
     _option(
         '--degrees', is_flag=True, help='Positions and velocities are in degrees; of bags too.'
     ),

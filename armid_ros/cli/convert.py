@@ -40,7 +40,7 @@ def convert(
     joints: str | None,
 ) -> None:
     """
-    Make a bag of a table or of a bag of ROS 1.
+    Convert a CSV, NPZ, ... table or a ROS 1 bag into a ROS 2 bag.
 
     Tables are CSV (.tsv, .txt, .gz too), NPZ and NPY, MAT, HDF5, Parquet, and folders of LeRobot
     datasets. Columns that are not named are guessed, and shown. Several tables hold columns of the

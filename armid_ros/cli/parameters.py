@@ -69,7 +69,7 @@ _memory = click.option(
     metavar='MB',
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({MEMORY: value}),
-    help='That a bag may take [MB]; a quarter of the memory by default.',
+    help='Memory limit for reading bags [MB]; a quarter of the memory by default.',
 )
 bag = click.option(
     '--out', required=True, type=OutPath(path_type=Path), help='Bag to write; must not exist.'
@@ -92,7 +92,7 @@ seed = click.option(
     type=click.IntRange(min=0),
     default=0,
     show_default=True,
-    help='Of every random number.',
+    help='Random seed.',
 )
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 

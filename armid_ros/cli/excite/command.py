@@ -73,7 +73,7 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     type=click.FloatRange(0.0, MAX_DURATION, min_open=True),
     default=44.0,
     show_default=True,
-    help='From rest to rest [s].',
+    help='Length of the exciting part [s]; approach and return are added.',
 )
 @click.option(
     '--periods',
@@ -82,7 +82,7 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     show_default=True,
     help='Identical periods in it; their difference is the noise.',
 )
-@click.option('--harmonics', default=5, show_default=True, help='Per joint.')
+@click.option('--harmonics', default=5, show_default=True, help='Fourier harmonics per joint.')
 @click.option(
     '--speed',
     'speeds',
@@ -173,7 +173,7 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     metavar='BAG',
     help='A bag recorded already: add most to what it tells. May be given several times.',
 )
-@click.option('--starts', default=4, show_default=True, help='Searches from other beginnings.')
+@click.option('--starts', default=4, show_default=True, help='Number of random restarts.')
 @click.option('--iterations', default=150, show_default=True, help='Of each search.')
 @click.option(
     '--time-budget',

@@ -141,7 +141,7 @@ def decide(
         return Verdict('ambiguous', f'{said}{tied}')
     fitted = as_it_is is not None and as_it_is.ratio.max() > 1.0
     once = ', once its rigid body and friction are fitted as well' if fitted else ''
-    return Verdict('named', f'{said} The rest is {floor_in_words}{once}.')
+    return Verdict('named', f'{said} The remaining error is {floor_in_words}{once}.')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:
@@ -234,7 +234,7 @@ def share_in_words(finding: Finding, interval: bool = False, of: str = _GAP) -> 
     text = f'{percent(finding.share)} of {of}'
     if interval:
         low, high = (percent(end) for end in finding.share_interval)
-        text += f' ({low} to {high})'
+        text += f' ({low} to {high})' if low != high else ''
     joint, taken = finding.of_joint
     if not joint:
         return text

@@ -126,12 +126,12 @@ class NoiseCheck:
         leader = name.name.split(' ')[0]
         where = f'{leader} of {name.joint}' if name.joint else leader
         size = float(abs(self.relative_bias[worst]))
-        verdict = 'the intervals hold' if self.harmless else 'the intervals are off by that'
+        verdict = 'negligible' if self.harmless else 'the intervals are off by the bias'
         return (
             f'Durbin-Wu-Hausman test: {found} (statistic {self.statistic:.1f}, '
             f'{self.freedom:.1f} degrees of freedom, p = {self.p_value:.2g})',
-            f'position noise {low:.2g} to {high:.2g} rad (or m): the bias that it makes is at '
-            f'most {size:.2g} standard deviations ({where}); {verdict}',
+            f'position noise {low:.2g} to {high:.2g} rad (or m): {verdict} (bias at most '
+            f'{size:.2g} standard deviations, in {where})',
         )
 
 
