@@ -253,9 +253,7 @@ def show(result: Diagnosis) -> None:
         rows = [row for finding in result.findings for row in _rows(finding)]
         print_rows(rows, as_json=False, right=('value, 95 %',))
     if result.minor:
-        say(
-            'minor effects: statistically significant, but negligible or not confirmed by other data'
-        )
+        say('minor effects: statistically significant, but negligible or not confirmed')
         share = 'share of the gap' if result.findings else 'share of what is left'
         rows = [_minor(finding, share) for finding in result.minor]
         print_rows(rows, as_json=False, right=(share, 'p'))
