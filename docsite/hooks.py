@@ -20,7 +20,6 @@ from docsite.schemas import schemas_page
 ROOT = Path(__file__).parents[1]
 #: What explains gaps, finds faults of data and plans motions for a diagnosis, below armid_ros.
 BESIDE_THE_DIAGNOSIS = (
-    'pair/ties',
     'identification/assess/data_faults.py',
     'identification/assess/dead_sensors.py',
     'identification/assess/joint_units.py',

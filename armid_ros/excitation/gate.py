@@ -205,7 +205,6 @@ class MotionGate:
     def _time_of(self, step: FloatArray, speed: FloatArray | float = 0.0) -> float:
         """Return the time of a small step that begins with a speed, within the limits [s]."""
         velocity = np.where(np.isfinite(self.limits.velocity), self.limits.velocity, SLOW_VELOCITY)
-        slowest = speed + np.sqrt(speed**2 + step * self.limits.acceleration)
-        return _STEP * float(
-            max((step / velocity).max(), (slowest / self.limits.acceleration).max())
-        )
+        stopping = speed / self.limits.acceleration
+        slowest = stopping + np.sqrt(stopping**2 + step / self.limits.acceleration)
+        return _STEP * float(max((step / velocity).max(), slowest.max()))

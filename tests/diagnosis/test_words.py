@@ -55,7 +55,7 @@ def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elb
     effect = CATALOGUE[name].on(bench.robot, joints or None)
     parameters = effect.parameters(bench.robot)[: len(values)]
     numbers = parameters, values, (0.01,) * len(values), share, (0.2, 0.4), 0.0
-    return Finding(name, joints, *numbers, sign=effect.sign, **more)
+    return Finding(name, joints, *numbers, sign=effect.traits.sign, **more)
 
 
 @pytest.mark.parametrize(('as_it_is', 'fitted'), [(None, False), (0.8, False), ([0.8, 4.0], True)])
@@ -283,7 +283,7 @@ def test_a_shape_that_the_data_do_not_determine_has_no_value(bench, time, std, t
     found = Finding('thermal_friction', ('elbow',), *numbers)
     summary = verdict(bench, found).summary
     assert ('206' in summary) is told
-    assert (effect.shown_by in summary) is not told
+    assert (effect.traits.shown_by in summary) is not told
     rows = NamedParameters((found,)).rows
     assert ('not determined' in [row[-1] for row in rows]) is not told
     assert '0.4' in rows[0][-1]

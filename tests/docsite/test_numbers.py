@@ -10,7 +10,6 @@ from armid_ros.diagnosis.settings import Thresholds
 from docsite.numbers import numbers_page
 
 PACKAGE = Path(__file__).parents[2] / 'armid_ros' / 'diagnosis'
-TIES = PACKAGE.parent / 'pair' / 'ties'
 MEASURED = 'as it is        1.0  9 of 10 first\nprice           0.7  8 of 10 first\n'
 
 
@@ -21,7 +20,7 @@ def rows(page):
 
 
 def test_each_has_a_value_and_a_reason():
-    page = numbers_page(PACKAGE, MEASURED, [TIES])
+    page = numbers_page(PACKAGE, MEASURED)
     told = rows(page)
     assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in told}
     assert not [row for row in told if not (row[1] and row[2])]
@@ -86,6 +85,6 @@ def test_numbers_of_a_folder_beside_it_are_on_the_page(tmp_path):
 
 
 def test_numbers_of_ties_are_on_the_page():
-    places = {(row[0], row[3]) for row in rows(numbers_page(PACKAGE, MEASURED, [TIES]))}
-    assert ('`_LEAST_GAIN`', '`armid_ros/diagnosis/ties/ties.py`') in places
+    places = {(row[0], row[3]) for row in rows(numbers_page(PACKAGE, MEASURED))}
+    assert ('`_LEAST_GAIN`', '`ties/ties.py`') in places
     assert ('`LEAST_Z`', '`armid_ros/identification/ties/search.py`') in places

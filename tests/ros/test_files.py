@@ -31,7 +31,7 @@ TABLES = {
 
 @pytest.mark.parametrize('name', NODES)
 def test_a_node_has_a_main_and_a_table_that_explains_itself(name):
-    assert callable(import_module(f'armid_ros.nodes.{name}').main)
+    assert callable(import_module(NODES[name].__module__).main)
     for parameter in NODES[name].table:
         assert parameter.description.endswith('.') or '[' in parameter.description
         assert (parameter.lower is None) == (parameter.upper is None)
