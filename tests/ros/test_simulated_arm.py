@@ -43,7 +43,10 @@ def trajectory(goal, seconds=1, joints=ROBOT.joints, stamp=None):
 def still_arm(bench, **parameters):
     """Make an arm that moves only when the test steps it, from a stamp of 100 s on."""
     parameters = {'rate': 100.0, 'real_time_factor': 0.0, **parameters}
-    return bench.add(lambda **kw: SimulatedArmNode(start_ns=100 * SECOND, **kw), **parameters)
+    arm = bench.add(lambda **kw: SimulatedArmNode(start_ns=100 * SECOND, **kw), **parameters)
+    if arm._timer is not None:
+        arm._timer.cancel()
+    return arm
 
 
 def send(bench, message):
