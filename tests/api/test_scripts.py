@@ -33,6 +33,7 @@ print(plan)
 """
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize('script', [PLAIN, OWN], ids=['plain', 'own effect'])
 def test_a_search_in_processes_does_not_run_the_script_again(script, tmp_path):

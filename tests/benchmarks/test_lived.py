@@ -210,6 +210,7 @@ def test_true_share_is_what_the_torque_of_the_cause_takes():
     assert np.isnan(true_shares(found, held_out, nothing)).all()
 
 
+@pytest.mark.long
 def test_a_share_is_stated_of_the_rows_that_it_is_compared_in():
     one = judge('development', 9, again=False)
     assert 0.5 < one.answer.true_share < 1.0

@@ -114,6 +114,7 @@ def test_excite_simulate_identify_in_three_lines(tmp_path):
     armid('simulate', '--robot', ROBOT, '--model', model, '--rate', 200, '--out', again)
 
 
+@pytest.mark.long
 def test_a_second_excitation_adds_to_what_a_bag_tells(bags, tmp_path):
     """With the bag, every parameter is predicted to be known better than without."""
     arguments = ('--robot', ROBOT, '--duration', 8, *QUICK, '--json')
@@ -122,6 +123,7 @@ def test_a_second_excitation_adds_to_what_a_bag_tells(bags, tmp_path):
     assert json.loads(after)['log_det'] > alone['log_det']
 
 
+@pytest.mark.long
 def test_speed_classes_come_in_folders_each_as_it_is_alone(tmp_path):
     arguments = ('--robot', ROBOT, '--duration', 8.33, *QUICK, '--json')
     several = armid('excite', *arguments, '--speed', 'slow,0.6', '--out', tmp_path / 'all').stdout

@@ -68,6 +68,7 @@ def test_report_and_model_name_the_segments(one_leg) -> None:
     assert sorted(ties) == ['swing_shank', 'swing_thigh']
 
 
+@pytest.mark.long
 def test_loose_straps_on_both_legs_are_slack(tmp_path) -> None:
     document = diagnosed(tmp_path, Straps(SEGMENTS, 1e4, 0.003), 4)
     assert document['verdict'] == 'named'

@@ -58,6 +58,7 @@ def ur5(tmp_path_factory):
     return out, excite(example('ur5_robot'), out, '--seed', 2).stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('seed', range(3))
 def test_an_arm_that_stands_stays_above_its_base_plane(tmp_path, seed):
     name = example('ur5_robot')
@@ -79,6 +80,7 @@ def test_an_arm_whose_zero_is_on_the_floor_starts_beside_it_and_says_so(ur5):
     assert 'the zero of the description is not free: wrist_3_link and floor' in said
 
 
+@pytest.mark.long
 def test_an_arm_that_hangs_is_asked_for_its_floor(tmp_path):
     name = example('talos_left_arm')
     refused = excite(name, tmp_path / 'plan', code=2).stderr

@@ -37,6 +37,7 @@ def test_what_was_there_already_is_not_named(bench):
     assert not found.findings
 
 
+@pytest.mark.long
 def test_a_change_beside_it_is(bench):
     def with_drag(motion, tau):
         return hose(motion, tau) + np.array([0.0, 1.2]) * np.sign(motion.dq)
@@ -49,6 +50,7 @@ def test_a_change_beside_it_is(bench):
     assert first.values[0] == pytest.approx(1.2, abs=4.0 * first.std[0])
 
 
+@pytest.mark.long
 def test_the_gap_is_where_the_cause_is_and_not_where_a_motion_shows_more_of_the_misfit(bench):
     """The hose is stretched more in the recordings that were not used."""
 
@@ -78,6 +80,7 @@ def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not_and_measures_n
     assert [place.joint for place in found.where] == ['elbow']
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('of_today', [True, False])
 def test_one_recording_with_a_mistake_is_named_among_sound_ones(bench, of_today):
     """It would be a gap without a name, or a misfit in which any change hides."""
@@ -117,6 +120,7 @@ def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     assert (result.doubt in result.summary) and bool(result.doubt) == changed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('factor', [0.75, 1.3])
 def test_an_arm_that_is_warmer_or_colder_has_another_friction_in_all_joints(bench, factor):
     """Not a delay, which acts in all joints with one value, nor causes joint by joint."""
@@ -218,6 +222,7 @@ def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):
     assert not found.findings, found.summary
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('with_baseline', [True, False])
 def test_friction_that_has_become_less_is_named(bench, with_baseline):
     """A value may go down to zero: what is left of it is no bound of what it lost."""
@@ -235,6 +240,7 @@ def test_friction_that_has_become_less_is_named(bench, with_baseline):
     assert first.values[0] == pytest.approx(-0.2, abs=4.0 * first.std[0])
 
 
+@pytest.mark.long
 def test_a_change_may_be_less_by_what_the_model_had_wrong_before(bench):
     """The model lacks a ripple of which 0.05 N m were there; 0.3 N m are found of 0.25 more."""
 
@@ -252,6 +258,7 @@ def test_a_change_may_be_less_by_what_the_model_had_wrong_before(bench):
     assert fresh.findings[0].std[0] < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize('seed', [7, 8])
 def test_what_another_motion_makes_of_a_misfit_is_no_change(upright, seed):
@@ -288,6 +295,7 @@ def test_a_load_of_a_link_between_two_days_is_a_payload(upright):
     assert values['payload_mz'] == pytest.approx(0.2, rel=0.05)
 
 
+@pytest.mark.long
 def test_drag_of_three_joints_is_no_person_who_slows_them_down(upright):
     """One damper at a link slows all joints before it, each of them a little wrongly."""
     drag = np.array([0.3, 0.35, 0.15])
@@ -300,6 +308,7 @@ def test_drag_of_three_joints_is_no_person_who_slows_them_down(upright):
     assert np.allclose(found.values, drag, atol=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize('with_baseline', [True, False])
 def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):

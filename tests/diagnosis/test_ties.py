@@ -51,6 +51,7 @@ def test_springs_are_named_where_all_effects_are_asked_for(arm, partner, togethe
     assert {tie.name for finding in found.findings for tie in finding.ties} == set(TIED)
 
 
+@pytest.mark.long
 def test_recordings_from_before_do_not_hide_springs(arm, partner, together) -> None:
     before = together[:1]
     found = diagnose(

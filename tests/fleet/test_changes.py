@@ -138,6 +138,7 @@ def test_a_day_that_all_siblings_share_is_no_change_of_any():
         assert np.abs(kept).max() < 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('bags', [10, 30])
 def test_healthy_arms_whose_days_differ_as_real_ones_do_are_rarely_named(bags):
     counts = [tally(120, bags, 20, np.random.default_rng([11, bags, k])) for k in range(2)]

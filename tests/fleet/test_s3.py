@@ -46,6 +46,7 @@ def bucket(bags):
     patch.undo()
 
 
+@pytest.mark.long
 def test_an_object_store_gives_the_digits_of_a_folder(bags, bucket, tmp_path):
     with connected(None, 1) as client:
         found = find_bags([f'{bucket}/bags/*/*'])
@@ -58,6 +59,7 @@ def test_an_object_store_gives_the_digits_of_a_folder(bags, bucket, tmp_path):
     assert there == here
 
 
+@pytest.mark.long
 def test_results_in_an_object_store_are_watched_there(bucket):
     store = Store(f'{bucket}/results')
     with connected(None, 1) as client:

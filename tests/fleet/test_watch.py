@@ -96,6 +96,7 @@ def test_the_overview_shows_those_first_that_need_a_person(lived):
     assert set(order[: len(truth['arms'])]) == set(truth['arms'])
 
 
+@pytest.mark.long
 def test_the_diagnosis_names_what_happened_with_the_arms_own_past_as_baseline(lived, cluster):
     store, found, truth = lived
     arm = next(arm for arm, event in truth['arms'].items() if event['what'] == 'load')

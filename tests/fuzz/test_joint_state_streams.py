@@ -163,6 +163,7 @@ def test_the_undamaged_stream_gives_the_truth(velocity):
     assert np.all(error < SHIFTED * UNDAMAGED[velocity].std + 1e-2)
 
 
+@pytest.mark.long
 @settings(
     max_examples=EXAMPLES,
     derandomize=EXAMPLES <= USUAL,

@@ -7,6 +7,7 @@ import pytest
 from benchmarks import lunar_arm
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_papers_arm_is_identified_better_than_in_the_paper():
     """Wanted: 1 % of the peak torque on average, 1.5 % of each joint, the load within 10 g."""

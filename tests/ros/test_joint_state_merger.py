@@ -152,6 +152,7 @@ def test_a_topic_without_torques_and_wrong_counts_are_refused(bench):
     assert 'std_msgs/msg/String holds no efforts' in node.complaints.latest
 
 
+@pytest.mark.long
 def test_torques_that_a_driver_low_passes_are_said(bench):
     node, out = merger(bench)
     rng, tau = np.random.default_rng(1), np.zeros(2)

@@ -297,6 +297,7 @@ def test_a_model_leaves_the_effects_of_the_parameters(bench, arm, effects, expec
     assert node.identifier.arm.effects == before.arm.effects
 
 
+@pytest.mark.long
 def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected):
     diagnostics = bench.diagnostics()
     node = identifying(bench)
@@ -536,6 +537,7 @@ def statuses(bench, node):
     return {s.name.partition(': ')[2]: s for s in diagnostics[-1].status}
 
 
+@pytest.mark.long
 def test_parameters_come_with_their_intervals(bench, arm):
     node = identifying(bench)
     publish(bench, node, bench.matched_publisher(JointState, 'joint_states'), moving(arm, 20.0))
@@ -548,6 +550,7 @@ def test_parameters_come_with_their_intervals(bench, arm):
     assert found.hardware_id == 'pendulum'
 
 
+@pytest.mark.long
 def test_too_little_motion_is_said_with_the_joint(bench, arm):
     node = identifying(bench)
     publisher = bench.matched_publisher(JointState, 'joint_states')

@@ -269,6 +269,7 @@ def test_torques_that_come_late_are_not_good(structure, run):
     assert int(said) == pytest.approx(100, abs=3)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize('since', [0, 1000])
 def test_a_dead_channel_of_torque_is_unusable(structure, run, other, since):
@@ -337,6 +338,7 @@ def test_real_recordings_are_good(machine, real_data, tmp_path):
     assert of_machine(machine, real_data, tmp_path).word == 'good'
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_a_wrist_with_a_coupling_is_good_with_it_and_unusable_without(real_data, tmp_path):
     """Half of the torque of joint 5 of the TX40 is friction of the coupling with joint 6."""

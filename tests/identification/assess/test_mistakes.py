@@ -450,6 +450,7 @@ class TestRealRecordings:
         robot, recordings = machine
         assert [mistake_in(robot, recording) for recording in recordings] == [''] * len(recordings)
 
+    @pytest.mark.long
     @pytest.mark.parametrize('machine', ['tx40', 'ur10'], indirect=True)
     def test_mistakes_made_of_them_are_found(self, machine):
         robot, (sound,) = machine

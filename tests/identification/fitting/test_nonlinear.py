@@ -113,6 +113,7 @@ def test_pairs_too(robot, pair):
     agrees(robot, pair, seed=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('name', ['load_dependent_friction', 'torque_gain'])
 def test_bodies_are_fitted_to_what_the_torque_is(robot, name):
     _, recording, result = fitted(robot, [name], physical=PhysicalSettings(weights=(1e-5, 1e-3)))
@@ -152,6 +153,7 @@ def test_a_fit_that_does_not_settle_says_so(robot, monkeypatch):
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_chunks_of_a_long_stretch_join(robot, monkeypatch):
     """The torque is taken in parts of a long stretch, which an encoder zero makes overlap."""

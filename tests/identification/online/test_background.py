@@ -68,6 +68,7 @@ def samples():
     return list(changes.changing('payload:' + changes.ball(0.3), 0, BEFORE, 3.0, RATE))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_pieces_of_work_change_nothing_of_what_is_learned(samples, monkeypatch):
     pieces = changes.watch(iter(samples))

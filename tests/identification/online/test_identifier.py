@@ -83,6 +83,7 @@ def clean(arm, motion, tau):
     return online
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_filtering_does_not_bias_a_rigid_arm(arm, motion):
     """
@@ -135,6 +136,7 @@ def test_estimates_scatter_as_their_covariance_says(arm, motion, tau):
     assert outside <= 0.01 * count + 2
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_unknown_noise_is_found_from_the_residuals(arm, motion, tau):
     rng = np.random.default_rng(1)
@@ -185,6 +187,7 @@ def test_an_arm_at_rest_teaches_nothing_it_could_unlearn(arm, motion, tau):
     np.testing.assert_array_equal(after.covariance, before.covariance)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_an_arm_without_dry_friction_learns_at_rest_and_does_not_drift(arm, motion):
     rng = np.random.default_rng(4)
@@ -205,6 +208,7 @@ def test_an_arm_without_dry_friction_learns_at_rest_and_does_not_drift(arm, moti
     assert np.all(np.abs(after.values - before.values) < 3.5 * before.std)
 
 
+@pytest.mark.long
 def test_forgetting_follows_friction_that_rises(arm, motion):
     """Viscous friction of all joints up by half within 20 s, memory 4 s."""
     robot = arm.robot
@@ -256,6 +260,7 @@ def test_jitter_does_not_spoil_the_estimate(arm):
     assert not online.rejected and not online.restarts
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('rate', [125.0, pytest.param(2000.0, marks=pytest.mark.slow)])
 def test_other_sampling_rates(arm, rate):
     motion = multisine(arm.robot, 20.0, rate=rate)

@@ -47,6 +47,7 @@ def test_a_joint_that_stands_still_is_named(arm, motion):
     assert 'viscous friction' in text and 'move it both ways at several speeds' in text
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_rich_motion_leaves_the_strong_joints_with_nothing_to_ask_for(arm, motion):
     named = {part.joint for part in learn(arm, motion)}
