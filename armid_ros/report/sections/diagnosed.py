@@ -50,8 +50,8 @@ class Shares(Section):
             one = group[0]
             where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
             names = ' and '.join(other.name.replace('_', ' ') for other in group)
-            low, high = one.share_interval
-            text = f'{percent(one.share)} ({percent(low)} to {percent(high)})'
+            low, high = (percent(end) for end in one.share_interval)
+            text = percent(one.share) + (f' ({low} to {high})' if low != high else '')
             share = max(one.share, 0.0)
             taken += share
             rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
