@@ -126,7 +126,9 @@ def test_one_share_is_on_the_page_and_in_the_document(found, html):
     text = re.sub('<[^>]*>', ' ', html[html.index('class="verdict') :])
     shown = text[: text.index('Measured and modelled')]
     assert shown.count(share) >= 2  # the sentence, and the short answers
-    assert percent(finding.share) in shown[shown.index('What explains the gap') :]
+    low, high = map(percent, finding.share_interval)
+    bar = f'{percent(finding.share)} (' if low != high else percent(finding.share)
+    assert bar in shown[shown.index('What explains the gap') :]
     assert 'above the floor' not in text
 
 

@@ -217,6 +217,12 @@ def _unproven(group: Sequence[Finding]) -> str:
     )
 
 
+def share_interval_in_words(finding: Finding) -> str:
+    """Return the 95 % interval of a share in brackets; empty where its ends read alike."""
+    low, high = (percent(end) for end in finding.share_interval)
+    return f' ({low} to {high})' if low != high else ''
+
+
 def share_in_words(finding: Finding, interval: bool = False, of: str = _GAP) -> str:
     """
     Return the share of the gap that a cause takes, and the joint that needs it though it is small.
@@ -232,9 +238,7 @@ def share_in_words(finding: Finding, interval: bool = False, of: str = _GAP) -> 
 
     """
     text = f'{percent(finding.share)} of {of}'
-    if interval:
-        low, high = (percent(end) for end in finding.share_interval)
-        text += f' ({low} to {high})' if low != high else ''
+    text += share_interval_in_words(finding) if interval else ''
     joint, taken = finding.of_joint
     if not joint:
         return text

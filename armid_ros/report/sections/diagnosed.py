@@ -12,7 +12,7 @@ from typing import ClassVar
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.where import Where
-from armid_ros.diagnosis.verdict.words import by_cause
+from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Series
@@ -50,8 +50,7 @@ class Shares(Section):
             one = group[0]
             where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
             names = ' and '.join(other.name.replace('_', ' ') for other in group)
-            low, high = (percent(end) for end in one.share_interval)
-            text = percent(one.share) + (f' ({low} to {high})' if low != high else '')
+            text = percent(one.share) + share_interval_in_words(one)
             share = max(one.share, 0.0)
             taken += share
             rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
