@@ -3,6 +3,7 @@
 """Hidden effects are not made by the code that looks for them."""
 
 import ast
+import os
 from pathlib import Path
 import subprocess
 import sys
@@ -42,7 +43,10 @@ def test_nothing_else_comes_along():
         f"print(*(m for m in sys.modules if m.startswith('armid_ros.')), sep='\\n')"
     )
     result = subprocess.run(
-        [sys.executable, '-c', code], cwd=HERE.parents[1], capture_output=True, text=True
+        [sys.executable, '-c', code],
+        env={**os.environ, 'PYTHONPATH': str(HERE.parents[1])},
+        capture_output=True,
+        text=True,
     )
     assert result.returncode == 0, result.stderr
     loaded = {name.split('.')[1] for name in result.stdout.split()}

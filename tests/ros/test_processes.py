@@ -281,7 +281,9 @@ def test_a_signal_brings_a_goal_to_rest_before_the_process_is_gone(
     process = processes.start('excitation_publisher', f'file:={tmp_path / "run.yaml"}', *options)
     arm.run(101.0)
     bench.spin_until(
-        lambda: bench.call('excitation_publisher/start').success or arm.run(arm.now + 0.1),
+        lambda: (
+            arm.goals or bench.call('excitation_publisher/start').success or arm.run(arm.now + 0.1)
+        ),
         'the start',
     )
     bench.spin_until(lambda: arm.goals, 'the goal')
