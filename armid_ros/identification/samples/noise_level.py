@@ -46,6 +46,8 @@ class NoiseLevel:
         Most samples that are learned from before `settle`.
     finest : ndarray, shape (m,), or float
         Resolution of the signals at best.
+    onset : ndarray, shape (m,), or float
+        Second derivative that is usual before any motion was seen, per second squared.
 
     Attributes
     ----------
@@ -54,8 +56,14 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, count: int, together: int = 1, finest: FloatArray | float = 0.0) -> None:
-        self._finest = finest
+    def __init__(
+        self,
+        count: int,
+        together: int = 1,
+        finest: FloatArray | float = 0.0,
+        onset: FloatArray | float = 0.0,
+    ) -> None:
+        self._finest, self._onset = finest, onset
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((SEEN, count), np.inf), np.zeros(count)
         self._windows = Loudest(count, _REMEMBERED)
@@ -90,7 +98,7 @@ class NoiseLevel:
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
         if not self._windows:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._resolution)
+            size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._least(period))
             self.usual = Usual(period, size, share_of_noise(errors, size))
 
     def learn(self, missed: Missed, move: FloatArray) -> None:
@@ -110,7 +118,7 @@ class NoiseLevel:
         size = robust_scale(errors, SHARE)
         self._windows.append(size, share_of_noise(errors, size))
         self.see_steps(moves)
-        loudest = np.maximum(self._windows.size, self._resolution)
+        loudest = np.maximum(self._windows.size, self._least(period))
         self.usual = Usual(period, loudest, self._windows.noisy.copy())
 
     def see_steps(self, moves: FloatArray) -> None:
@@ -119,16 +127,16 @@ class NoiseLevel:
         steps = np.concatenate([self._steps, np.where(steps > 0.0, steps, np.inf)])
         self._steps = np.partition(steps, SEEN - 1, axis=0)[:SEEN]
 
-    @property
-    def _resolution(self) -> FloatArray:
+    def _least(self, period: float) -> FloatArray:
         """
-        Return the smallest step of every signal, at least the finest one.
+        Return the smallest step of every signal, at least the finest one and that of an onset.
 
         A signal that moves fast makes no small steps; but by its resolution it leaves any line.
 
         """
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
-        return np.maximum(np.minimum(self._most, step), self._finest)
+        least = np.maximum(self._finest, self._onset * period**2)
+        return np.maximum(np.minimum(self._most, step), least)
 
 
 class Loudest:
