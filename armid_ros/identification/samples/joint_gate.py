@@ -12,7 +12,7 @@ import numpy.typing as npt
 #: share of its limit: an encoder of 22 bits, a torque sensor of 17.
 _FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
 #: Second derivative that each may have when an arm at rest begins to move, in the same units per
-#: second squared: 2 rad/s^2; a jerk of 50 rad/s^3; a torque that oscillates with its limit at 1 Hz.
+#: second squared: 2 rad/s^2; a jerk of 50 rad/s^3; a torque of its limit that oscillates at 1 Hz.
 _ONSET = {'q': 2.0, 'v': 50.0, 't': 50.0}
 
 
