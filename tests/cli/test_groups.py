@@ -6,6 +6,7 @@ import inspect
 
 from armid_ros.cli import main
 import click
+from click.testing import CliRunner
 import pytest
 
 
@@ -32,3 +33,8 @@ def test_a_command_takes_its_options_and_nothing_else(name):
     assert taken <= options
     if len(taken) == len(parameters):
         assert taken == options
+
+
+def test_a_misspelt_command_is_corrected():
+    result = CliRunner().invoke(main, ['identfy'])
+    assert result.exit_code == 2 and "'identify'" in result.output
