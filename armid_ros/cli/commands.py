@@ -32,7 +32,6 @@ COMMANDS = {
     'diagnose': 'diagnose.command',
     'compare': 'compare',
     'recover': 'record',
-    'view': 'view',
     'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
