@@ -113,6 +113,7 @@ def identification_report(
     if grade is None:
         grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
+    sentences = (*grade.reasons, *judgement.sentences)
     quality = [
         *(RecordingQuality.of(r, 'training', training.get(r.source, ())) for r in recordings),
         *(
@@ -121,12 +122,7 @@ def identification_report(
         ),
     ]
     sections: list[Section] = [
-        VerdictSection(
-            grade.word,
-            TONES[grade.word],
-            (*grade.reasons, *judgement.sentences),
-            judgement.beware,
-        ),
+        VerdictSection(grade.word, TONES[grade.word], sentences, judgement.beware),
         NextSteps(judgement.next_steps),
         FitSection(arm.robot, training, validation, torque_reach(result, shown)),
         *_forward(result, verification),
