@@ -210,11 +210,13 @@ def _story(
     robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
     sections: list[Section] = [Story(diagnosis, residual)]
     if patched:
-        sections += [Shares(diagnosis), NamedParameters(diagnosis.findings)]
+        sections.append(Shares(diagnosis))
     sections += [
-        GapBars(robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
         GapOverlay(robot, diagnosis.gap, patched, names),
+        GapBars(robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
     ]
+    if patched:
+        sections.append(NamedParameters(diagnosis.findings))
     if diagnosis.where:
         sections.append(EvidenceSection(diagnosis.where, share_of(diagnosis)))
     return sections
