@@ -24,13 +24,14 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import stacked, together_interaction_problem
-from armid_ros.identification.ties.search import LEAST_Z, with_springs
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 
+#: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
+_LEAST_Z = 4.0
 #: A tie so many standard deviations above zero is not excluded.
 _DOUBTFUL = 1.0
 #: Squares over noise that each fitted inertia has to explain for the description to be wrong: one
@@ -79,7 +80,7 @@ class TieRegression:
         if found.misfit > self.settings.thresholds.same_fit * problem.tau.size:
             return frozenset()
         z = found.stiffness / found.std
-        sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > LEAST_Z}
+        sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > _LEAST_Z}
         return frozenset(sure - _tied_joints(self.arm))
 
     def springs(self, explanation: Explanation, inertias: Inertias) -> Interaction | None:
@@ -108,7 +109,7 @@ class TieRegression:
                 for k, joint in enumerate(problem.spring_joints)
                 if joint in named or (joint not in there and doubtful[k])
             ]
-            return identify_interaction(with_springs(problem, np.array(kept)))
+            return identify_interaction(problem.with_springs(np.array(kept)))
         except IdentificationError:
             return None
 

@@ -123,6 +123,19 @@ class InteractionProblem:
         variance = np.diag(self.motion_noise)
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 
+    def with_springs(self, kept: npt.NDArray[np.intp]) -> InteractionProblem:
+        """Return the problem with some of its springs only."""
+        columns = [*kept.tolist(), *range(len(self.segments), self.columns.shape[2])]
+        return replace(
+            self,
+            columns=self.columns[:, :, columns],
+            columns_by_motion=self.columns_by_motion[:, :, columns],
+            described=self.described[columns],
+            precision=self.precision[np.ix_(columns, columns)],
+            segments=tuple(self.segments[k] for k in kept),
+            spring_joints=tuple(self.spring_joints[k] for k in kept),
+        )
+
     def residual(self, theta: FloatArray) -> FloatArray:
         """Return what is left of the torques, shape (N, n) [N m]."""
         return np.asarray(self.tau - self.known - self.columns @ theta)
