@@ -17,14 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
-from armid_ros.identification.assess.hypotheses import (
-    Exchanged,
-    InDegrees,
-    InUnit,
-    OtherUnit,
-    Reversed,
-)
-from armid_ros.identification.assess.hypothesis import Hypothesis
+from armid_ros.identification.assess.hypotheses import Hypothesis
 from armid_ros.identification.assess.joint_units import (
     factors_apart,
     knows,
@@ -55,8 +48,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Mistakes that are of the data and of nothing that may happen to an arm.
-_OF_DATA = Exchanged | InDegrees | InUnit | Reversed
 #: A torque of so many times the limit of its drive is said.
 _BEYOND = 1.5
 #: Share of samples at the very extreme of a reading, above which it is clipped.
@@ -180,7 +171,7 @@ def _mistaken(
     mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
     found = [one.hypotheses for one in mistakes if one is not None]
     if len(found) == len(recordings):
-        said = {tuple(_fault(one, arm.robot, then) for one in likely) for likely in found}
+        said = {tuple(_fault(one, then) for one in likely) for likely in found}
         (first, *others) = said
         if all(first) and not others:
             return [', or '.join(first)]
@@ -192,9 +183,7 @@ def _mistaken(
         for unit, per in units_near(now / then).items()
         if is_factor(arm.body, recordings, used, then * per)
     ]
-    scaled = len(found) == len(recordings) and all(
-        isinstance(likely[0], OtherUnit) for likely in found
-    )
+    scaled = len(found) == len(recordings) and all(likely[0].kind == 'scale' for likely in found)
     if not units and not scaled:
         return []
     days = [slow_motions_of(some, used) for some in (recordings, before)]
@@ -231,7 +220,7 @@ def mistaken_recordings(
         mistake = find_mistake(arm.body, recording, used)
         if mistake is None or not joints[mistake.joint]:
             continue
-        faults = [_fault(one, arm.robot, None) for one in mistake.hypotheses]
+        faults = [_fault(one, None) for one in mistake.hypotheses]
         if all(faults):
             said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
     return said
@@ -255,12 +244,12 @@ def _baseline_factor(
     return then if np.any(known) else None
 
 
-def _fault(mistake: Hypothesis, robot: Robot, since: float | None) -> str:
+def _fault(mistake: Hypothesis, since: float | None) -> str:
     """Say what is wrong with data; empty if it is something that may happen to an arm."""
-    if isinstance(mistake, OtherUnit):
+    if mistake.kind == 'scale':
         unit = '' if since is not None else unit_of(mistake.factor)
         return f'torques are in {unit} instead of N m: convert them' if unit else ''
-    return mistake.sentence(robot) if isinstance(mistake, _OF_DATA) else ''
+    return mistake.text if mistake.of_data else ''
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:

@@ -153,7 +153,7 @@ def _mistakes(
     for recording in recordings:
         mistake = suspected_mistake(robot, recording, result.used)
         if mistake is not None:
-            kind = (mistake.links, *mistake.hypotheses[0].kind)
+            kind = (mistake.links, mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
             alike.setdefault(kind, []).append((recording.source, mistake))
     mistakes, suspicions = [], []
     for found in alike.values():

@@ -15,12 +15,13 @@ opposite, as friction is; a body that is off from its description is therefore n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from armid_ros.effects.load import described_spread
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.effects.timing import smoothed, within_band
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
-from armid_ros.identification.assess.hypotheses import LateTorque
+from armid_ros.identification.assess.hypotheses import shifted
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
@@ -49,7 +50,14 @@ _BLOCKS = 10
 _STEPS, _SETTLED = 10, 1e-4
 
 
-def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateTorque | None:
+class Delay(NamedTuple):
+    """By how much a torque is late, negative for earlier, and half of the 95 % interval [s]."""
+
+    seconds: float
+    half_width: float
+
+
+def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
     Return a delay that is told from zero.
 
@@ -64,14 +72,14 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateT
 
     Returns
     -------
-    LateTorque or None
+    Delay or None
         With its 95 % interval; None where that holds zero.
 
     """
     stretches = list(segments(recording, used))
     seconds, half = 0.0, np.inf
     for _ in range(_STEPS):
-        moved = [LateTorque(seconds).motion(motion) for motion in stretches]
+        moved = [shifted(motion, seconds) for motion in stretches]
         rows = [
             _rows(robot, motion, used)
             for motion in moved
@@ -84,7 +92,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateT
         seconds = float(np.clip(seconds + step, -LONGEST, LONGEST))
         if abs(seconds - before) < _SETTLED:
             break
-    return LateTorque(seconds, half) if abs(seconds) > half else None
+    return Delay(seconds, half) if abs(seconds) > half else None
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:
