@@ -15,7 +15,8 @@ from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
 from armid_ros.identification.description import kinematics_digest
-from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.identify import Identification
+from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.motion import FloatArray
 import numpy as np
 

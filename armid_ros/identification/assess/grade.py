@@ -22,8 +22,9 @@ from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import Mistake, suspected_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
-from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
+from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.identification.rows.stamps import rounded_stamps, uneven_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.identification.identify import Fit
 from armid_ros.identification.rows.checks import moving
+from armid_ros.identification.rows.regression import Fit
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 import numpy as np

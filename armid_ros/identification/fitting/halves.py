@@ -77,7 +77,20 @@ def halves_error(
     halves = slice(0, middle), slice(middle, None)
     left = np.zeros_like(tau)
     for fitted, predicted in (halves, halves[::-1]):
-        change = _fit(columns[fitted], rest[fitted], tau[fitted], weight[fitted], most)
+        # a Bayesian estimate in units of the residual, of changes as large as the description may
+        # be off by, or as the torque there is; without it, what a half does not tell at all would
+        # be any number. Where next to nothing is left, the residual is no unit, and what a half
+        # does not tell stays as it is described
+        own = weight[fitted]
+        stacked = (columns[fitted] * own[:, :, np.newaxis]).reshape(-1, columns.shape[2])
+        size = np.sqrt(np.mean(stacked**2, axis=0))
+        size = np.where(size > 0.0, size, 1.0)
+        torque = np.sqrt(np.mean((tau[fitted] * own) ** 2))
+        stacked = stacked / size
+        normal = stacked.T @ stacked
+        normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2 + (most * size) ** -2.0
+        aim = stacked.T @ (rest[fitted] * own).ravel()
+        change = informative_solution(normal, aim) / size
         left[predicted] = rest[predicted] - columns[predicted] @ change
     error, length = (np.linalg.norm(told * rows, axis=0) for rows in (left, tau))
     whole = float(np.linalg.norm(length))
@@ -85,28 +98,3 @@ def halves_error(
         float(100.0 * np.linalg.norm(error) / whole) if whole > 0.0 else 0.0,
         100.0 * np.divide(error, length, out=np.zeros_like(error), where=length > 0.0),
     )
-
-
-def _fit(
-    columns: FloatArray,
-    rest: FloatArray,
-    tau: FloatArray,
-    weight: FloatArray,
-    most: FloatArray,
-) -> FloatArray:
-    """
-    Fit changes of the description, each as large as it may be off by, or as the torque there is.
-
-    That is a Bayesian estimate in units of the residual; without it, what a half does not tell at
-    all would be any number. Where next to nothing is left, the residual is no unit, and what a
-    half does not tell stays as it is described.
-
-    """
-    stacked = (columns * weight[:, :, np.newaxis]).reshape(-1, columns.shape[2])
-    size = np.sqrt(np.mean(stacked**2, axis=0))
-    size = np.where(size > 0.0, size, 1.0)
-    torque = np.sqrt(np.mean((tau * weight) ** 2))
-    stacked = stacked / size
-    normal = stacked.T @ stacked
-    normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2 + (most * size) ** -2.0
-    return np.asarray(informative_solution(normal, stacked.T @ (rest * weight).ravel()) / size)

@@ -30,7 +30,12 @@ from armid_ros.identification.fitting.nonlinear import (
     ungrouped,
 )
 from armid_ros.identification.fitting.triangle import within
-from armid_ros.identification.rows.regression import filtered_columns, Regression, regressions
+from armid_ros.identification.rows.regression import (
+    filtered_columns,
+    Regression,
+    regressions,
+    weighted_rows,
+)
 from armid_ros.identification.rows.signals import (
     Conditioning,
     sampling_rate,
@@ -172,14 +177,11 @@ def by_instruments(
         If the instruments do not correlate with the columns in every parameter.
 
     """
-    rank = problem[0].columns.shape[2]
-    w, z = (
-        (weights[:, :, np.newaxis] * np.concatenate(parts)).reshape(-1, rank)
-        for parts in ([part.columns for part in problem], instruments)
-    )
+    w, target = weighted_rows(problem, weights)
+    rank = w.shape[1]
+    z = (weights[:, :, np.newaxis] * np.concatenate(instruments)).reshape(-1, rank)
     scale = np.linalg.norm(w, axis=0)
     w, z = w / scale, z / scale
-    target = (weights * np.concatenate([part.target for part in problem])).ravel()
     (triangle,) = scipy.linalg.qr(w, mode='r', check_finite=False)
     triangle = triangle[:rank]
     try:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.identification.fitting.normal_equations import NormalEquations
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -79,9 +79,8 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
     for part in problem:
         weight = weights[first : first + len(part.target)]
         first += len(part.target)
-        columns = (part.columns * weight[:, :, np.newaxis]).reshape(-1, len(values))
-        rest = (part.target - part.columns @ values) * weight
-        own = NormalEquations.of_rows(columns, rest.ravel())
+        columns, target = weighted_rows([part], weight)
+        own = NormalEquations.of_rows(columns, target - columns @ values)
         parts[part.source] = parts[part.source] + own if part.source in parts else own
     if len(parts) < 2:
         return np.zeros((0, len(values)))

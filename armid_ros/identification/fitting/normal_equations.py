@@ -98,29 +98,16 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
     scaled = products * np.outer(scale, scale)
-    whole = _inverse_factor(scaled, tolerance)
-    if whole is not None:
-        return np.asarray(scale[:, np.newaxis] * whole)
+    lower, failed = scipy.linalg.lapack.dpotrf(scaled, lower=True)
+    if not failed and len(scaled):
+        inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
+        # the smallest eigenvalue is at least one over the trace of the inverse, and the largest
+        # at most the trace of the products: every direction is told
+        if np.sum(inverse**2) * np.trace(scaled) * tolerance <= 1.0:
+            return np.asarray(scale[:, np.newaxis] * inverse.T)
     values, vectors = np.linalg.eigh(scaled)
     good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
-
-
-def _inverse_factor(products: FloatArray, tolerance: float) -> FloatArray | None:
-    """
-    Return B of the inverse B B' where every direction is told; None where one may not be.
-
-    The smallest eigenvalue is at least one over the trace of the inverse, and the largest is at
-    most the trace of the products.
-
-    """
-    lower, failed = scipy.linalg.lapack.dpotrf(products, lower=True)
-    if failed or not len(products):
-        return None
-    inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
-    if np.sum(inverse**2) * np.trace(products) * tolerance > 1.0:
-        return None
-    return np.asarray(inverse.T)
 
 
 def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ from armid_ros.identification.physical.physical_certificate import (
     walls_reached,
 )
 from armid_ros.identification.physical.physical_program import Box, PhysicalProgram
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.model import BaseParameters
 from armid_ros.model.pseudo_inertia import (
     Consistency,
@@ -132,7 +132,7 @@ def fit_bodies(
     """
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
-    blocks = compress(problem, weights, settings.blocks)
+    blocks = _compress(problem, weights, settings.blocks)
     whole = np.concatenate(blocks)
     least = float(np.linalg.norm(_residual(whole, unconstrained.values)))
     least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
@@ -269,35 +269,15 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     return theta, tuple(notes)
 
 
-def compress(
+def _compress(
     problem: Sequence[Regression], weights: FloatArray, blocks: int
 ) -> tuple[FloatArray, ...]:
-    """
-    Shrink the weighted problem to one triangular factor per block of successive samples.
-
-    Parameters
-    ----------
-    problem : sequence of Regression
-        Stretches with the same r columns.
-    weights : ndarray, shape (N, n)
-        Weight of every row.
-    blocks : int
-        How many.
-
-    Returns
-    -------
-    tuple of ndarray, each of shape (k, r + 1), k <= r + 1
-        Factor of columns and torque: all that least squares needs of a block.
-
-    """
-    columns = np.concatenate([part.columns for part in problem])
-    tau = np.concatenate([part.target for part in problem])
-    factors = []
-    for rows in np.array_split(np.arange(len(tau)), blocks):
-        scaled = weights[rows, :, np.newaxis] * columns[rows]
-        stacked = np.concatenate([scaled, (weights * tau)[rows, :, np.newaxis]], axis=2)
-        factors.append(_triangle(stacked.reshape(-1, stacked.shape[2])))
-    return tuple(factors)
+    """Shrink weighted rows to one triangular factor per block of successive samples."""
+    columns, target = weighted_rows(problem, weights)
+    rows = np.column_stack([columns, target])
+    parts = np.array_split(np.arange(len(weights)), blocks)
+    ends = np.cumsum([len(part) for part in parts])[:-1] * weights.shape[1]
+    return tuple(_triangle(part) for part in np.split(rows, ends))
 
 
 def _held_out_errors(

@@ -6,10 +6,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError, RecordingError
 from armid_ros.identification import identify, Score
-from armid_ros.identification.identify import Fit
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
-from armid_ros.identification.rows.regression import regressions
+from armid_ros.identification.rows.regression import Fit, regressions
 from armid_ros.identification.samples.joint_order import JointOrder
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
