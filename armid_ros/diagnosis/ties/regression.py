@@ -31,7 +31,7 @@ from armid_ros.recording import Recording
 import numpy as np
 
 #: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
-_LEAST_Z = 4.0
+LEAST_Z = 4.0
 #: A tie so many standard deviations above zero is not excluded.
 _DOUBTFUL = 1.0
 #: Squares over noise that each fitted inertia has to explain for the description to be wrong: one
@@ -80,7 +80,7 @@ class TieRegression:
         if found.misfit > self.settings.thresholds.same_fit * problem.tau.size:
             return frozenset()
         z = found.stiffness / found.std
-        sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > _LEAST_Z}
+        sure = {joint for k, joint in enumerate(problem.spring_joints) if z[k] > LEAST_Z}
         return frozenset(sure - _tied_joints(self.arm))
 
     def springs(self, explanation: Explanation, inertias: Inertias) -> Interaction | None:
