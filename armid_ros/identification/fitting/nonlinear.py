@@ -205,15 +205,21 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     rigid = _rigid(arm)
     change[:rigid] -= free @ (free.T @ change[:rigid])
     theta = arm.theta + change
+    theta[:rigid] = _carried(theta[:rigid], free)
+    return arm.with_theta(theta)
+
+
+def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
+    """Return rigid parameters with a mass where a first moment has none, shape (10 n,)."""
+    links = rigid.reshape(-1, len(LINK_PARAMETERS))
+    lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
+    if not np.any(lacking):
+        return rigid
     # a link that is described without a mass has got a moment from the data, which tell no mass
     # apart: any changes no torque where those of links before it change along with it
-    links = theta[:rigid].reshape(-1, len(LINK_PARAMETERS))
-    lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
-    if np.any(lacking):
-        mass = np.zeros_like(links)
-        mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
-        theta[:rigid] += free @ (free.T @ mass.ravel())
-    return arm.with_theta(theta)
+    mass = np.zeros_like(links)
+    mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
+    return np.asarray(rigid + free @ (free.T @ mass.ravel()))
 
 
 def linearised(
