@@ -204,13 +204,9 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """
-    Return what the identification.json beside a model.yaml says, if it is of this model.
-
-    It has what the model was made from: groups of parameters, with their covariance. It is of the
-    model if the values of the model make those of every group.
-
-    """
+    """Return what the identification.json beside a model.yaml says, if it is of this model."""
+    # It has what the model was made from: groups of parameters, with their covariance. It is of
+    # the model if the values of the model make those of every group.
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
@@ -268,12 +264,8 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
 
 
 def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
-    """
-    Look up the robot that a file without its kinematics names, where it is still there.
-
-    A text of a model.yaml has to have all parameters of it.
-
-    """
+    """Look up the robot that a file without its kinematics names, where it is still there."""
+    # A text of a model.yaml has to have all parameters of it.
     beside = path.parent / found.robot
     source = str(beside) if is_file(beside) else found.robot
     try:

@@ -170,12 +170,8 @@ def dead_encoders(
 
 
 def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) -> Iterator[str]:
-    """
-    Say which velocities stay the same, if those of other joints that move do not.
-
-    A wheel or a turntable may go at constant speed: then its way is the integral of that.
-
-    """
+    """Say which velocities stay the same, if those of other joints that move do not."""
+    # A wheel or a turntable may go at constant speed: then its way is the integral of that.
     if recording.dq is None:
         return
     way = recording.q - recording.dq * (recording.t - recording.t[0])[:, np.newaxis]
@@ -204,12 +200,8 @@ def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
 
 
 def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
-    """
-    Return how far a recorded velocity goes beyond its mean, [rad or m].
-
-    What the integral of its white noise may reach by chance is taken off.
-
-    """
+    """Return how far a recorded velocity goes beyond its mean, [rad or m]."""
+    # What the integral of its white noise may reach by chance is taken off.
     if recording.dq is None or stop - start < 3:
         return 0.0
     dq, t = recording.dq[start:stop, joint], recording.t[start:stop]

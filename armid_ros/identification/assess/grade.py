@@ -143,12 +143,8 @@ def by_error(error: float) -> Word:
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> tuple[list[_Reason], list[_Reason]]:
-    """
-    Return what recordings show to be wrong, and what links explain as well, which is a note.
-
-    Zeros and names are those of a day: what one recording of several suggests is of its motion.
-
-    """
+    """Return what recordings show to be wrong, and what links explain as well, which is a note."""
+    # Zeros and names are those of a day: what one recording of several suggests is of its motion.
     robot = description.body
     alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     for recording in recordings:

@@ -138,12 +138,8 @@ def factors_apart(
 
 
 def _since(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]) -> FloatArray:
-    """
-    Return the factors of torques on the model's, over those of a baseline, (n,).
-
-    Zero where one is not clear, or the model does not know the torque of the baseline.
-
-    """
+    """Return the factors of torques on the model's, over those of a baseline, (n,)."""
+    # Zero where one is not clear, or the model does not know the torque of the baseline.
     factors = _factors(arm, motions)
     if not before:
         return factors

@@ -271,12 +271,9 @@ def _judge(robot: Robot, slow: Sequence[Motion], *, fitted: bool = False) -> Jud
 def _best(
     robot: Robot, tried: Sequence[Hypothesis], judge: Judge, near: Judge | None = None
 ) -> Mistake | None:
-    """
-    Return the hypothesis that gains most, if that is enough for what it is free to choose.
-
-    Beside a judge by the body as described, another one by bodies near it says which are of links.
-
-    """
+    """Return the hypothesis that gains most, if that is enough for what it is free to choose."""
+    # Beside a judge by the body as described, another one by bodies near it says which are of
+    # links.
     as_recorded = judge(AS_RECORDED)
     if as_recorded is None:
         return None
@@ -317,13 +314,9 @@ def _best(
 
 
 def _beyond_bodies(one: Hypothesis, near: Judge, as_recorded: PredictionError) -> bool:
-    """
-    Whether a change of the data explains what no body that the description may mean does.
-
-    Where the centre of a wrist lies near its axis, a few millimetres turn its weight by as much as
-    a wrong zero. A factor of all masses is none where it is material.
-
-    """
+    """Whether a change of the data explains what no body that the description may mean does."""
+    # Where the centre of a wrist lies near its axis, a few millimetres turn its weight by as much
+    # as a wrong zero. A factor of all masses is none where it is material.
     if one.of_masses:
         return True
     put_right = near(one)

@@ -95,12 +95,8 @@ def cutoff_of_torques(
 def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
-    """
-    Return the rows of each recording that a lower cut-off has as well.
-
-    It cuts more off the ends, where arms start and stop: other rows have other losses.
-
-    """
+    """Return the rows of each recording that a lower cut-off has as well."""
+    # It cuts more off the ends, where arms start and stop: other rows have other losses.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
         for part in parts:

@@ -319,12 +319,8 @@ class ChangeWatch:
         yield from self._learn(again, [self._for_estimator(sample) for sample in samples])
 
     def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
-        """
-        Return how much larger squares of residuals are than usual, 1 at least.
-
-        A change shakes the arm, and its motion is none that the parameters were learned from.
-
-        """
+        """Return how much larger squares of residuals are than usual, 1 at least."""
+        # A change shakes the arm, and its motion is none that the parameters were learned from.
         squares = count = 0.0
         for block in blocks:
             rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))

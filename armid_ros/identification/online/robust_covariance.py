@@ -250,13 +250,9 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """
-    Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it.
-
-    The noise power in a band is that of the residuals, corrected for what the fit absorbed; the
-    covariance of every value is a sum over bands, and as certain as that (Satterthwaite 1946).
-
-    """
+    """Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it."""
+    # The noise power in a band is that of the residuals, corrected for what the fit absorbed; the
+    # covariance of every value is a sum over bands, and as certain as that (Satterthwaite 1946).
     information, scores = bands.information, bands.products[..., :-1, :-1]
     size = np.sqrt(np.diag(information).clip(PRIOR_STD**-2))
     ridge = _RIDGE * np.eye(len(size))

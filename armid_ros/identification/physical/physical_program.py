@@ -202,13 +202,9 @@ class PhysicalProgram:
     def _add_log_determinant(
         self, link: int, blocks: list[Any], offsets: list[FloatArray], cones: list[Any]
     ) -> None:
-        """
-        Bound the logarithms u from above: sum u <= log det X, of the whitened X of a link.
-
-        X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
-        Nemirovski 2001, section 4.2).
-
-        """
+        """Bound the logarithms u from above: sum u <= log det X, of the whitened X of a link."""
+        # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
+        # Nemirovski 2001, section 4.2).
         first, width = self._first(link), len(self.prior) + _LOG_DETERMINANT * self.n_links
         matrix = sparse.lil_matrix((36, width))
         for index in range(PER_LINK):

@@ -111,12 +111,8 @@ class TripleLag:
         return stages
 
     def _set_step(self, dt: float) -> None:
-        """
-        Learn what the stages become of themselves, of the signal before and of its move.
-
-        A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
-
-        """
+        """Learn what the stages become of themselves, of the signal before and of its move."""
+        # A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
         x, step = self.pole * dt, self._step
         self._dt = dt
         step[0, 0] = step[1, 1] = step[2, 2] = decay = math.exp(-x)
@@ -136,18 +132,10 @@ def pole_of(cutoff: float) -> float:
 
 
 def _gain_of_curvature(pole: float) -> float:
-    """
-    Return what a triple lag makes of a constant second derivative that is 1.
-
-    Between samples the signal is a straight line, so all its curvature is at the samples, and the
-    filter sees sum(h(k)) in place of the integral of its impulse response p^3 t^2 / 2 exp(-p t).
-
-    Parameters
-    ----------
-    pole : float
-        p over the sampling rate [-].
-
-    """
+    """Return what a triple lag makes of a constant second derivative that is 1."""
+    # Between samples the signal is a straight line, so all its curvature is at the samples, and
+    # the filter sees sum(h(k)) in place of the integral of its impulse response p^3 t^2 / 2 exp(-p
+    # t).
     decay = math.exp(-pole)
     return 0.5 * pole**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
 
@@ -350,14 +338,10 @@ class CausalFilter:
         return True
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """
-        Return what stands for the samples missing before one.
-
-        A straight line would have no acceleration, so the rows would lack that of the whole gap.
-        They are on the cubic through the sample behind the gap and three before it, which are as
-        far apart as the gap is long, for then it has hardly more noise than they.
-
-        """
+        """Return what stands for the samples missing before one."""
+        # A straight line would have no acceleration, so the rows would lack that of the whole gap.
+        # They are on the cubic through the sample behind the gap and three before it, which are as
+        # far apart as the gap is long, for then it has hardly more noise than they.
         assert self._period is not None
         count = round(dt / self._period) if dt > _GAP * self._period else 1
         if count < 2 or not self._recent:

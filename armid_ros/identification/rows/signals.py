@@ -385,14 +385,10 @@ def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
-    """
-    Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint.
-
-    Stretches are positions and the frequency up to which they, or those of each joint, are no
-    noise. What is above does not count: a joint that hardly moves has nothing but noise where
-    another is still moving. All stretches count together, for the same reason.
-
-    """
+    """Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint."""
+    # Stretches are positions and the frequency up to which they, or those of each joint, are no
+    # noise. What is above does not count: a joint that hardly moves has nothing but noise where
+    # another is still moving. All stretches count together, for the same reason.
     band = rate / max(len(q) for q, _ in stretches)
     spectra = [(*_velocity_spectrum(q, rate), end) for q, end in stretches]
     for joint in range(stretches[0][0].shape[1]):
@@ -419,12 +415,8 @@ def _velocity_spectrum(q: FloatArray, rate: float) -> tuple[FloatArray, FloatArr
 
 
 def _noise_crossing(recording: Recording) -> FloatArray:
-    """
-    Return where the spectrum of each position meets its noise, shape (n,) [Hz].
-
-    The noise is white at the sensor; its level is the median of the upper two fifths.
-
-    """
+    """Return where the spectrum of each position meets its noise, shape (n,) [Hz]."""
+    # The noise is white at the sensor; its level is the median of the upper two fifths.
     frequency, power, floor = _position_spectrum(recording)
     above = power > NOISE_MARGIN * floor
     return np.array([frequency[np.argmin(column)] for column in above.T])

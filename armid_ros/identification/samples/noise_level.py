@@ -121,12 +121,8 @@ class NoiseLevel:
 
     @property
     def _resolution(self) -> FloatArray:
-        """
-        Return the smallest step of every signal, at least the finest one.
-
-        A signal that moves fast makes no small steps; but by its resolution it leaves any line.
-
-        """
+        """Return the smallest step of every signal, at least the finest one."""
+        # A signal that moves fast makes no small steps; but by its resolution it leaves any line.
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
         return np.maximum(np.minimum(self._most, step), self._finest)
 

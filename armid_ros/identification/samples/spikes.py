@@ -363,13 +363,9 @@ class SpikeGate:
         return False
 
     def _stepped(self, floor: FloatArray | float) -> bool:
-        """
-        Return whether a signal that never steps has stepped between what is known and held.
-
-        The lines before and behind a step do not meet in between; those of a turn, as in a
-        collision, do.
-
-        """
+        """Return whether a signal that never steps has stepped between what is known and held."""
+        # The lines before and behind a step do not meet in between; those of a turn, as in a
+        # collision, do.
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
         far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))

@@ -311,13 +311,9 @@ def _free_body(
 
 
 def _passed(used: Conditioning) -> FloatArray:
-    """
-    Return the filtered covariance of white noise in position, velocity, acceleration.
-
-    Of a row with itself and with later ones, shape (1 + lags, 3, 3). Columns change slowly
-    compared with the filter of the decimation, so noise passes it as if it were alone.
-
-    """
+    """Return the filtered covariance of white noise in position, velocity, acceleration."""
+    # Of a row with itself and with later ones, shape (1 + lags, 3, 3). Columns change slowly
+    # compared with the filter of the decimation, so noise passes it as if it were alone.
     w = np.linspace(0.0, np.pi, 8001)
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4

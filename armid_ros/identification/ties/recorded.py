@@ -234,11 +234,7 @@ def _crossing(recording: Recording, rate: float) -> float:
 
 
 def _white(signals: FloatArray) -> FloatArray:
-    """
-    Return the standard deviation of white noise in signals of shape (N, n).
-
-    Differences of high order leave nothing of a motion that is sampled densely.
-
-    """
+    """Return the standard deviation of white noise in signals of shape (N, n)."""
+    # Differences of high order leave nothing of a motion that is sampled densely.
     differences = np.diff(signals, _ORDER, axis=0)
     return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER)))

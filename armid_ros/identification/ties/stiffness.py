@@ -158,12 +158,8 @@ def identify_interaction(
 def _compensated(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """
-    Solve the normal equations less what noise adds to them on average.
-
-    Linear, so that it leads from anywhere to near the solution; weights are those at theta.
-
-    """
+    """Solve the normal equations less what noise adds to them on average."""
+    # Linear, so that it leads from anywhere to near the solution; weights are those at theta.
     weight = np.linalg.inv(_noise(problem, problem.sensitivity(theta), variance))
     weighted = np.einsum('nij,njp->nip', weight, problem.columns)
     each = np.einsum('nij,njpx->nipx', weight, problem.columns_by_motion @ problem.motion_noise)
@@ -180,13 +176,10 @@ def _compensated(
 def _scaled(
     problem: InteractionProblem, theta: FloatArray, step: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """
-    Return a step, by powers of two as long as the weighted residuals become smaller.
-
-    Where noise makes most of a column, as of accelerations that are small, the information is too
-    large and steps are too short, ten times and more; others overshoot. Nothing if none is good.
-
-    """
+    """Return a step, by powers of two as long as the weighted residuals become smaller."""
+    # Where noise makes most of a column, as of accelerations that are small, the information is
+    # too large and steps are too short, ten times and more; others overshoot. Nothing if none is
+    # good.
     before = _loss(problem, theta, variance)
     reached = _loss(problem, theta + step, variance)
     for _ in range(_HALVINGS):
@@ -207,14 +200,10 @@ def _scaled(
 def _along_the_valley(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """
-    Return the solution, from a theta near it, by a quasi-Newton method (BFGS).
-
-    Where noise makes most of a column the loss is a valley much flatter than the information says,
-    in which steps of Gauss and Newton go to and fro. The curvature is learned from the gradients,
-    beginning with the information.
-
-    """
+    """Return the solution, from a theta near it, by a quasi-Newton method (BFGS)."""
+    # Where noise makes most of a column the loss is a valley much flatter than the information
+    # says, in which steps of Gauss and Newton go to and fro. The curvature is learned from the
+    # gradients, beginning with the information.
     _, information, _, _ = _gauss_newton(problem, theta, variance)
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
@@ -285,13 +274,9 @@ def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArr
 def _gauss_newton(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """
-    Return the step of the parameters and their information, and what both are made of.
-
-    These are the columns at the motion that the residuals make likely, shape (N, n, P), and the
-    residuals over their covariance, shape (N, n).
-
-    """
+    """Return the step of the parameters and their information, and what both are made of."""
+    # These are the columns at the motion that the residuals make likely, shape (N, n, P), and the
+    # residuals over their covariance, shape (N, n).
     by_motion = problem.sensitivity(theta)
     covariance = _noise(problem, by_motion, variance)
     pull = np.linalg.solve(covariance, problem.residual(theta)[..., np.newaxis])[..., 0]
@@ -315,14 +300,10 @@ def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatAr
 def _covariance(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray, excess: float
 ) -> FloatArray:
-    """
-    Return the covariance of the parameters at the solution, H^-1 B H^-1.
-
-    B is that of the scores. Filters make neighbours alike, by how much is known; where the scores
-    add up to more, as of noise that was not white before, deviations are widened (Newey and West
-    1987). Poses are independent, and B is H.
-
-    """
+    """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
+    # B is that of the scores. Filters make neighbours alike, by how much is known; where the
+    # scores add up to more, as of noise that was not white before, deviations are widened (Newey
+    # and West 1987). Poses are independent, and B is H.
     _, information, columns, pull = _gauss_newton(problem, theta, variance)
     size = np.sqrt(np.diag(information))
     scaled = np.linalg.inv(information / np.outer(size, size))
