@@ -22,7 +22,7 @@ from armid_ros.identification.rows.signals import Conditioning, decimate, segmen
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
-from armid_ros.simulation import Controller, Plant, simulate, SimulatedRun
+from armid_ros.simulation import Controller, Plant, simulate
 from armid_ros.simulation.controller import Desired
 import numpy as np
 import pinocchio as pin
@@ -77,22 +77,8 @@ class ForwardScore:
 
 
 @dataclass(frozen=True, eq=False)
-class RecordedTorque(Controller):
-    """
-    The recorded torque, and a feedback that holds the arm to the recorded motion.
-
-    Attributes
-    ----------
-    motion : Motion
-        Recorded motion with torque.
-    robot : Robot
-        Gives the inertia matrix of the feedback.
-    bandwidth : float
-        Natural frequency [rad/s].
-    inertia : ndarray, shape (n,)
-        Rotor inertias that are added to that of the links [kg m^2].
-
-    """
+class _RecordedTorque(Controller):
+    """The recorded torque, and a feedback of an inertia that holds the arm to its motion."""
 
     motion: Motion
     robot: Robot
@@ -166,7 +152,12 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    run, controller = driven(arm.along(reference), reference, nominal or arm, bandwidth)
+    nominal = nominal or arm
+    added = nominal.action().inertia
+    rotors = np.zeros(motion.n_joints) if added is None else np.diag(added)
+    controller = _RecordedTorque(reference, nominal.body, bandwidth, rotors)
+    plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
+    run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
     t = run.truth.t
     recorded = np.column_stack([np.interp(t, reference.t, column) for column in reference.q.T])
     given = controller.feedforward(run.truth)
@@ -182,34 +173,6 @@ def forward_validation(
         motion=motion,
         simulated=np.column_stack([np.interp(reference.t, t, q) for q in run.truth.q.T]),
     )
-
-
-def driven(
-    arm: ArmModel, reference: Motion, nominal: ArmModel, bandwidth: float = BANDWIDTH
-) -> tuple[SimulatedRun, RecordedTorque]:
-    """
-    Simulate an arm under the recorded torques of a motion and the feedback that holds it to it.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        What is simulated.
-    reference : Motion
-        Recorded motion with torque, from time zero on.
-    nominal : ArmModel
-        Gives the inertia matrix of the feedback.
-    bandwidth : float
-        Natural frequency of the feedback [rad/s].
-
-    """
-    added = nominal.action().inertia
-    n = reference.n_joints
-    controller = RecordedTorque(
-        reference, nominal.body, bandwidth, np.zeros(n) if added is None else np.diag(added)
-    )
-    plant = Plant(unlimited(arm), hard_stops=False)
-    run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
-    return run, controller
 
 
 def unlimited(arm: ArmModel) -> ArmModel:

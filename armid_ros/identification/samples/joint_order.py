@@ -5,54 +5,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from armid_ros.errors import RecordingError
 import numpy as np
 import numpy.typing as npt
 
 
-@dataclass(frozen=True)
-class JointOrder:
+def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
     """
-    Where the joints of a robot are in a message that names its joints in an order of its own.
+    Return the positions of wanted joints among the names of a message; others are left out.
 
-    Attributes
+    Parameters
     ----------
-    joints : tuple of str
+    joints : sequence of str
         The joints that are wanted, in the order that is wanted.
+    names : sequence of str
+        Joint names of the message, such as JointState.name.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        ``position[indices]`` is in the order that is wanted.
+
+    Raises
+    ------
+    RecordingError
+        If joints are missing or named twice; the message lists them.
 
     """
-
-    joints: tuple[str, ...]
-
-    def map(self, names: Sequence[str]) -> npt.NDArray[np.intp]:
-        """
-        Return the positions of the wanted joints among the names; others are left out.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Joint names of the message, such as JointState.name.
-
-        Returns
-        -------
-        ndarray of int, shape (n,)
-            ``position[indices]`` is in the order that is wanted.
-
-        Raises
-        ------
-        RecordingError
-            If joints are missing or named twice; the message lists them.
-
-        """
-        missing = [joint for joint in self.joints if joint not in names]
-        if missing:
-            raise RecordingError(
-                f'joint states without {", ".join(missing)}; they name '
-                f'{", ".join(names) or "no joints"}'
-            )
-        twice = [joint for joint in self.joints if list(names).count(joint) > 1]
-        if twice:
-            raise RecordingError(f'joint states name {", ".join(twice)} twice')
-        return np.array([list(names).index(joint) for joint in self.joints], dtype=np.intp)
+    missing = [joint for joint in joints if joint not in names]
+    if missing:
+        raise RecordingError(
+            f'joint states without {", ".join(missing)}; they name '
+            f'{", ".join(names) or "no joints"}'
+        )
+    twice = [joint for joint in joints if list(names).count(joint) > 1]
+    if twice:
+        raise RecordingError(f'joint states name {", ".join(twice)} twice')
+    return np.array([list(names).index(joint) for joint in joints], dtype=np.intp)

@@ -35,8 +35,7 @@ from dataclasses import replace
 import math
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.samples.line_errors import line_errors, LineErrors
-from armid_ros.identification.samples.noise_level import NoiseLevel, SEEN, SHARE, WINDOW
+from armid_ros.identification.samples.noise_level import line_errors, LineErrors, NoiseLevel
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
@@ -202,10 +201,7 @@ class SpikeGate:
 
     def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
         """Return how far off the samples of a whole recording are, as `take` would predict."""
-        lines = line_errors(
-            t, x, self._turn, max_gap=self._max_gap, window=WINDOW, share=SHARE, seen=SEEN
-        )
-        return replace(lines, quantile=self._quantile_of(lines.usual.period))
+        return line_errors(t, x, self._turn, self._max_gap, self._quantile_of)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
