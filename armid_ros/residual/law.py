@@ -79,28 +79,11 @@ class Law:
         return said
 
 
-@dataclass(frozen=True)
-class Column:
+def library(
+    inputs: FloatArray, low: float, high: float, prismatic: bool
+) -> list[tuple[str, str, FloatArray]]:
     """
-    A term of the library along data.
-
-    Attributes
-    ----------
-    text, unit : str
-        What it is, and the unit of its factor.
-    values : ndarray, shape (N,)
-        Its values.
-
-    """
-
-    text: str
-    unit: str
-    values: FloatArray
-
-
-def library(inputs: FloatArray, low: float, high: float, prismatic: bool) -> tuple[Column, ...]:
-    """
-    Return the terms that are tried.
+    Return the terms that are tried: text, unit of the factor, and values along the data, (N,).
 
     Parameters
     ----------
@@ -142,7 +125,7 @@ def library(inputs: FloatArray, low: float, high: float, prismatic: bool) -> tup
     for place in low + np.array(_PLACES) * (high - low):
         terms.append((f'max(q - {place:.3g}, 0)', f'{force}/{x}', np.maximum(q - place, 0.0)))
         terms.append((f'max({place:.3g} - q, 0)', f'{force}/{x}', np.maximum(place - q, 0.0)))
-    return tuple(Column(*term) for term in terms)
+    return terms
 
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
@@ -164,7 +147,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = library(rows.inputs, *ends, prismatic)
-    x = np.column_stack([column.values for column in columns])
+    x = np.column_stack([values for _, _, values in columns])
     losses = np.array([_losses(x, rows, count) for count in range(1, _TERMS + 1)])
     best = int(np.argmin(losses.sum(axis=1)))
     count = next(k for k in range(best + 1) if _as_good(losses[k], losses[best])) + 1
@@ -175,7 +158,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
         return None
     size = np.abs(factors) * np.sqrt(np.mean(x**2, axis=0))
     order = sorted(chosen, key=lambda k: -size[k])
-    terms = tuple(Term(columns[k].text, float(factors[k]), columns[k].unit) for k in order)
+    terms = tuple(Term(columns[k][0], float(factors[k]), columns[k][1]) for k in order)
     return Law(terms, share)
 
 

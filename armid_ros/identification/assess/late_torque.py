@@ -144,7 +144,11 @@ def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
     """
     rows = np.concatenate(parts, axis=1)
     own, shared = np.split(rows[:, :, :-1], [_OWN], axis=2)
-    shared = _without(own, shared / _size(rows[:, :, -1:]))
+    # what columns of each joint's own leave of the others (Frisch and Waugh 1933)
+    shared, own = shared / _size(rows[:, :, -1:]), own / _size(own)
+    turned = own.transpose(0, 2, 1)
+    normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
+    shared = shared - own @ np.linalg.solve(normal, turned @ shared)
     near, rate, rest = shared[:, :, :-2], shared[:, :, -2], shared[:, :, -1]
     stacked = near.reshape(-1, near.shape[2])
     prior = LIMITS.floor**2 * near.shape[1] / FREEDOM
@@ -159,14 +163,6 @@ def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
     blocks = [float(part.sum()) for part in np.array_split(score, _BLOCKS, axis=1)]
     deviation = max(_spread(np.array(blocks)), _spread(score.sum(axis=1))) / known
     return delay, float(student.ppf(0.975, _BLOCKS - 1)) * deviation
-
-
-def _without(own: FloatArray, shared: FloatArray) -> FloatArray:
-    """Return what columns of each joint's own leave of others (Frisch and Waugh 1933)."""
-    own = own / _size(own)
-    turned = own.transpose(0, 2, 1)
-    normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
-    return np.asarray(shared - own @ np.linalg.solve(normal, turned @ shared))
 
 
 def _size(columns: FloatArray) -> FloatArray:

@@ -25,7 +25,7 @@ from armid_ros.identification.online.change_score import (
     ScoreStatistics,
     weighing,
 )
-from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
+from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -165,7 +165,7 @@ class ChangeSearch:
     def interrupt(self) -> None:
         """Begin a new stretch of blocks, which does not continue the one before."""
         self._blocks: deque[Projected] = deque(maxlen=_KEPT)
-        self._waiting: deque[dict[int, Weighed]] = deque()
+        self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
@@ -187,9 +187,9 @@ class ChangeSearch:
         for m in lengths:
             window = yield from self._window(len(self._blocks) - m, residual_scale)
             yield
-            weighed[m] = Weighed(self._ratios(window), window.strength)
+            weighed[m] = self._ratios(window), window.strength
             if self._chance > 0.0:
-                excess = self._usual[m].excess(weighed[m], self._chance)
+                excess = self._usual[m].excess(*weighed[m], self._chance)
                 positive = positive or bool(np.any(excess > 1.0))
             yield
         if positive:
@@ -201,7 +201,7 @@ class ChangeSearch:
         self._waiting.append(weighed)
         if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
             for m, values in self._waiting.popleft().items():
-                self._work.begin(self._usual[m].learning(values))
+                self._work.begin(self._usual[m].learning(*values))
         return None
 
     def size(

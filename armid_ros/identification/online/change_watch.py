@@ -179,9 +179,6 @@ class ChangeWatch:
             self._open.samples.append((sample, seed))
         return self._estimator.update(*sample)
 
-    def _for_estimator(self, sample: WeightedSample) -> WeightedSample:
-        return sample._replace(rows=sample.rows[:, : self._asked])
-
     def _among_all(self, directions: FloatArray) -> FloatArray:
         """Return directions in the parameters of the estimator in those of the wider one."""
         more = len(self._wider.parameters) - self._asked
@@ -316,7 +313,8 @@ class ChangeWatch:
 
     def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)
-        yield from self._learn(again, [self._for_estimator(sample) for sample in samples])
+        own = [sample._replace(rows=sample.rows[:, : self._asked]) for sample in samples]
+        yield from self._learn(again, own)
 
     def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
         """Return how much larger squares of residuals are than usual, 1 at least."""

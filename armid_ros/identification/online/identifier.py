@@ -24,7 +24,6 @@ from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, che
 from armid_ros.identification.rows.row_noise import RowNoise
 from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.spikes import SpikeGate
-from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -200,7 +199,8 @@ class OnlineIdentifier:
             self.latest = self._take(t, signal)
         else:
             good = self._gate.take(t, signal, self._without_consequence)
-            self.latest = tuple(one for sample in good for one in self._take_good(sample))
+            found = [self._take(one.t, one.x, begins=one.begins) for one in good]
+            self.latest = tuple(one for brought in found for one in brought)
         self._go_on(learned)
         return self.latest[-1] if self.latest else None
 
@@ -222,15 +222,13 @@ class OnlineIdentifier:
         self._work.finish()
         return self.__dict__
 
-    def _take_good(self, sample: StreamSample) -> tuple[OnlineSample, ...]:
-        """Learn from a sample of the gate, which says where a stretch begins."""
-        if sample.begins:
-            self._filter.restart('position_step')
-        return self._take(sample.t, sample.x)
-
-    def _take(self, t: float, signal: FloatArray) -> tuple[OnlineSample, ...]:
-        """Learn from a good sample; return what it brought, if anything."""
+    def _take(
+        self, t: float, signal: FloatArray, *, begins: bool = False
+    ) -> tuple[OnlineSample, ...]:
+        """Learn from a good sample, which may begin a stretch; return what it brought."""
         n = self.arm.robot.n_joints
+        if begins:
+            self._filter.restart('position_step')
         self._checks.take(t, signal[:n], signal[-n:])
         motion = self._filter.advance(t, signal)
         if motion is None:

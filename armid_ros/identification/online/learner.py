@@ -65,7 +65,6 @@ class Learner:
             base.parameters,
             sensor_noise(arm.robot, settings.torque_noise),
             forgetting=settings.forgetting,
-            prior=settings.prior,
             start=base.values(arm.theta),
             scale_covariance=settings.torque_noise is None,
         )

@@ -13,9 +13,8 @@ distribution, its degrees of freedom counting how much was measured.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
-from armid_ros.identification.online.background import at_once, Job, Pieces
+from armid_ros.identification.online.background import Job, Pieces
 from armid_ros.identification.online.history import History
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -45,24 +44,6 @@ _ROUNDS = 8
 _FEWEST = 12.0
 #: Numbers that are looked at in one piece of work.
 _AT_A_TIME = 4_000
-
-
-@dataclass(frozen=True, eq=False)
-class Weighed:
-    """
-    What a window says of C candidates with Q quantities in all.
-
-    Attributes
-    ----------
-    ratios : ndarray, shape (C,)
-        Twice the logarithms of the likelihood ratios; 0: no data.
-    strength : ndarray, shape (Q,)
-        Squares of the torques that a unit of each quantity would make.
-
-    """
-
-    ratios: FloatArray
-    strength: FloatArray
 
 
 class NullCalibration:
@@ -110,16 +91,22 @@ class NullCalibration:
         self._freedom = np.zeros(len(sizes))
         self._limits: tuple[FloatArray, float, FloatArray] | None = None
 
-    def learn(self, window: Weighed) -> None:
-        """Take in a window in which nothing changed."""
-        at_once(self.learning(window))
+    def learning(self, ratios: FloatArray, strength: FloatArray) -> Job:
+        """
+        Take in a window in which nothing changed, piece by piece.
 
-    def learning(self, window: Weighed) -> Job:
-        """Take in a window in which nothing changed, piece by piece."""
-        if not np.any(window.ratios > 0.0):
+        Parameters
+        ----------
+        ratios : ndarray, shape (C,)
+            Twice the logarithms of the likelihood ratios; 0: no data.
+        strength : ndarray, shape (Q,)
+            Squares of the torques that a unit of each quantity would make.
+
+        """
+        if not np.any(ratios > 0.0):
             return
-        self._ratios.append(window.ratios)
-        self._strengths.append(window.strength)
+        self._ratios.append(ratios)
+        self._strengths.append(strength)
         self._fresh += 1
         if self._fresh < max(_EVERY, _SHARE * len(self._ratios)):
             return
@@ -182,7 +169,7 @@ class NullCalibration:
         place = (1.0 - _RARE) * (count - 1) - (count - len(largest))
         return float(np.interp(place, np.arange(len(largest)), np.sort(largest)))
 
-    def excess(self, window: Weighed, chance: float) -> FloatArray:
+    def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
         Return statistics over what they exceed with so small a chance; 0: too early to say.
 
@@ -191,8 +178,8 @@ class NullCalibration:
 
         Parameters
         ----------
-        window : Weighed
-            The statistics.
+        ratios, strength : ndarray
+            The statistics, as of `learning`.
         chance : float
             Of each to exceed its limit.
 
@@ -200,10 +187,10 @@ class NullCalibration:
         judged = self._freedom > 0.0
         result = np.zeros(len(self._sizes))
         stronger = np.maximum.reduceat(
-            window.strength / self._strength.clip(_SMALLEST), self._first
+            strength / self._strength.clip(_SMALLEST), self._first
         ).clip(1.0)
         usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
-        result[judged] = window.ratios[judged] / (usual * self._limits_at(chance)[judged])
+        result[judged] = ratios[judged] / (usual * self._limits_at(chance)[judged])
         return result
 
     def _limits_at(self, chance: float) -> FloatArray:

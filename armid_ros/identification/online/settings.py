@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.rows.causal import ROW_RATE_RATIO
 import numpy as np
@@ -31,9 +30,6 @@ class OnlineSettings:
     torque_noise : tuple of float or None
         Standard deviation of the noise in single torque samples, per joint [N m]. Without it the
         noise is proportional to the torque limits and its size is taken from the residuals.
-    prior : Estimate or None
-        What is known of the base parameters; by default nothing, with the arm's values to start
-        from.
     rest_velocity : float
         A joint that is slower [rad/s or m/s] for longer than `rest_time` [s] is at rest: where
         dry friction may hold it, its torque says nothing and is not used.
@@ -57,7 +53,6 @@ class OnlineSettings:
     row_rate: float | None = None
     forgetting: float = 1.0
     torque_noise: tuple[float, ...] | None = None
-    prior: Estimate | None = None
     rest_velocity: float = 0.01
     rest_time: float = 0.1
     period: float | None = None

@@ -9,12 +9,8 @@ Reflections take rows in and leave R^T R exactly what the rows make (Bierman 197
 
 from __future__ import annotations
 
-from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
-import scipy.linalg
 from scipy.linalg import lapack
 
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
@@ -27,31 +23,6 @@ _LOSS_RATIO = 2.0
 #: The most that one sample may take away from the old information in any direction.
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
-
-
-def prior_root(
-    parameters: tuple[ParameterName, ...], prior: Estimate | None, start: npt.ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the triangle R, shape (P, P), and R theta, shape (P, 1), of the prior."""
-    if prior is None:
-        count = len(parameters)
-        values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
-        if values.shape != (count,) or not np.all(np.isfinite(values)):
-            raise IdentificationError(f'start {values}: has to be {count} finite values')
-        return np.eye(count) / PRIOR_STD, values[:, np.newaxis] / PRIOR_STD
-    if prior.parameters != parameters:
-        unknown = [p for p in prior.parameters if p not in parameters] or 'the order'
-        raise IdentificationError(f'the prior is of other parameters; different: {unknown}')
-    try:
-        factor = np.linalg.cholesky(prior.covariance)
-    except np.linalg.LinAlgError:
-        raise IdentificationError(
-            'the covariance of the prior is not positive definite: it has to give every '
-            'parameter an uncertainty'
-        ) from None
-    inverse = scipy.linalg.solve_triangular(factor, np.eye(len(parameters)), lower=True)
-    root: FloatArray = np.linalg.qr(inverse).R
-    return root, root @ prior.values[:, np.newaxis]
 
 
 def solved(root: FloatArray, right: FloatArray) -> FloatArray:

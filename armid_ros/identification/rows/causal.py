@@ -131,15 +131,6 @@ def pole_of(cutoff: float) -> float:
     return 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
 
 
-def _gain_of_curvature(pole: float) -> float:
-    """Return what a triple lag makes of a constant second derivative that is 1."""
-    # Between samples the signal is a straight line, so all its curvature is at the samples, and
-    # the filter sees sum(h(k)) in place of the integral of its impulse response p^3 t^2 / 2 exp(-p
-    # t).
-    decay = math.exp(-pole)
-    return 0.5 * pole**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
-
-
 class CausalMotion(NamedTuple):
     """
     One sample of joint motion behind the motion filter.
@@ -388,7 +379,12 @@ class CausalFilter:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
-        curvature = pole * pole / _gain_of_curvature(pole * period)
+        # what the lag makes of a second derivative of 1: between samples the signal is a straight
+        # line, all its curvature is at the samples, and the filter sees the sum of its impulse
+        # response p^3 t^2 / 2 exp(-p t) in place of the integral
+        decay, relative = math.exp(-pole * period), pole * period
+        gain = 0.5 * relative**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
+        curvature = pole * pole / gain
         slope = (0.0, pole, -pole)
         bend = slope if self._measured_velocity else (curvature, -2.0 * curvature, curvature)
         self._outputs = np.array([(0.0, 0.0, 1.0), slope, bend])

@@ -21,7 +21,7 @@ from armid_ros.identification.rows.senders import require_one_sender
 from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
-from armid_ros.recording import PartnerMotion, Recording
+from armid_ros.recording import Recording
 from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
@@ -158,7 +158,12 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     rate = float(np.median([sampling_rate(recording) for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
-        crossings = [_noise_crossing(recording) for recording in recordings]
+        # where the spectrum of each position meets its noise, which is white at the sensor
+        crossings = []
+        for recording in recordings:
+            frequency, power, floor = _position_spectrum(recording)
+            above = power > NOISE_MARGIN * floor
+            crossings.append(np.array([frequency[np.argmin(column)] for column in above.T]))
         parts = [
             (q, end)
             for recording, end in zip(recordings, crossings, strict=True)
@@ -354,21 +359,18 @@ def _differentiated(
     band = _CURVATURE_BANDS * _motion_band([(smooth[:, :n], used.cutoff_hz)], used.rate_hz)
     beside = None
     if recording.partner is not None:
-        beside = _points(recording.partner, smooth[inner, n:], dq[inner, n:])
+        # the other machine's ends of the ties along its positions and velocities
+        other, ties = recording.partner, recording.partner.ties
+        position, jacobian = points_motion(
+            other.robot,
+            [tie.other_joint for tie in ties],
+            np.array([tie.other_point for tie in ties]).reshape(-1, 3),
+            smooth[inner, n:],
+        )
+        velocity = np.einsum('nsxj,nj->nsx', jacobian, dq[inner, n:])
+        beside = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
     parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
     return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=beside)
-
-
-def _points(beside: PartnerMotion, q: FloatArray, dq: FloatArray) -> MovingPoints:
-    """Follow the other machine's ends of the ties along its positions and velocities (N, m)."""
-    position, jacobian = points_motion(
-        beside.robot,
-        [tie.other_joint for tie in beside.ties],
-        np.array([tie.other_point for tie in beside.ties]).reshape(-1, 3),
-        q,
-    )
-    names = tuple(tie.name for tie in beside.ties)
-    return MovingPoints(names, position, np.einsum('nsxj,nj->nsx', jacobian, dq))
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
@@ -412,14 +414,6 @@ def _velocity_spectrum(q: FloatArray, rate: float) -> tuple[FloatArray, FloatArr
     power = np.abs(transformed) ** 2 / len(steps)
     power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
     return fft.rfftfreq(len(steps), 1.0 / rate), power
-
-
-def _noise_crossing(recording: Recording) -> FloatArray:
-    """Return where the spectrum of each position meets its noise, shape (n,) [Hz]."""
-    # The noise is white at the sensor; its level is the median of the upper two fifths.
-    frequency, power, floor = _position_spectrum(recording)
-    above = power > NOISE_MARGIN * floor
-    return np.array([frequency[np.argmin(column)] for column in above.T])
 
 
 def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -326,12 +326,6 @@ def test_reset_forgets_everything(arm, motion, tau, clean):
     np.testing.assert_array_equal(online.estimate().values, clean.estimate().values)
 
 
-def test_prior_from_an_earlier_run_is_kept(arm, clean):
-    settings = replace(SETTINGS, prior=clean.estimate())
-    online = identifier(arm, settings)
-    np.testing.assert_allclose(online.estimate().values, clean.estimate().values, rtol=1e-6)
-
-
 @pytest.mark.parametrize(
     ('settings', 'message'),
     [
