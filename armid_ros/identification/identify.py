@@ -25,9 +25,8 @@ from armid_ros.identification.fitting.nonlinear import (
     ungrouped,
 )
 from armid_ros.identification.fitting.quasi_static import with_uncertain_inertia
-from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
+from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
-from armid_ros.identification.physical.physical_fit import fit_to_bodies
 from armid_ros.identification.rows.checks import (
     beyond_limits,
     check_length,
@@ -245,6 +244,9 @@ def identify(
             arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
+    # halves predict each other, with the description weighed as the fit weighs it
+    spread = base_spread(whole, fit.base) if _holds(settings) else None
+    values = fit.base.values(whole.theta)
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -256,7 +258,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes + _unsettled(fit),
-        halves=_halves(whole, fit, settings),
+        halves=halves_error(fit.problem, fit.solution.weights, values, spread),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
@@ -282,15 +284,6 @@ def _fitted(
 def _holds(settings: IdentificationSettings) -> bool:
     """Whether the description stays where it is surer; a fit among bodies weighs it by itself."""
     return settings.physical is None and settings.method == settings.least_squares
-
-
-def _halves(
-    description: ArmModel, fit: FittedValues, settings: IdentificationSettings
-) -> HalvesError:
-    """Let halves predict each other, with the description weighed as the fit weighs it."""
-    spread = base_spread(description, fit.base) if _holds(settings) else None
-    described = fit.base.values(description.theta)
-    return halves_error(fit.problem, fit.solution.weights, described, spread)
 
 
 def _require_samples(

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
@@ -38,7 +37,7 @@ class SampleWindow:
     Attributes
     ----------
     moved : float
-        Time in which any joint moved, since the window was made or cleared [s].
+        Time in which any joint moved, since the window was made [s].
 
     """
 
@@ -74,11 +73,6 @@ class SampleWindow:
         """Memory of the samples [bytes]."""
         return self._rows.nbytes
 
-    def clear(self) -> None:
-        """Forget all samples."""
-        self._first = self._end = 0
-        self.moved = 0.0
-
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
     ) -> bool:
@@ -113,19 +107,14 @@ class SampleWindow:
         row = self._rows[self._end]
         row[0], row[1 : n + 1], row[2 * n + 1 :] = t, q, tau
         row[n + 1 : 2 * n + 1] = np.nan if dq is None else dq
-        self._count_motion(row, n)
+        if len(self):
+            before = self._rows[self._end - 1]
+            step = row[0] - before[0]
+            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > self._rest * step:
+                self.moved += step
         self._end += 1
         self._first = max(self._first, self._end - self._capacity)
         return True
-
-    def _count_motion(self, row: FloatArray, n: int) -> None:
-        """Add to the time of motion if the joints moved since the sample before."""
-        if not len(self):
-            return
-        before = self._rows[self._end - 1]
-        step = row[0] - before[0]
-        if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > self._rest * step:
-            self.moved += step
 
     def recording(self, since: float = -np.inf, source: str = 'window') -> Recording:
         """

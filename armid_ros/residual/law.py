@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 import warnings
 
 from armid_ros.motion import FloatArray
@@ -77,6 +78,14 @@ class Law:
             body = factor if term.text == '1' else f'{factor} {term.text}'
             said += f' {sign} {body}' if number else f'{sign}{body}'
         return said
+
+    def document(self) -> dict[str, Any]:
+        """Return it for programs to read."""
+        terms = [
+            {'term': one.text, 'coefficient': one.coefficient, 'unit': one.unit}
+            for one in self.terms
+        ]
+        return {'text': self.text, 'terms': terms, 'held_out_share': self.share}
 
 
 def library(

@@ -113,7 +113,7 @@ class Residual:
                     'length_scales': [
                         float(x) if np.isfinite(x) else None for x in one.learned.lengths
                     ],
-                    'law': None if one.law is None else _law(one.law),
+                    'law': None if one.law is None else one.law.document(),
                 }
                 for one in self.joints
             ],
@@ -138,17 +138,6 @@ def _sentence(one: JointResidual) -> str:
 def percent_of(share: float) -> str:
     """Return a share in whole per cent."""
     return f'{100.0 * share:.0f} %'
-
-
-def _law(law: Law) -> dict[str, Any]:
-    return {
-        'text': law.text,
-        'terms': [
-            {'term': term.text, 'coefficient': term.coefficient, 'unit': term.unit}
-            for term in law.terms
-        ],
-        'held_out_share': law.share,
-    }
 
 
 def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:

@@ -300,7 +300,15 @@ def _best(
     sure = believed
     likeliest = None if near is None else near(AS_RECORDED)
     if near is not None and likeliest is not None:
-        sure = [r for r in believed if _beyond_bodies(r.hypothesis, near, likeliest[0])]
+        # where the centre of a wrist lies near its axis, a few millimetres turn its weight by as
+        # much as a wrong zero; a factor of all masses is none where it is material
+        def beyond_bodies(one: Hypothesis) -> bool:
+            put_right = None if one.of_masses else near(one)
+            if put_right is None:
+                return True
+            return likeliest[0].gain(put_right[0]) >= LIMITS.gain**one.values
+
+        sure = [row for row in believed if beyond_bodies(row.hypothesis)]
         believed = sure or believed
     first = max(believed, key=lambda row: row.surplus)
     as_good = {
@@ -311,16 +319,6 @@ def _best(
     }
     likely = (first.hypothesis, *as_good.values())
     return Mistake(likely, before, first.after, fitted, links=not sure)
-
-
-def _beyond_bodies(one: Hypothesis, near: Judge, as_recorded: PredictionError) -> bool:
-    """Whether a change of the data explains what no body that the description may mean does."""
-    # Where the centre of a wrist lies near its axis, a few millimetres turn its weight by as much
-    # as a wrong zero. A factor of all masses is none where it is material.
-    if one.of_masses:
-        return True
-    put_right = near(one)
-    return put_right is None or as_recorded.gain(put_right[0]) >= LIMITS.gain**one.values
 
 
 class _Row(NamedTuple):

@@ -105,26 +105,23 @@ class JointMerger:
         self._parts.setdefault(joints, _Part(joints)).take(t, values)
         if self.missing:
             return []
-        first, *others = self._needed()
-        complete = []
-        while first.samples and all(part.reaches(first.samples[0][0]) for part in others):
-            t, values = first.samples.popleft()
-            rest = [part.at(t) for part in others]
-            merged = np.empty((len(values), self._n_joints))
-            for part, found in zip((*others, first), (*rest, values), strict=True):
-                if found is None:
-                    break
-                merged[:, part.joints] = found
-            else:
-                complete.append((t, merged))
-        return complete
-
-    def _needed(self) -> list[_Part]:
-        """Return the senders that bring a joint which none before them has, in their order."""
+        # the senders that bring a joint which none before them has
         found: list[_Part] = []
         known: set[int] = set()
         for part in self._parts.values():
             if not known.issuperset(part.joints):
                 found.append(part)
                 known.update(part.joints)
-        return sorted(found, key=lambda part: min(part.joints))
+        first, *others = sorted(found, key=lambda part: min(part.joints))
+        complete = []
+        while first.samples and all(part.reaches(first.samples[0][0]) for part in others):
+            t, values = first.samples.popleft()
+            rest = [part.at(t) for part in others]
+            merged = np.empty((len(values), self._n_joints))
+            for part, own in zip((*others, first), (*rest, values), strict=True):
+                if own is None:
+                    break
+                merged[:, part.joints] = own
+            else:
+                complete.append((t, merged))
+        return complete

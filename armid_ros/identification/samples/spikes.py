@@ -149,15 +149,12 @@ class SpikeGate:
                 self.rejected['out_of_order'] += 1
             else:
                 good = self._take(early, floor)
-        if self._leaps(t):
+        ahead = 0.0 if self._tail is None else t - self._tail.t
+        if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
+            # something seems to be lost before it
             self._early = StreamSample(t, x)
             return good
         return good + self._take(StreamSample(t, x), floor)
-
-    def _leaps(self, t: float) -> bool:
-        """Return whether something seems to be lost before a sample."""
-        ahead = 0.0 if self._tail is None else t - self._tail.t
-        return _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf
 
     def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
         """Take in a sample whose stamp is not contradicted by the next one."""

@@ -25,7 +25,6 @@ from armid_ros.model import (
     rigid_parameter_names,
 )
 from armid_ros.model.spring_ties import (
-    Tie,
     tie_columns_derivatives,
     tie_geometry,
     TiedMachines,
@@ -219,13 +218,17 @@ def interaction_problem(
     slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.pulled(slack)
-    springs_by = _springs_by_motion(robot, slow, other, far, ties, slack)
+    by_angles = np.concatenate(
+        tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack), axis=3
+    )
+    springs_by = np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], 3)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     names = tuple(tie.name for tie in ties) if separate else ('all',)
     count = springs_by.shape[3] // 3
     if inertias == 'known':
-        body = _known_body(robot, motion, slow, count)
+        by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
+        body = _Body(inverse_dynamics(robot, motion), _placed(by, count))
     else:
         body = _free_body(
             robot, motion, slow, springs, count, names if separate else ('the springs',)
@@ -235,7 +238,7 @@ def interaction_problem(
     passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
-        passed, left = _passed(used), _torque_passed(used)
+        passed, left = _passed(used)
     noise = noise or MachineNoise()
     deviation = np.broadcast_to(np.asarray(noise.position, dtype=float), (count,))
     return InteractionProblem(
@@ -281,12 +284,6 @@ class _Body:
         return columns, np.concatenate([springs_by, self.columns_by], axis=2)
 
 
-def _known_body(robot: Robot, motion: Motion, slow: Motion, count: int) -> _Body:
-    """Return the torque of a body as it is described."""
-    by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
-    return _Body(inverse_dynamics(robot, motion), _placed(by, count))
-
-
 def _free_body(
     robot: Robot,
     motion: Motion,
@@ -310,10 +307,11 @@ def _free_body(
     )
 
 
-def _passed(used: Conditioning) -> FloatArray:
-    """Return the filtered covariance of white noise in position, velocity, acceleration."""
-    # Of a row with itself and with later ones, shape (1 + lags, 3, 3). Columns change slowly
-    # compared with the filter of the decimation, so noise passes it as if it were alone.
+def _passed(used: Conditioning) -> tuple[FloatArray, FloatArray]:
+    """Return what filters leave of white noise of positions and of torques, of rows and lags."""
+    # of position, velocity, acceleration of a row with itself and with later ones, shape
+    # (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with the filter
+    # of the decimation, so noise passes it as if it were alone
     w = np.linspace(0.0, np.pi, 8001)
     sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
     gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
@@ -322,14 +320,9 @@ def _passed(used: Conditioning) -> FloatArray:
     for lag, i, j in np.ndindex(result.shape):
         turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
         result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
-    return result
-
-
-def _torque_passed(used: Conditioning) -> FloatArray:
-    """Return the same of white noise of torques, shape (1 + lags,)."""
     taps = used.taps()
     ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
-    return np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
+    return result, np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 
 
 def _identifiable(
@@ -349,20 +342,6 @@ def _identifiable(
             'and inertia along this motion; keep the inertias known, or move more'
         )
     return base
-
-
-def _springs_by_motion(
-    robot: Robot,
-    motion: Motion,
-    other: Robot,
-    other_motion: Motion,
-    ties: Sequence[Tie],
-    slack: float | FloatArray,
-) -> FloatArray:
-    """Return the derivatives of the spring columns, shape (N, n, S, 3 J)."""
-    by_q, by_far = tie_columns_derivatives(robot, motion.q, other, other_motion.q, ties, slack)
-    by_angles = np.concatenate([by_q, by_far], axis=3)
-    return np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], axis=3)
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:

@@ -131,11 +131,12 @@ def together_interaction_problem(
     for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
         assert own.tau is not None
         tau = own.tau if rest is None else own.tau - rest(own)
+        far = (np.array(x[:, n:]) for x in (stretch.q, stretch.dq, stretch.ddq))
         problems.append(
             interaction_problem(
                 machines,
                 own.with_torque(tau),
-                _joints(stretch, slice(n, None), both.joints[n:]),
+                Motion(both.joints[n:], stretch.t, *far),
                 noise=noise,
                 used=used,
                 inertias=inertias,
@@ -179,12 +180,6 @@ def _one_machine(recording: Recording) -> Recording:
         tau=np.hstack([recording.tau, np.zeros_like(far)]),
         partner=None,
     )
-
-
-def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
-    assert motion.tau is not None
-    parts = (motion.q, motion.dq, motion.ddq, motion.tau)
-    return Motion(joints, motion.t, *(np.array(part[:, columns]) for part in parts))
 
 
 def band_of_motion(

@@ -122,7 +122,11 @@ def identify_interaction(
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
     theta = _least_squares(problem, columns)
     theta = np.concatenate([np.full(count, theta[0]), theta[1:]])
-    given = _given(problem, torque_noise)
+    # the variance of the torques as asked for or as measured in them, if it was
+    noise = torque_noise
+    if noise is None and np.all(problem.torque_noise > 0.0):
+        noise = problem.torque_noise
+    given = None if noise is None else np.zeros(problem.tau.shape[1]) + np.asarray(noise) ** 2
     used = _torque_variance(problem, theta) if given is None else given
     for _ in range(_LINEAR):
         theta = _compensated(problem, theta, used)
@@ -250,15 +254,6 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
         raise IdentificationError(f'{name}: its spring is never drawn out, so nothing shows it')
     y = problem.tau - problem.known
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
-
-
-def _given(problem: InteractionProblem, noise: FloatArray | float | None) -> FloatArray | None:
-    """Return the torques' variance as asked for or as measured in them, if it was."""
-    if noise is None and np.all(problem.torque_noise > 0.0):
-        noise = problem.torque_noise
-    if noise is None:
-        return None
-    return np.broadcast_to(np.asarray(noise, dtype=float) ** 2, problem.tau.shape[1:]).copy()
 
 
 def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArray:
