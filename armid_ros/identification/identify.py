@@ -15,7 +15,6 @@ from armid_ros.identification.fitting.excited import base_spread, determined, ex
 from armid_ros.identification.fitting.halves import halves_error, HalvesError
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
 from armid_ros.identification.fitting.instruments import fit_by_instruments
-from armid_ros.identification.fitting.jackknife import scatter
 from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
 from armid_ros.identification.fitting.nonlinear import (
     fit_values,
@@ -24,6 +23,7 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
+from armid_ros.identification.fitting.normal_equations import scatter
 from armid_ros.identification.fitting.quasi_static import with_uncertain_inertia
 from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate

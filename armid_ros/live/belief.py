@@ -106,34 +106,6 @@ class Belief:
         """Return the belief where nothing is wrong."""
         return replace(self, proposed=None, named=())
 
-    def accepting(self) -> Belief:
-        """
-        Return the belief where what is proposed is so.
-
-        Raises
-        ------
-        IdentificationError
-            If nothing is proposed.
-
-        """
-        if self.proposed is None:
-            raise IdentificationError('nothing is proposed')
-        return Belief(self.proposed, rejected=self.rejected)
-
-    def rejecting(self) -> Belief:
-        """
-        Return the belief where what is proposed is not so, and is not to be proposed again.
-
-        Raises
-        ------
-        IdentificationError
-            If nothing is proposed.
-
-        """
-        if self.proposed is None:
-            raise IdentificationError('nothing is proposed')
-        return Belief(self.accepted, rejected=self.rejected | {self.named[0]})
-
 
 class LiveDiagnosis:
     """
@@ -309,7 +281,8 @@ class LiveDiagnosis:
             If nothing is proposed.
 
         """
-        self.belief = self.belief.accepting()
+        proposed = self._proposed()
+        self.belief = Belief(proposed, rejected=self.belief.rejected)
         self._outdate()
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
@@ -325,9 +298,16 @@ class LiveDiagnosis:
             If nothing is proposed.
 
         """
-        self.belief = self.belief.rejecting()
+        self._proposed()
+        belief = self.belief
+        self.belief = Belief(belief.accepted, rejected=belief.rejected | {belief.named[0]})
         self._outdate()
         self._agreed = []
+
+    def _proposed(self) -> ArmModel:
+        if self.belief.proposed is None:
+            raise IdentificationError('nothing is proposed')
+        return self.belief.proposed
 
     def _outdate(self) -> None:
         """Have the answer that is under way dropped when it comes."""

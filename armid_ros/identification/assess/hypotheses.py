@@ -234,7 +234,7 @@ def other_gravity(robot: Robot, vector: FloatArray | None = None) -> Hypothesis:
     material = bool(far and length < _STRONGEST and (turns or _beyond_masses(weighs)))
     if not material:
         return Hypothesis('gravity', '', values=3, material=False)
-    axis, option = known_gravity(vector, told)
+    axis, option = known_gravity(vector, told) if length > 0.0 else (vector, '0,0,0')
     direction = ', '.join(f'{part:.3g}' for part in axis)
     return Hypothesis(
         'gravity',

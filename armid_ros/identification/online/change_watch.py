@@ -31,12 +31,12 @@ from armid_ros.identification.online.change_search import (
     FoundChange,
 )
 from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
+from armid_ros.identification.online.null_calibration import ResidualScale
 from armid_ros.identification.online.recursive import (
     Learned,
     RecursiveLeastSquares,
     WeightedSample,
 )
-from armid_ros.identification.online.residual_scale import ResidualScale
 from armid_ros.motion import FloatArray
 import numpy as np
 

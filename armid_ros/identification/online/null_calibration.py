@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Distribution of likelihood ratios while nothing changes, and the limit that it gives.
+Distribution of likelihood ratios and residuals while nothing changes, and the limit that it gives.
 
 Twice the logarithm is chi-square of p degrees only if noise is white and the model right. Noise
 that is coloured, and what the model lacks, make it larger, by a factor that is measured for every
@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.identification.online.background import Job, Pieces
-from armid_ros.identification.online.history import History
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +43,51 @@ _ROUNDS = 8
 _FEWEST = 12.0
 #: Numbers that are looked at in one piece of work.
 _AT_A_TIME = 4_000
+#: Blocks that are remembered: a minute of four a second.
+_BLOCKS = 240
+#: Blocks before the assumption is given up.
+_FEWEST_BLOCKS = 16
+#: Median of the square of a standard normal variable.
+_MEDIAN = float(stats.chi2(1).median())
+
+
+class History:
+    """
+    Rows of numbers, of which the last ones are remembered.
+
+    Parameters
+    ----------
+    width : int
+        Numbers in a row.
+    most : int
+        Rows that are remembered.
+
+    """
+
+    def __init__(self, width: int, most: int) -> None:
+        self._rows = np.empty((16, width))
+        self._most = most
+        self._end = 0
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return min(self._end, self._most)
+
+    def append(self, row: FloatArray) -> None:
+        """Take in a row."""
+        if self._end == len(self._rows):
+            kept = self.values
+            size = min(2 * len(self._rows), 2 * self._most)
+            self._rows = np.empty((size, self._rows.shape[1]))
+            self._rows[: len(kept)] = kept
+            self._end = len(kept)
+        self._rows[self._end] = row
+        self._end += 1
+
+    @property
+    def values(self) -> FloatArray:
+        """Return the rows, oldest first; they stay as they are when others come."""
+        return self._rows[self._end - len(self) : self._end]
 
 
 class NullCalibration:
@@ -226,3 +270,50 @@ def _drawn_together(
     share = variance / (variance + spread)
     left = share * spread + share**2 * np.mean(variance + spread) / independent
     return values + share * (mean - values), left
+
+
+class ResidualScale:
+    """
+    Standard deviation of residuals that last, per joint, relative to noise as assumed.
+
+    Sums of residuals over a block: what is quick cancels in them. By their median, which neither
+    the first blocks nor a change that is not yet noticed moves.
+
+    Parameters
+    ----------
+    least : float
+        What the factor is at least.
+
+    """
+
+    def __init__(self, least: float) -> None:
+        self._least = least
+        self._seen: History | None = None
+        self._value: FloatArray | None = None
+
+    @property
+    def value(self) -> FloatArray:
+        """Return the factor of every joint, shape (m,); 1 in the beginning."""
+        return np.ones(1) if self._value is None else self._value
+
+    def learn(self, residual: FloatArray, weights: FloatArray) -> None:
+        """Take in the residuals of a block, in units of the assumed noise, shape (k, m)."""
+        used = np.sum(weights > 0.0, axis=0)
+        if not used.any():
+            return  # an arm at rest must not forget what it is like in motion
+        squares = np.sum(residual, axis=0) ** 2
+        if self._seen is None:
+            self._seen = History(len(squares), _BLOCKS)
+        self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
+        if len(self._seen) < _FEWEST_BLOCKS:
+            return
+        later = self._seen.values[len(self._seen) // 2 :]
+        known = np.any(later > 0.0, axis=0)
+        value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
+        # the medians of the numbers in every column; numpy's nanmedian takes ten times it
+        values = later[:, known]
+        ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
+        columns = np.arange(values.shape[1])
+        medians = (ordered[(counts - 1) // 2, columns] + ordered[counts // 2, columns]) / 2.0
+        value[known] = np.sqrt(medians / _MEDIAN)
+        self._value = np.maximum(value, self._least)

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.senders import require_one_sender
 from armid_ros.identification.rows.spectrum import mean_spectrum
+from armid_ros.identification.rows.stamps import require_one_sender
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Recording

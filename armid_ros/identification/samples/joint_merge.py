@@ -1,14 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One stream of joint states out of several, each of which has some of the joints."""
+"""Joints by name, and one stream of joint states out of several that have some joints each."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 #: Samples of one sender that wait for those of the others.
 _WAITING = 1000
@@ -125,3 +128,37 @@ class JointMerger:
             else:
                 complete.append((t, merged))
         return complete
+
+
+def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
+    """
+    Return the positions of wanted joints among the names of a message; others are left out.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        The joints that are wanted, in the order that is wanted.
+    names : sequence of str
+        Joint names of the message, such as JointState.name.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        ``position[indices]`` is in the order that is wanted.
+
+    Raises
+    ------
+    RecordingError
+        If joints are missing or named twice; the message lists them.
+
+    """
+    missing = [joint for joint in joints if joint not in names]
+    if missing:
+        raise RecordingError(
+            f'joint states without {", ".join(missing)}; they name '
+            f'{", ".join(names) or "no joints"}'
+        )
+    twice = [joint for joint in joints if list(names).count(joint) > 1]
+    if twice:
+        raise RecordingError(f'joint states name {", ".join(twice)} twice')
+    return np.array([list(names).index(joint) for joint in joints], dtype=np.intp)

@@ -9,8 +9,7 @@ import math
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
-from armid_ros.identification.samples.joint_merge import JointMerger
-from armid_ros.identification.samples.joint_order import joint_places
+from armid_ros.identification.samples.joint_merge import joint_places, JointMerger
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
 from armid_ros.recording.joint_state.message import (

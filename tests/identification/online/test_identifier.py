@@ -10,7 +10,7 @@ from armid_ros.identification import identify, Score
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
 from armid_ros.identification.rows.regression import Fit, regressions
-from armid_ros.identification.samples.joint_order import joint_places
+from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot

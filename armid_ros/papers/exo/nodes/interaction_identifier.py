@@ -12,7 +12,7 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.identification.rows.causal import LARGEST
 from armid_ros.identification.samples.joint_gate import joint_gate
-from armid_ros.identification.samples.joint_order import joint_places
+from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
