@@ -14,7 +14,7 @@ from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Traject
 from armid_ros.diagnosis.search.candidates import with_friction
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import Conditioning, conditioning, MODEL_BANDS
 from armid_ros.identification.ties.recorded import band_of_motion

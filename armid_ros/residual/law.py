@@ -12,7 +12,6 @@ Source: Brunton, Proctor and Kutz 2016; Pati, Rezaiifar and Krishnaprasad 1993.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 import warnings
@@ -159,7 +158,10 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     x = np.column_stack([values for _, _, values in columns])
     losses = np.array([_losses(x, rows, count) for count in range(1, _TERMS + 1)])
     best = int(np.argmin(losses.sum(axis=1)))
-    count = next(k for k in range(best + 1) if _as_good(losses[k], losses[best])) + 1
+    # the fewest with which blocks are predicted as well as in the best way, to one deviation
+    worse = losses[: best + 1] - losses[best]
+    allowed = np.std(worse, axis=1, ddof=1) * np.sqrt(BLOCKS)
+    count = int(np.argmax(worse.sum(axis=1) <= allowed)) + 1
     factors = _fit(x, rows.left, count)
     chosen = np.flatnonzero(factors)
     share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.left**2)), 1e-300)
@@ -201,9 +203,3 @@ def _losses(x: FloatArray, rows: JointRows, count: int) -> FloatArray:
         factors = _fit(x[others], rows.left[others], count)
         result[block] = float(np.sum((rows.left[~others] - x[~others] @ factors) ** 2))
     return result
-
-
-def _as_good(losses: Sequence[float] | FloatArray, best: Sequence[float] | FloatArray) -> bool:
-    """Tell whether blocks are predicted as well as in the best way, to one deviation."""
-    worse = np.asarray(losses) - np.asarray(best)
-    return bool(worse.sum() <= np.std(worse, ddof=1) * np.sqrt(len(worse)))

@@ -196,7 +196,10 @@ def _learned(
     if len(rows) < _FEW:
         return None
     learned, predicted = learn_map(rows, rng)
-    if not _predicts(rows, predicted):
+    # a map has to gain on blocks it has not seen, even without the best of them
+    saved = rows.left**2 - (rows.left - predicted) ** 2
+    blocks = np.bincount(rows.block, saved, BLOCKS)
+    if not blocks.sum() - blocks.max() > 0.0:
         return None
     parts = [(rows.left, predicted)]
     near = None if unseen is None else unseen.select(near_data(learned, unseen))
@@ -222,10 +225,3 @@ def _learned(
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return which rows a map knows something of: they lie near those it was learned from."""
     return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
-
-
-def _predicts(rows: JointRows, predicted: FloatArray) -> bool:
-    """Tell whether a map gains on blocks it has not seen, even without the best of them."""
-    gain = rows.left**2 - (rows.left - predicted) ** 2
-    blocks = np.bincount(rows.block, gain, BLOCKS)
-    return bool(blocks.sum() - blocks.max() > 0.0)

@@ -152,7 +152,7 @@ def check_data(
         moved, torques = [part.motion for part in data], [part.torque for part in data]
         driven = driven_by_friction(arm.robot, moved, torques)
         faults += [wrong_sign(driven)] if driven else []
-    notes = [*_clipped(arm.robot, recordings), *_beyond_limits(arm.robot, recordings)]
+    notes = [note for one in recordings for note in _extremes(arm.robot, one)]
     notes += _described_friction(arm)
     for held in held_elsewhere(arm.robot, recordings, [part.motion for part in data]):
         (faults if held.spoils else notes).append(held.text)
@@ -290,32 +290,23 @@ def _described_friction(arm: ArmModel) -> list[str]:
     ]
 
 
-def _clipped(robot: Robot, recordings: Sequence[Recording]) -> list[str]:
-    notes = []
-    for recording in recordings:
-        if recording.tau is None:
-            continue
-        for j, joint in enumerate(recording.joints):
-            reading = recording.tau[:, j]
-            top = np.abs(reading).max()
-            share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
-            if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
-                notes.append(
-                    f'{recording.source or "recording"}: {100 * share:.0f} % of the torque of '
-                    f'{joint} is at {top:.4g} {robot.torque_units[j]}, its highest value: a limit'
-                )
-    return notes
-
-
-def _beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> Iterator[str]:
-    """Say where a torque is beyond what the description lets a drive give."""
-    limit = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
-    for recording in recordings:
-        if recording.tau is None:
-            continue
-        largest = np.max(np.abs(recording.tau), axis=0)
-        for j in np.flatnonzero(largest > _BEYOND * limit).tolist():
+def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
+    """Say where torques stay at their highest value, or are beyond what a drive can give."""
+    if recording.tau is None:
+        return
+    source = recording.source or 'recording'
+    limits = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
+    for j, (joint, limit) in enumerate(zip(robot.joints, limits, strict=True)):
+        reading, unit = recording.tau[:, j], robot.torque_units[j]
+        top = np.abs(reading).max()
+        share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
+        if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
             yield (
-                f'{recording.source or "recording"}: the torque of {robot.joints[j]} reaches '
-                f'{largest[j]:.4g}, its limit is {limit[j]:.4g} {robot.torque_units[j]}'
+                f'{source}: {100 * share:.0f} % of the torque of {joint} is at {top:.4g} {unit}, '
+                'its highest value: a limit'
+            )
+        if top > _BEYOND * limit:
+            yield (
+                f'{source}: the torque of {joint} reaches {top:.4g}, its limit is {limit:.4g} '
+                f'{unit}'
             )

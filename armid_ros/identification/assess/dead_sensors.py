@@ -86,10 +86,8 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
         if stop - start < least or not moved or at_limit:
             continue
         if _changes(arm, motions, j, float(t[start]), float(t[stop - 1])):
-            always = stop - start == len(reading)
-            when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+            when, remedy = _when(t, start, stop, 'record with the joint held still')
             value = f'{reading[start] + 0.0:.4g} {units[j]}'
-            remedy = 'record with the joint held still' if always else 'leave that time out'
             yield (
                 f'in {recording.source or "a recording"} the torque of {joint} stays at '
                 f'{value} {when} while the joint moves: its channel is dead; {remedy}'
@@ -143,15 +141,13 @@ def dead_encoders(
         steps = np.abs(np.diff(q))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(recording, j, start, stop)
-        always = stop - start == len(recording)
         t = recording.t
-        when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+        when, remedy = _when(t, start, stop, 'record again')
         reads = f'{recording.q[start, j]:.4g} {unit}'
         said = f'in {source} the position of {joint} stays at {reads} {when}'
         if goes > hidden:
             yield (
-                f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; '
-                + ('record again' if always else 'leave that time out')
+                f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; {remedy}'
             )
         elif (
             robot is not None
@@ -163,8 +159,7 @@ def dead_encoders(
         ):
             yield (
                 f'{said}, while its torque is not what weight and the other joints make of a '
-                'joint at rest: its encoder is dead; '
-                + ('record again' if always else 'leave that time out')
+                f'joint at rest: its encoder is dead; {remedy}'
             )
     yield from _dead_velocities(recording, source, units)
 
@@ -189,6 +184,13 @@ def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) ->
             f'{moved}: one of the two is dead; record again, or '
             'leave velocities out if the positions are right'
         )
+
+
+def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:
+    """Return when a reading stays the same, in words, and what to do."""
+    if stop - start == len(t):
+        return 'throughout', always
+    return f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s', 'leave that time out'
 
 
 def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:

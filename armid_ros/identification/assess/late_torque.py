@@ -129,19 +129,10 @@ def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:
 
 
 def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
-    """
-    Fit a delay of the torque of all joints beside friction, drives and a body near the described.
-
-    The deviation allows for residuals that are alike for long, or in all of a joint (Liang and
-    Zeger 1986): sums of their products with the rate over parts of the recording, or over joints,
-    whichever vary more.
-
-    Returns
-    -------
-    delay, half_width : float
-        Of its 95 % interval [s]; None where the torque of the body does not change.
-
-    """
+    """Fit a delay beside friction, drives and a near body; return it and its half width [s]."""
+    # the deviation allows for residuals that are alike for long, or in all of a joint (Liang and
+    # Zeger 1986): sums of their products with the rate over parts of the recording, or over
+    # joints, whichever vary more
     rows = np.concatenate(parts, axis=1)
     own, shared = np.split(rows[:, :, :-1], [_OWN], axis=2)
     # what columns of each joint's own leave of the others (Frisch and Waugh 1933)

@@ -242,8 +242,18 @@ class ChangeSearch:
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
-        seen = self._seen(best, first)
-        if not (at[best] > self._least_likelihood() and seen >= _EARLIEST):
+        # the blocks from one on in which the torque of the candidate shows
+        some = self._slices[best]
+        directions = self._directions[:, some]
+        moved = [one.moved[:, some] for one in self._blocks]
+        strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
+        shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
+        seen = int(np.count_nonzero(shows[first:]))
+        # soon after a change, no mere correction of its size counts as another
+        t, before = self._fresh
+        soon = self._blocks[-1].block.end - t < _LEARNING
+        least = max(_CLEAR, _CORRECTION * before) if soon else _CLEAR
+        if not (at[best] > least and seen >= _EARLIEST):
             return None
         alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
         # the load where it explains the torques as well: arms pick things up all day
@@ -253,22 +263,6 @@ class ChangeSearch:
             return None
         blocks = tuple(projected.block for projected in self._blocks)
         return FoundChange(blocks, first, named, rivals, float(at[best]))
-
-    def _seen(self, number: int, first: int) -> int:
-        """Return the blocks from one on in which the torque of a candidate shows."""
-        some = self._slices[number]
-        directions = self._directions[:, some]
-        strength = np.array(
-            [np.einsum('pq,pq->q', directions, one.moved[:, some]) for one in self._blocks]
-        )
-        shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
-        return int(np.count_nonzero(shows[first:]))
-
-    def _least_likelihood(self) -> float:
-        """Return what counts as a change: soon after one, no mere correction of its size."""
-        t, likelihood = self._fresh
-        soon = self._blocks[-1].block.end - t < _LEARNING
-        return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
 
     def _likelihood(self, ratios: FloatArray) -> FloatArray:
         """Return logarithms of likelihoods, each free parameter being charged for."""

@@ -23,7 +23,6 @@ from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import RowNoise
 from armid_ros.identification.samples.joint_gate import joint_gate
-from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -34,6 +33,11 @@ __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
 #: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
 _FORGOTTEN = 10.0
+#: A joint that is slower [rad/s or m/s] for longer than this [s], which is longer than a reversal
+#: takes, is at rest: where dry friction may hold it, its torque says nothing and is not used.
+_REST_VELOCITY, _REST_TIME = 0.01, 0.1
+#: Successive samples that may be damaged by chance; what lasts longer is real.
+_LONGEST_DAMAGE = 10
 #: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
 _PIECES = 400.0
 #: Samples between two rows of which one is for learning from the row alone; where there are fewer,
@@ -134,12 +138,18 @@ class OnlineIdentifier:
         self._filter = CausalFilter(
             robot.n_joints,
             settings.cutoff,
-            period=settings.period,
             max_gap=settings.max_gap,
             measured_velocity=settings.measured_velocity,
             prismatic=robot.prismatic,
         )
-        self._gate = _gate(arm, settings)
+        measured = 'qvt' if settings.measured_velocity else 'qt'
+        self._gate = joint_gate(
+            robot.prismatic,
+            measured,
+            torque_limit=robot.torque_limit,
+            max_gap=_LONGEST_DAMAGE,
+            false_alarm_time=(settings.changes or ChangeSettings()).false_alarm_time,
+        )
         self._checks = StreamChecks(robot)
         self._missing = MissingSamples()
         self.latest: tuple[OnlineSample, ...] = ()
@@ -165,8 +175,7 @@ class OnlineIdentifier:
         self._checks.reset()
         self._missing.reset()
         self.latest = ()
-        if self._gate is not None:
-            self._gate.reset()
+        self._gate.reset()
 
     def update(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -195,17 +204,11 @@ class OnlineIdentifier:
             self._missing.take(t, self._filter.period)
         if signal is None:
             self.latest = ()
-        elif self._gate is None:
-            self.latest = self._take(t, signal)
         else:
             good = self._gate.take(t, signal, self._without_consequence)
             found = [self._take(one.t, one.x, begins=one.begins) for one in good]
             self.latest = tuple(one for brought in found for one in brought)
-        self._go_on(learned)
-        return self.latest[-1] if self.latest else None
-
-    def _go_on(self, learned: bool) -> None:
-        """Do some of what takes long, with a sample that does nothing else if there are such."""
+        # some of what takes long, with a sample that does nothing else if there are such
         period = self._filter.period or 0.0
         if self.latest:
             busy = not self._crowded
@@ -215,6 +218,7 @@ class OnlineIdentifier:
             self._learner.settle()
             self._work.advance(max(1, round(_PIECES * period)))
         self._crowded = bool(self.latest)
+        return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Finish what is under way, for a job can be in one place only."""
@@ -318,8 +322,7 @@ class OnlineIdentifier:
     @property
     def rejected(self) -> Mapping[str, int]:
         """Joint states left out, by reason; see CausalFilter and SpikeGate."""
-        damaged = Counter() if self._gate is None else self._gate.rejected
-        return Counter(self._filter.rejected) + damaged
+        return Counter(self._filter.rejected) + self._gate.rejected
 
     @property
     def error(self) -> str:
@@ -329,7 +332,6 @@ class OnlineIdentifier:
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
         """Joint states left out as a signal jumped and came back, by joint and signal."""
-        counts = {} if self._gate is None else self._gate.spikes
         joints = self.arm.robot.joints
         names = (
             ('position', 'velocity', 'effort')
@@ -338,7 +340,7 @@ class OnlineIdentifier:
         )
         return {
             (joints[k % len(joints)], names[k // len(joints)]): count
-            for k, count in counts.items()
+            for k, count in self._gate.spikes.items()
         }
 
     @property
@@ -366,8 +368,8 @@ class OnlineIdentifier:
         """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""
         if self._last_useless is None:
             self._last_useless = np.full(len(motion.q), motion.t)
-        self._last_moving[np.abs(motion.dq) >= self.settings.rest_velocity] = motion.t
-        resting = motion.t - self._last_moving > self.settings.rest_time
+        self._last_moving[np.abs(motion.dq) >= _REST_VELOCITY] = motion.t
+        resting = motion.t - self._last_moving > _REST_TIME
         self._last_useless[resting & self._held] = motion.t
         return self._last_useless
 
@@ -376,7 +378,13 @@ class OnlineIdentifier:
     ) -> OnlineSample:
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
-        stacked = np.column_stack([motion.tau, self._rows(one)])
+        robot = self.arm.robot
+        rigid = pin.computeJointTorqueRegressor(
+            robot.model, self._data, motion.q, motion.dq, motion.ddq
+        )
+        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
+        columns = np.concatenate([rigid, self.arm.effect_columns(one)[0]], axis=1)
+        stacked = np.column_stack([motion.tau, columns.take(self.base.independent, axis=1)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows = filtered[:, 0], filtered[:, 1:]
         noise = self._row_noise()
@@ -396,15 +404,6 @@ class OnlineIdentifier:
             np.multiply(self._learner.residual_deviation, self._row_noise().single, out=floor[-n:])
         return floor
 
-    def _rows(self, motion: Motion) -> FloatArray:
-        """Return the regressor of one sample in the independent columns, shape (n, r)."""
-        robot = self.arm.robot
-        q, dq, ddq = motion.q[0], motion.dq[0], motion.ddq[0]
-        rigid = pin.computeJointTorqueRegressor(robot.model, self._data, q, dq, ddq)
-        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
-        effects = self.arm.effect_columns(motion)[0]
-        return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
-
     def _row_noise(self) -> RowNoise:
         """Return the noise of the rows since the filters were started."""
         if self._noise is None:
@@ -412,17 +411,3 @@ class OnlineIdentifier:
             assert period is not None and pole is not None
             self._noise = RowNoise.of(period, pole, self._row_filter.pole)
         return self._noise
-
-
-def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
-    """Return what leaves damaged samples out, if that is wanted."""
-    if settings.longest_damage < 1:
-        return None
-    changes = settings.changes or ChangeSettings()
-    return joint_gate(
-        arm.robot.prismatic,
-        'qvt' if settings.measured_velocity else 'qt',
-        torque_limit=arm.robot.torque_limit,
-        max_gap=settings.longest_damage,
-        false_alarm_time=changes.false_alarm_time,
-    )

@@ -123,7 +123,13 @@ class RecursiveLeastSquares:
         self.parameters = parameters
         self.samples = 0
         self._forgetting = float(forgetting)
-        self._noise = None if noise is None else _checked_noise(noise)
+        self._noise = None if noise is None else np.array(noise, dtype=np.float64)
+        if self._noise is not None and (
+            self._noise.ndim != 1 or not np.all((self._noise > 0.0) & (self._noise < np.inf))
+        ):
+            raise IdentificationError(
+                f'noise {self._noise}: has to be one finite standard deviation > 0 for each joint'
+            )
         self._scale = noise is None if scale_covariance is None else scale_covariance
         count = len(parameters)
         values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
@@ -349,12 +355,3 @@ def check_forgetting(factor: float) -> None:
         raise IdentificationError(
             f'forgetting factor {factor}: has to be from {SMALLEST_FORGETTING} to 1'
         )
-
-
-def _checked_noise(noise: npt.ArrayLike) -> FloatArray:
-    values = np.array(noise, dtype=np.float64)
-    if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
-        raise IdentificationError(
-            f'noise {values}: has to be one finite standard deviation > 0 for each joint'
-        )
-    return values

@@ -148,7 +148,13 @@ class RobustCovariance:
         if self._latest is not None:
             settled = self._settled or _nothing(window)
             yield from _add(settled, self._latest)
-            kept = max(self.forgetting**self._window, 1.0 - _brought(window, settled))
+            # the share of what is known with a window that it brings, mean of all directions
+            both = settled.information + window.information
+            size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
+            scale, ridge = np.outer(size, size), _RIDGE * np.eye(len(size))
+            share = np.linalg.solve(both / scale + ridge, window.information / scale)
+            brought = float(np.trace(share)) / len(size)
+            kept = max(self.forgetting**self._window, 1.0 - brought)
             yield
             if kept < 1.0:
                 for products in settled.products:
@@ -156,10 +162,10 @@ class RobustCovariance:
                     yield
                 settled.counts[:] *= kept
             self._settled = settled
-            both = _nothing(window)
-            yield from _add(both, settled)
-            yield from _add(both, window)
-            self._shape = yield from _shape(both, values)
+            whole = _nothing(window)
+            yield from _add(whole, settled)
+            yield from _add(whole, window)
+            self._shape = yield from _shape(whole, values)
         self._latest = window
 
     def _reopened(self, directions: FloatArray, values: FloatArray) -> Job:
@@ -216,15 +222,6 @@ def _add(some: _Bands, more: _Bands) -> Job:
     some.counts[:] += more.counts
 
 
-def _brought(window: _Bands, before: _Bands) -> float:
-    """Return the share of what is known with a window that it brings, mean of all directions."""
-    both = before.information + window.information
-    size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
-    scale = np.outer(size, size)
-    share = np.linalg.solve(both / scale + _RIDGE * np.eye(len(size)), window.information / scale)
-    return float(np.trace(share)) / len(size)
-
-
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
     """Return the products of a window of rows [W, y] of shape (m, k, P + 1), in octaves."""
     joints, count, size = columns.shape
@@ -262,7 +259,13 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     root = inverse / size[:, np.newaxis]
     covariance = root @ root.T
     yield
-    taken, power = yield from _each_joint(bands, covariance, np.append(values, -1.0))
+    # what a fit takes of the scores, and the squares of its residuals, each (m, B)
+    ends, parts = np.append(values, -1.0), []
+    for products in bands.products:
+        absorbed = np.tensordot(products[:, :-1, :-1], covariance, axes=2)
+        parts.append((absorbed, products @ ends @ ends))
+        yield
+    taken, power = (np.array(part) for part in zip(*parts, strict=True))
     counts = bands.counts.clip(_SMALLEST)
     freedom = counts * (1.0 - taken / counts).clip(LEAST_LEFT)
     noise = np.maximum(power, _LEAST_NOISE * bands.products[..., -1, -1]) / freedom
@@ -297,15 +300,3 @@ def _triangle(information: FloatArray) -> FloatArray:
         root = np.sqrt(sizes.clip(_RIDGE))[:, np.newaxis] * vectors.T
         triangle = np.linalg.qr(root, mode='r')
         return np.asarray(np.where(np.diag(triangle) < 0.0, -1.0, 1.0)[:, np.newaxis] * triangle)
-
-
-def _each_joint(
-    bands: _Bands, covariance: FloatArray, ends: FloatArray
-) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """Return what a fit takes of the scores, and the squares of its residuals, each (m, B)."""
-    taken, power = [], []
-    for products in bands.products:
-        taken.append(np.tensordot(products[:, :-1, :-1], covariance, axes=2))
-        power.append(products @ ends @ ends)
-        yield
-    return np.array(taken), np.array(power)

@@ -30,22 +30,12 @@ class OnlineSettings:
     torque_noise : tuple of float or None
         Standard deviation of the noise in single torque samples, per joint [N m]. Without it the
         noise is proportional to the torque limits and its size is taken from the residuals.
-    rest_velocity : float
-        A joint that is slower [rad/s or m/s] for longer than `rest_time` [s] is at rest: where
-        dry friction may hold it, its torque says nothing and is not used.
-    rest_time : float
-        See `rest_velocity`; longer than a reversal takes.
-    period : float or None
-        Sampling period [s], learned from the stamps by default.
     max_gap : int
         Missing samples that are interpolated across; a longer gap restarts the filters.
     measured_velocity : bool
         Differentiate the measured velocity instead of the position.
     changes : ChangeSettings or None
         How readily a change of the arm is believed; None does not look for any.
-    longest_damage : int
-        Successive samples that may be damaged by chance, and are then left out; what lasts longer
-        is real. 0 takes all samples as they are.
 
     """
 
@@ -53,13 +43,9 @@ class OnlineSettings:
     row_rate: float | None = None
     forgetting: float = 1.0
     torque_noise: tuple[float, ...] | None = None
-    rest_velocity: float = 0.01
-    rest_time: float = 0.1
-    period: float | None = None
     max_gap: int = 10
     measured_velocity: bool = False
     changes: ChangeSettings | None = field(default_factory=ChangeSettings)
-    longest_damage: int = 10
 
     def rows_per_second(self) -> float:
         """
