@@ -232,7 +232,11 @@ def identify(
         fit = _fitted(arm, base, problem, recordings, used, settings)
         rigid = len(arm.robot.rigid_parameters)
         if not np.all(np.any(theory.grouping[:, rigid:], axis=0)):
-            theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
+            # what the described arm does not show, such as a saturation that it never reaches
+            now = fit.arm.base_parameters(rng)
+            if now.rank > theory.rank:
+                found = excited(now, regressions(fit.arm, now.independent, recordings, used))
+                theory, fit = now, _fitted(fit.arm, *found, recordings, used, settings)
     if settings.method == 'iv':
         fit, said = fit_by_instruments(arm, fit, recordings, used)
         notes += said
@@ -327,19 +331,3 @@ def _unsettled(fit: FittedValues) -> tuple[str, ...]:
         f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
         'change one another too much in these data; leave some out, or record more',
     )
-
-
-def _with_what_shows_now(
-    theory: BaseParameters,
-    fit: FittedValues,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    settings: IdentificationSettings,
-    rng: np.random.Generator,
-) -> tuple[BaseParameters, FittedValues]:
-    """Fit again with what the described arm does not show, such as saturation it never reaches."""
-    now = fit.arm.base_parameters(rng)
-    if now.rank <= theory.rank:
-        return theory, fit
-    columns = regressions(fit.arm, now.independent, recordings, used)
-    return now, _fitted(fit.arm, *excited(now, columns), recordings, used, settings)

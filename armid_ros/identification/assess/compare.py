@@ -70,7 +70,10 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     covariance = first.covariance_of(shared) + second.covariance_of(shared)
     scatter = np.concatenate([one.scatter for one in sides])
     joint = before.covariance is not None and after.covariance is not None
-    groups = _groups(shared) if joint else []
+    members: dict[str, list[int]] = {}  # the rigid body, and the effects of each joint
+    for position, name in enumerate(shared):
+        members.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
+    groups = [group for group in members.values() if joint and len(group) > 1]
     residuals = residual_changes(before.fit, after.fit)
     chance = CHANCE / sum((True, bool(groups), bool(residuals)))
     single = _beyond_chance(_single_chances(*sides), chance)
@@ -166,14 +169,6 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
             yield NotCompared(name, 'effect')
         else:
             yield NotCompared(name, 'deviation' if other.without_std else 'grouping')
-
-
-def _groups(names: Sequence[ParameterName]) -> list[list[int]]:
-    """Return the positions of the rigid body, and of the effects of each joint; two or more."""
-    groups: dict[str, list[int]] = {}
-    for position, name in enumerate(names):
-        groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
-    return [group for group in groups.values() if len(group) > 1]
 
 
 @dataclass(frozen=True)

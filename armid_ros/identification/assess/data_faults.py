@@ -229,13 +229,9 @@ def mistaken_recordings(
 def _baseline_factor(
     arm: ArmModel, before: Sequence[Recording], used: Conditioning
 ) -> float | None:
-    """
-    Return by what factor torques of a baseline are those of the model; None where nothing tells.
-
-    Its masses are what it has wrong on both days, where a factor leaves less than none does. One
-    that knows the torque of no joint of the baseline tells nothing.
-
-    """
+    """Return by what factor torques of a baseline are the model's; None where nothing tells."""
+    # its masses are what it has wrong on both days, where a factor leaves less than none does; one
+    # that knows the torque of no joint of the baseline tells nothing
     then = effort_factor(arm.body, before, used)
     if then is None:
         return None

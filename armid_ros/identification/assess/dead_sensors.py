@@ -217,17 +217,13 @@ def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
 def _moves_unseen(
     robot: Robot, motions: Sequence[Motion], joint: int, time: tuple[float, float]
 ) -> bool:
-    """
-    Return whether the torque of a joint that reads the same for a time is none of one at rest.
-
-    A joint at rest takes what its links weigh and what the other joints do to them. Its friction
-    answers to that: the drive gives what is left, none at least and all at most. What is described
-    is within a factor of two, so that a joint at rest is off it by no more than it varies itself.
-    One that is off by more, and by more than noise of its sensor, is at rest where a good model of
-    that describes it, with free masses and a share of the friction of other joints. A joint that
-    moves before or after varies as much then, and no more by far.
-
-    """
+    """Return whether the torque of a joint that reads the same is none of one at rest."""
+    # A joint at rest takes what its links weigh and what the other joints do to them. Its friction
+    # answers to that: the drive gives what is left, none at least and all at most. What is
+    # described is within a factor of two, so that a joint at rest is off it by no more than it
+    # varies itself. One that is off by more, and by more than noise of its sensor, is at rest
+    # where a good model of that describes it, with free masses and a share of the friction of
+    # other joints. A joint that moves before or after varies as much then, and no more by far.
     within, other = _divided(motions, time)
     motion = thinned(within, _ROWS)
     if motion is None or len(motion) < min(_LEAST, sum(len(one) for one in motions)):

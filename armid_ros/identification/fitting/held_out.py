@@ -217,18 +217,10 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """
-    Predict every second stretch from the others, and those from it.
-
-    Every joint counts by the ratio of its errors: a light one whose torque is mostly noise gains
-    by a low cut-off, and must not hide that a heavy one loses.
-
-    Returns
-    -------
-    ndarray, shape (S,)
-        Logarithm of the root mean square of the residual, mean of the joints, of each stretch.
-
-    """
+    """Return the log of the rms that others leave of each stretch, mean of joints, shape (S,)."""
+    # every second stretch is predicted from the others, and those from it; every joint counts by
+    # the ratio of its errors: a light one whose torque is mostly noise gains by a low cut-off, and
+    # must not hide that a heavy one loses
     x, _, y, told, _ = _Rows.of(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)

@@ -18,7 +18,7 @@ from typing import get_args, Literal
 from armid_ros.identification.fitting.triangle import (
     fit_scaled,
     fit_triangle,
-    freedom_factor,
+    joint_std,
     positive,
     ROUNDS,
     Triangle,
@@ -120,12 +120,10 @@ def solve(
     residual = _residual(problem, values)
     weights = np.asarray(relative / fit.scale)
     products = noise_products(problem, residual * weights, weights, fit.inverse)
-    counts = np.maximum(triangle.counts, 1.0)
-    squares = np.sum(residual**2, axis=0, where=used)
     return Solution(
         values=values,
         covariance=fit.covariance(products),
-        joint_std=np.sqrt(freedom_factor(triangle) * squares / counts),
+        joint_std=joint_std(triangle, values),
         condition_number=fit.condition_number,
         outliers=int(np.sum(used & (relative**2 < 0.5))),
         weights=weights,

@@ -75,7 +75,11 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
     budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
-    level = min(_level(np.maximum(gains, 0.0), budget), _LARGEST_LOSS)
+    # the level for which the gains cut off at it, ascending, add up to the budget
+    some = np.maximum(gains, 0.0)
+    levels = (budget - np.cumsum(some) + some) / np.arange(len(some), 0, -1)
+    above = some >= levels
+    level = min(float(levels[np.argmax(above)]), _LARGEST_LOSS) if above.any() else _LARGEST_LOSS
     kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
     if np.any(kept > 0.0):
         root, *_ = lapack.dtpqrt(
@@ -111,12 +115,3 @@ def inverse_products(root: FloatArray) -> FloatArray:
     """Return R^-1 R^-T, the covariance for noise of variance 1, shape (P, P)."""
     inverse, _ = lapack.dtrtri(root)
     return np.asarray(inverse @ inverse.T)
-
-
-def _level(gains: FloatArray, budget: float) -> float:
-    """Return the level for which the gains cut off at it, ascending, add up to the budget."""
-    count = len(gains)
-    smaller = np.cumsum(gains) - gains
-    levels = (budget - smaller) / np.arange(count, 0, -1)
-    above = gains >= levels
-    return float(levels[np.argmax(above)]) if above.any() else np.inf

@@ -75,7 +75,13 @@ def without_damage(
             one, bad = _damage(recording, used)
         if one is not None:
             found.append(one)
-            recording = _repaired(recording, bad)
+            t, good = recording.t, ~bad
+            q, dq, tau = (
+                x if x is None else np.column_stack([np.interp(t, t[good], c[good]) for c in x.T])
+                for x in (recording.q, recording.dq, recording.tau)
+            )
+            assert q is not None
+            recording = replace(recording, q=q, dq=dq, tau=tau)
         repaired.append(recording)
     return repaired, tuple(found)
 
@@ -152,17 +158,3 @@ def impossible_excursions(
         return found
     lowest, highest = np.min(x[good_ones], axis=0), np.max(x[good_ones], axis=0)
     return [one for one in found if not gate.possible(one, lowest, highest)]
-
-
-def _repaired(recording: Recording, bad: npt.NDArray[np.bool_]) -> Recording:
-    """Return a recording with straight lines across damaged samples."""
-
-    def across(values: FloatArray | None) -> FloatArray | None:
-        if values is None:
-            return None
-        t, good = recording.t, ~bad
-        return np.stack([np.interp(t, t[good], column[good]) for column in values.T], axis=1)
-
-    q = across(recording.q)
-    assert q is not None
-    return replace(recording, q=q, dq=across(recording.dq), tau=across(recording.tau))

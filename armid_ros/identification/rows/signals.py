@@ -392,7 +392,13 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
     # noise. What is above does not count: a joint that hardly moves has nothing but noise where
     # another is still moving. All stretches count together, for the same reason.
     band = rate / max(len(q) for q, _ in stretches)
-    spectra = [(*_velocity_spectrum(q, rate), end) for q, end in stretches]
+    spectra = []
+    for q, end in stretches:  # the power of velocities
+        steps = np.diff(q, axis=0)
+        transformed = fft.rfft(steps - steps.mean(axis=0), axis=0)
+        power = np.abs(transformed) ** 2 / len(steps)
+        power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
+        spectra.append((fft.rfftfreq(len(steps), 1.0 / rate), power, end))
     for joint in range(stretches[0][0].shape[1]):
         kept = [
             (frequency[inside], power[inside, joint])
@@ -405,15 +411,6 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
         if share[-1] > 0.0:
             band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))
     return band
-
-
-def _velocity_spectrum(q: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies (K,) [Hz] and the power of all velocities there, shape (K, n)."""
-    steps = np.diff(q, axis=0)
-    transformed = fft.rfft(steps - steps.mean(axis=0), axis=0)
-    power = np.abs(transformed) ** 2 / len(steps)
-    power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
-    return fft.rfftfreq(len(steps), 1.0 / rate), power
 
 
 def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:

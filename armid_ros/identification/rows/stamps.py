@@ -83,13 +83,9 @@ def rounded_stamps(recording: Recording) -> str:
 
 
 def _wander(t: FloatArray) -> float:
-    """
-    Return how far stamps are from an even grid [s], root mean square; zero where none come early.
-
-    Samples that are lost make steps longer and none shorter. Stamps that come late, each by
-    another time, make short ones too; steps alone do not tell how far they are off.
-
-    """
+    """Return how far stamps are from an even grid [s]; zero where none come early."""
+    # samples that are lost make steps longer and none shorter; stamps that come late, each by
+    # another time, make short ones too, and steps alone do not tell how far they are off
     steps = np.diff(t)
     if len(t) < _WINDOW or np.mean(steps < 0.5 * np.mean(steps)) <= _UNEVEN:
         return 0.0
@@ -123,7 +119,12 @@ def two_senders(recording: Recording) -> str:
     fewest = max(_FEWEST, _SHARE_OF_MESSAGES * len(t))
     if np.count_nonzero(apart) < fewest:
         return ''
-    apart &= step > _usual_speed(recording, across) * (t[2:] - t[:-2])[:, np.newaxis]
+    # the speed that each joint seldom exceeds, by its velocities if there are
+    time = (t[2:] - t[:-2])[:, np.newaxis]
+    usual = np.median(np.abs(across) / time, axis=0)
+    if recording.dq is not None and np.any(recording.dq):
+        usual = np.percentile(np.abs(recording.dq), 99, axis=0)
+    apart &= step > usual * time
     if np.count_nonzero(apart.any(axis=1)) < fewest:
         return ''
     joint = int(np.argmax(apart.sum(axis=0)))
@@ -143,11 +144,3 @@ def two_senders(recording: Recording) -> str:
         f'one topic: the position of {recording.joints[joint]} jumps by {jump:.3g} and back, '
         f'first at {t[rows[0] + 1] - t[0]:.3f} s; record each sender on a topic of its own'
     )
-
-
-def _usual_speed(recording: Recording, across: FloatArray) -> FloatArray:
-    """Return the speed that each joint seldom exceeds, (n,), by its velocities if there are."""
-    if recording.dq is not None and np.any(recording.dq):
-        return np.percentile(np.abs(recording.dq), 99, axis=0)
-    time = (recording.t[2:] - recording.t[:-2])[:, np.newaxis]
-    return np.asarray(np.median(np.abs(across) / time, axis=0))

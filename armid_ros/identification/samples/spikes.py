@@ -375,13 +375,10 @@ class SpikeGate:
         return np.asarray(np.abs(missed.error) / limit)
 
     def _surely_in_line(self, missed: Missed, floor: FloatArray | float) -> bool:
-        """
-        Return whether a sample is within less than its limits, which takes a third of the time.
-
-        Limits grow with both times over which the prediction is made, and as fast as they do where
-        both grow alike; so they are at least those over a period times the smaller of the two.
-
-        """
+        """Return whether a sample is within less than its limits, in a third of the time."""
+        # Limits grow with both times over which the prediction is made, and as fast as they do
+        # where both grow alike; so they are at least those over a period times the smaller of the
+        # two.
         least, usual = self._least, self._level.usual
         if least is None or least[0] is not usual or least[1] != self._quantile:
             over_a_period = usual.limits(self._quantile, 1.0, 1.0)
