@@ -96,16 +96,6 @@ class Belief:
         """Return the best model there is."""
         return self.accepted if self.proposed is None else self.proposed
 
-    def proposing(self, answer: Answer) -> Belief:
-        """Return the belief after a name that counts, unless it was rejected."""
-        if answer.named[0] in self.rejected:
-            return self.without_proposal()
-        return replace(self, proposed=answer.arm, named=answer.named)
-
-    def without_proposal(self) -> Belief:
-        """Return the belief where nothing is wrong."""
-        return replace(self, proposed=None, named=())
-
 
 class LiveDiagnosis:
     """
@@ -263,12 +253,14 @@ class LiveDiagnosis:
             if self._agreed and self._agreed[-1] != named:
                 self._agreed = []
             self._agreed.append(named)
-            if self.confirmed:
-                self.belief = self.belief.proposing(answer)
+            if self.confirmed and named not in self.belief.rejected:
+                self.belief = replace(self.belief, proposed=answer.arm, named=answer.named)
+            elif self.confirmed:
+                self.belief = replace(self.belief, proposed=None, named=())
         else:
             self._agreed = []
             if answer.verdict == 'consistent':
-                self.belief = self.belief.without_proposal()
+                self.belief = replace(self.belief, proposed=None, named=())
         return self.belief.model is not before
 
     def accept(self) -> None:

@@ -173,28 +173,16 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
 
 @dataclass(frozen=True)
 class _Side:
-    """
-    The parameters that two identifications share, in one of them.
+    """The parameters that two identifications share, in one of them."""
 
-    Attributes
-    ----------
-    values, std : ndarray, shape (p,)
-        Values and their standard deviations: those of noise, and in each joint as many times as
-        much as its values vary from recording to recording.
-    scatter : ndarray, shape (K, p)
-        Changes of the values without each recording.
-    freedom : int
-        Recordings less one.
-    freedoms : ndarray, shape (p,)
-        Degrees of freedom of each deviation: the mean of squares of n values with correlations R
-        has n^2 over the sum of R^2 times those of one (Satterthwaite). Infinite for noise.
-
-    """
-
-    values: FloatArray
+    values: FloatArray  # (p,)
+    #: Standard deviations: those of noise, and in each joint as many times as much as its values
+    #: vary from recording to recording.
     std: FloatArray
-    scatter: FloatArray
-    freedom: int
+    scatter: FloatArray  # changes of the values without each recording, (K, p)
+    freedom: int  # recordings less one
+    #: Degrees of freedom of each deviation: the mean of squares of n values with correlations R
+    #: has n^2 over the sum of R^2 times those of one (Satterthwaite). Infinite for noise.
     freedoms: FloatArray
 
     @classmethod

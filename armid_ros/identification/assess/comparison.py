@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from armid_ros.estimate import ParameterName
@@ -216,9 +216,7 @@ class Comparison:
             'after': self.after.source,
             'parameters': [
                 {
-                    'name': c.parameter.name,
-                    'joint': c.parameter.joint,
-                    'unit': c.parameter.unit,
+                    **asdict(c.parameter),
                     'before': c.before,
                     'before_std': c.before_std,
                     'after': c.after,

@@ -32,7 +32,7 @@ from armid_ros.identification.fitting.instruments import (
 from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Regression, weighted_rows
-from armid_ros.identification.rows.signals import even_positions, sampling_rate
+from armid_ros.identification.rows.signals import even_positions
 from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -222,7 +222,7 @@ def position_noise(recording: Recording) -> FloatArray:
     It is the top of the spectrum of stretches without a gap: a jump across one is no noise.
 
     """
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
     level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))

@@ -12,7 +12,7 @@ that explain dozens of changes, to their uncertainty, are a load; its mass is th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 import re
 from typing import Any
 
@@ -60,14 +60,8 @@ class LoadChange:
 
     def document(self) -> dict[str, Any]:
         """Return the load for programs to read."""
-        return {
-            'link': self.link,
-            'mass': self.mass,
-            'mass_std': self.mass_std,
-            'center': None if self.center is None else self.center.tolist(),
-            'p_value': self.p_value,
-            'rivals': list(self.rivals),
-        }
+        center = None if self.center is None else self.center.tolist()
+        return {**asdict(self), 'center': center, 'rivals': list(self.rivals)}
 
 
 def find_load(

@@ -38,7 +38,6 @@ from armid_ros.identification.rows.regression import (
 )
 from armid_ros.identification.rows.signals import (
     Conditioning,
-    sampling_rate,
     segments,
     unbroken,
 )
@@ -216,7 +215,7 @@ def smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Record
         cutoff = _SHARE * used.cutoff_hz * recording.period * 2.0
         sections = signal.butter(4, min(0.9, cutoff), output='sos')
         q = recording.q.copy()
-        for part in unbroken(recording, sampling_rate(recording)):
+        for part in unbroken(recording, 1.0 / recording.period):
             edge = min(_EDGE, len(part) - 1)
             q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
         calm.append(replace(recording, q=q, dq=None))

@@ -279,8 +279,7 @@ class ChangeWatch:
         values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
         yield
         size = Estimate(found.best.parameters, values, covariance)
-        begin, detected = found.blocks[found.first].begin, found.blocks[-1].end
-        change = Change(found.best, found.rivals, begin, detected, size)
+        change = Change(found.best, found.rivals, found.blocks[found.first].begin, size)
         yield from self._learn_again(found, change.reopened)
         louder = yield from self._louder(found.blocks[found.after :], change.reopened.shape[1])
         self.changes.append(

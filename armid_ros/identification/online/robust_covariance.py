@@ -44,20 +44,10 @@ _LEVEL = 0.975
 
 @dataclass(frozen=True, eq=False)
 class _Bands:
-    """
-    Products of rows and torques, joint by joint and band by band.
+    """Products of the transforms of rows and torques, joint by joint and band by band."""
 
-    Attributes
-    ----------
-    products : ndarray, shape (m, B, P + 1, P + 1)
-        Of the transforms of the columns, torques last.
-    counts : ndarray, shape (m, B)
-        Real numbers of every column that they are sums over.
-
-    """
-
-    products: FloatArray
-    counts: FloatArray
+    products: FloatArray  # (m, B, P + 1, P + 1), torques last
+    counts: FloatArray  # real numbers of every column that they are sums over, (m, B)
 
     @property
     def information(self) -> FloatArray:

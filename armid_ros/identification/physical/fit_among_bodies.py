@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.excited import bounds, excited
 from armid_ros.identification.fitting.least_squares import Method, solve
 from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
@@ -162,12 +161,11 @@ def _bodies(
 ) -> tuple[FittedValues, PhysicalCertificate]:
     """Fit the standard parameters of an arm to a linear problem, all links being bodies."""
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
-    unconstrained = Estimate(base.parameters, fit.solution.values, fit.solution.covariance)
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
     blocks = _compress(problem, weights)
     whole = np.concatenate(blocks)
-    least = float(np.linalg.norm(_residual(whole, unconstrained.values)))
+    least = float(np.linalg.norm(_residual(whole, fit.solution.values)))
     least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
     rows = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
     share = np.array([part.sum() for part in rows], dtype=float)
@@ -207,7 +205,6 @@ def _bodies(
         total_mass=settings.total_mass,
         weight=weight,
         tried=tried,
-        unconstrained=unconstrained,
         misfit_ratio=max(misfit / least, 1.0),
         notes=(*notes, *_heavy(arm.robot, rigid)),
         at_mass=tuple(link for link, at in zip(arm.robot.links, off, strict=True) if at),

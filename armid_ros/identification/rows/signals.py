@@ -155,7 +155,7 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     for recording in recordings:
         _require_rate(recording)
         require_one_sender(recording)
-    rate = float(np.median([sampling_rate(recording) for recording in recordings]))
+    rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
         # where the spectrum of each position meets its noise, which is white at the sensor
@@ -182,11 +182,6 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     return Conditioning(rate, cutoff, decimation, given)
 
 
-def sampling_rate(recording: Recording) -> float:
-    """Return the rate of a recording, from the median time between samples [Hz]."""
-    return float(1.0 / np.median(np.diff(recording.t)))
-
-
 def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
     """
     Return by how much velocities are wrong that are made of filtered positions.
@@ -209,7 +204,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
 
 def _require_rate(recording: Recording) -> None:
     """Raise an IdentificationError where samples are so far apart that stamps are no seconds."""
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     if rate >= SLOWEST:
         return
     units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
@@ -340,7 +335,7 @@ def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArra
 
 def even_positions(recording: Recording) -> list[FloatArray]:
     """Return the positions of every stretch without a gap at even times, each (K, n)."""
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
     return [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
 
@@ -427,6 +422,6 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
         Its median in the upper two fifths.
 
     """
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
     return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)

@@ -59,19 +59,21 @@ class NoiseLevel:
         self._finest = finest
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((SEEN, count), np.inf), np.zeros(count)
-        self._windows = Loudest(count, _REMEMBERED)
+        self._sizes, self._shares = np.zeros((2, _REMEMBERED, count))
+        self._seen = 0
         self._errors, self._moves = np.empty((2, WINDOW + together, count))
         self._waiting = 0
 
     def set(self, usual: Usual) -> None:
         """Take it as known what is usual."""
-        self._windows.clear()
-        self._windows.append(usual.size, usual.noisy)
+        self.forget()
+        self._remember(usual.size, usual.noisy)
         self.usual = usual
 
     def forget(self) -> None:
         """Measure the noise anew with the next `begin`."""
-        self._windows.clear()
+        self._sizes[:] = 0.0
+        self._seen = 0
 
     def begin(self, missed: Sequence[Missed], moves: FloatArray, period: float) -> None:
         """
@@ -89,7 +91,7 @@ class NoiseLevel:
         """
         self.see_steps(moves)
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
-        if not self._windows:
+        if not self._seen:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
             size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._resolution)
             self.usual = Usual(period, size, share_of_noise(errors, size))
@@ -109,10 +111,16 @@ class NoiseLevel:
         self._waiting = 0
         self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
         size = robust_scale(errors, SHARE)
-        self._windows.append(size, share_of_noise(errors, size))
+        self._remember(size, share_of_noise(errors, size))
         self.see_steps(moves)
-        loudest = np.maximum(self._windows.size, self._resolution)
-        self.usual = Usual(period, loudest, self._windows.noisy.copy())
+        loudest = np.argmax(self._sizes, axis=0)[np.newaxis]
+        size, noisy = (np.take_along_axis(x, loudest, 0)[0] for x in (self._sizes, self._shares))
+        self.usual = Usual(period, np.maximum(size, self._resolution), noisy)
+
+    def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
+        place = self._seen % _REMEMBERED
+        self._sizes[place], self._shares[place] = size, noisy
+        self._seen += 1
 
     def see_steps(self, moves: FloatArray) -> None:
         """Learn the resolution from moves of shape (k, m)."""
@@ -126,61 +134,6 @@ class NoiseLevel:
         # A signal that moves fast makes no small steps; but by its resolution it leaves any line.
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
         return np.maximum(np.minimum(self._most, step), self._finest)
-
-
-class Loudest:
-    """
-    How large errors were in the loudest of the last windows, and what they were like there.
-
-    A window is compared with the loudest one before it, not with all that are remembered; these
-    are looked through only when the loudest is forgotten.
-
-    Parameters
-    ----------
-    count : int
-        Signals m.
-    most : int
-        Windows that are remembered.
-
-    Attributes
-    ----------
-    size, noisy : ndarray, shape (m,)
-        Size of the errors, and share of noise in them, in the window where each is largest.
-
-    """
-
-    def __init__(self, count: int, most: int) -> None:
-        self._most = most
-        self._sizes, self._shares = np.empty((2, most, count))
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget everything."""
-        self._seen = 0
-        self._when = np.zeros(self._sizes.shape[1], dtype=np.intp)
-        self.size, self.noisy = np.full((2, self._sizes.shape[1]), -np.inf)
-
-    def __len__(self) -> int:
-        """Return how many windows are remembered."""
-        return min(self._seen, self._most)
-
-    def append(self, size: FloatArray, noisy: FloatArray) -> None:
-        """Take in a window, arrays of shape (m,)."""
-        forgotten = np.flatnonzero(self._when == self._seen - self._most)
-        place = self._seen % self._most
-        self._sizes[place], self._shares[place] = size, noisy
-        self._take(np.flatnonzero(size > self.size), place, self._seen)
-        self._seen += 1
-        for signal in forgotten:
-            oldest_first = np.roll(self._sizes[:, signal], -(place + 1))
-            age = int(np.argmax(oldest_first))
-            self._take(signal, (place + 1 + age) % self._most, self._seen - self._most + age)
-
-    def _take(self, signals: np.intp | npt.NDArray[np.intp], place: int, when: int) -> None:
-        """Let a window be the loudest of some signals."""
-        self.size[signals] = self._sizes[place, signals]
-        self.noisy[signals] = self._shares[place, signals]
-        self._when[signals] = when
 
 
 @dataclass(frozen=True, eq=False)

@@ -168,13 +168,6 @@ class SpikeGate:
         self._first.append(sample)
         return self._begin(floor) if len(self._first) == FIRST else []
 
-    def rest(self) -> list[StreamSample]:
-        """Return the samples that still wait, at the end of a stream."""
-        waiting = self._first if self._first is not None else self._held
-        waiting = waiting + ([self._early] if self._early is not None else [])
-        self._restart([])
-        return waiting
-
     def begin(
         self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
     ) -> None:

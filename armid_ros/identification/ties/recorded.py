@@ -18,6 +18,7 @@ from armid_ros.identification.rows.signals import (
     segments,
     SignalSettings,
 )
+from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
@@ -30,7 +31,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
 import numpy as np
-from scipy import signal
 
 #: Order of the differences that noise is measured by.
 _ORDER = 6
@@ -218,14 +218,7 @@ def band_of_motion(
 
 def _crossing(recording: Recording, rate: float) -> float:
     """Return where the motion of the fastest angle sinks into its noise [Hz]."""
-    frequency, power = signal.welch(
-        recording.q,
-        fs=rate,
-        window='blackmanharris',
-        nperseg=min(len(recording.t), int(_SPECTRUM * rate)),
-        detrend='linear',
-        axis=0,
-    )
+    frequency, power = mean_spectrum([recording.q], rate, 'linear', _SPECTRUM)
     above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
     above[-1] = False
     return max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)

@@ -181,6 +181,8 @@ def test_forgetting_keeps_the_window_it_promises():
 def test_information_never_falls():
     rng = np.random.default_rng(9)
     estimator = RecursiveLeastSquares(names(5), NOISE, forgetting=0.95)
+    for known in np.split(1e-2 * np.eye(6, 5), 2):
+        estimator.update(known, known @ np.ones(5))
     before = estimator.covariance
     for _ in range(500):
         rows = rng.normal(size=(3, 5)) * 10.0 ** rng.uniform(-4, 2)
