@@ -312,6 +312,9 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     error = None
     if told is not None:
         error = finite(told['relative_error_percent'], 'relative_error_percent')
+    scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
+    if any(len(row) != len(values) for row in scatter):
+        raise ValueError(f'a scatter whose rows are not of {len(values)} values')
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -322,7 +325,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         terms,
         tuple(str(joint) for joint in about.get('joints', ())),
         str(about.get('kinematics', '')),
-        _scatter(document.get('scatter', ()), len(values)),
+        np.array(scatter).reshape(len(scatter), len(values)),
         without_std,
         frozenset(
             (str(row['name']), str(row['joint']))
@@ -331,14 +334,6 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         ),
         known_fit(document),
     )
-
-
-def _scatter(rows: Sequence[Sequence[Any]], size: int) -> FloatArray:
-    """Return changes of all values, a row for each recording."""
-    if any(len(row) != size for row in rows):
-        raise ValueError(f'a scatter whose rows are not of {size} values')
-    named = [[finite(value, 'a scatter') for value in row] for row in rows]
-    return np.array(named).reshape(len(rows), size)
 
 
 def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:

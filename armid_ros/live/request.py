@@ -163,7 +163,11 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
         verdict: str, summary: str, findings: Sequence[Finding] = (), patched: ArmModel = arm
     ) -> Answer:
         spent = time.process_time() - begun
-        more = () if found is None else _gap(found)
+        gap = None if found is None else found.gap
+        more: tuple[GapOfJoint, ...] = ()
+        if gap is not None:
+            rows = zip(arm.robot.joints, gap.before, gap.after, gap.floor, strict=True)
+            more = tuple(GapOfJoint(joint, *map(float, numbers)) for joint, *numbers in rows)
         cut = window is not request.window
         return Answer(
             verdict, summary, tuple(findings), more, patched, window, request.end, spent, cut
@@ -194,11 +198,3 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     except ArmidError as error:
         return said('bad_data', str(error)), None
     return said(found.verdict, found.summary, found.findings, found.arm), found
-
-
-def _gap(diagnosis: Diagnosis) -> tuple[GapOfJoint, ...]:
-    gap = diagnosis.gap
-    if gap is None:
-        return ()
-    rows = zip(diagnosis.arm.robot.joints, gap.before, gap.after, gap.floor, strict=True)
-    return tuple(GapOfJoint(joint, *map(float, numbers)) for joint, *numbers in rows)

@@ -74,7 +74,13 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
     best: tuple[float, _Scales, _Cells] | None = None
     for share in _KNEES:
         knee = max(share * float(np.abs(rows.inputs[:, 1]).max()), 1e-9)
-        cells = _cells(rows, _labels(rows, knee, rng), everywhere)
+        count = max(1, min(_POINTS, len(rows) // _ROWS))
+        means = imported('sklearn.cluster').MiniBatchKMeans(
+            count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
+        )
+        inputs = counted(rows.inputs, knee)
+        labels = np.asarray(means.fit_predict(inputs / _span(inputs)), dtype=np.intp)
+        cells = _cells(rows, labels, everywhere)
         evidence, scales = _fitted(cells, knee)
         if best is None or evidence > best[0]:
             best = evidence, scales, cells
@@ -97,16 +103,6 @@ class _Scales(NamedTuple):
     lengths: FloatArray
     amplitude: float
     knee: float
-
-
-def _labels(rows: JointRows, knee: float, rng: np.random.Generator) -> npt.NDArray[np.intp]:
-    cluster = imported('sklearn.cluster')
-    count = max(1, min(_POINTS, len(rows) // _ROWS))
-    means = cluster.MiniBatchKMeans(
-        count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
-    )
-    inputs = counted(rows.inputs, knee)
-    return np.asarray(means.fit_predict(inputs / _span(inputs)), dtype=np.intp)
 
 
 def _span(inputs: FloatArray) -> FloatArray:

@@ -95,7 +95,21 @@ class Residual:
 
     def sentences(self) -> tuple[str, ...]:
         """Say what was learned, a joint a line."""
-        return tuple(_sentence(one) for one in self.joints)
+        said = []
+        for one in self.joints:
+            alone = ''
+            if one.held_out is not None:
+                alone = f' ({percent_of(one.held_out)} of held-out recordings)'
+                if one.held_out < 0.0:
+                    alone = ' (held-out recordings get worse: they go beyond its data)'
+            like = 'no law of few terms'
+            if one.law is not None:
+                like = f'{one.law.text} ({percent_of(one.law.share)})'
+            said.append(
+                f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is '
+                f'left{alone}; it looks like {like}'
+            )
+        return tuple(said)
 
     def document(self, table: str) -> dict[str, Any]:
         """Return what diagnosis.json holds; the table is a file's name."""
@@ -118,21 +132,6 @@ class Residual:
                 for one in self.joints
             ],
         }
-
-
-def _sentence(one: JointResidual) -> str:
-    alone = ''
-    if one.held_out is not None:
-        alone = f' ({percent_of(one.held_out)} of held-out recordings)'
-        if one.held_out < 0.0:
-            alone = ' (held-out recordings get worse: they go beyond its data)'
-    like = 'no law of few terms'
-    if one.law is not None:
-        like = f'{one.law.text} ({percent_of(one.law.share)})'
-    return (
-        f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is left'
-        f'{alone}; it looks like {like}'
-    )
 
 
 def percent_of(share: float) -> str:

@@ -33,8 +33,7 @@ from armid_ros.identification.assess.comparison import (
     NotCompared,
     ParameterChange,
 )
-from armid_ros.identification.assess.load_change import find_load
-from armid_ros.identification.assess.residual_change import residual_changes
+from armid_ros.identification.assess.load_change import find_load, residual_changes
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.motion import FloatArray
 import numpy as np

@@ -9,8 +9,7 @@ from typing import Any, Literal
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.load_change import LoadChange
-from armid_ros.identification.assess.residual_change import ResidualChange
+from armid_ros.identification.assess.load_change import LoadChange, ResidualChange
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.identification.rows.checks import NEAR
 import numpy as np

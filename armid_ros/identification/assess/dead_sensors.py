@@ -224,7 +224,12 @@ def _moves_unseen(
     # varies itself. One that is off by more, and by more than noise of its sensor, is at rest
     # where a good model of that describes it, with free masses and a share of the friction of
     # other joints. A joint that moves before or after varies as much then, and no more by far.
-    within, other = _divided(motions, time)
+    within, other = [], []  # parts of motions within the time, and those before and after it
+    for one in motions:
+        first, last = np.searchsorted(one.t, [time[0], time[1] + 1e-9])
+        within.append(one.select(slice(first, last)))
+        pieces = (one.select(slice(0, first)), one.select(slice(last, len(one))))
+        other += [piece for piece in pieces if len(piece)]
     motion = thinned(within, _ROWS)
     if motion is None or len(motion) < min(_LEAST, sum(len(one) for one in motions)):
         return False
@@ -244,20 +249,6 @@ def _moves_unseen(
     left = left_of_blocks(columns, (torque - described)[:, np.newaxis] / size)[:, 0]
     smooth = float(np.mean(left**2)) - _white(left)
     return bool(100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor)
-
-
-def _divided(
-    motions: Sequence[Motion], time: tuple[float, float]
-) -> tuple[list[Motion], list[Motion]]:
-    """Return the parts of motions within a time, and those before and after it."""
-    within, other = [], []
-    for motion in motions:
-        first, last = np.searchsorted(motion.t, [time[0], time[1] + 1e-9])
-        pieces = slice(0, first), slice(first, last), slice(last, len(motion))
-        before, inside, after = (motion.select(one) for one in pieces)
-        within.append(inside)
-        other += [one for one in (before, after) if len(one)]
-    return within, other
 
 
 def _white(values: FloatArray) -> float:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.identification.assess.forward import unlimited
 from armid_ros.identification.fitting.excited import bounds
 from armid_ros.identification.fitting.least_squares import noise_products
 from armid_ros.identification.fitting.nonlinear import (
@@ -60,6 +59,8 @@ _MOST_ROUNDS = 4
 _SETTLED = 0.02
 #: An arm under computed torque that is off by more than this share of its motion is no arm.
 _ASTRAY = 0.05
+#: Far enough for no joint to be at a limit [rad or m].
+_FAR = 1e4
 
 
 @dataclass(frozen=True)
@@ -258,3 +259,11 @@ def _simulated_columns(
         along = replace(motion, q=q, dq=dq, ddq=ddq)
         found.append(filtered_columns(arm, fit.base.independent, along, used))
     return found
+
+
+def unlimited(arm: ArmModel) -> ArmModel:
+    """Return an arm whose joints have no limits that a simulation could run into."""
+    n = arm.robot.n_joints
+    far, free = np.full(n, _FAR), np.full(n, np.inf)
+    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
+    return replace(arm, robot=robot)

@@ -16,10 +16,9 @@ from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.checks import MissingSamples, StreamChecks
-from armid_ros.identification.online.learner import Learner
+from armid_ros.identification.online.learner import Learner, OnlineSettings
 from armid_ros.identification.online.nuisance_rows import Seed
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
-from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import RowNoise
 from armid_ros.identification.samples.joint_gate import joint_gate

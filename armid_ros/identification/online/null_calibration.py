@@ -17,7 +17,6 @@ from collections.abc import Iterator, Sequence
 from armid_ros.identification.online.background import Job, Pieces
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 from scipy import special, stats
 
 #: Windows that are remembered: ten minutes of four a second.
@@ -175,7 +174,12 @@ class NullCalibration:
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
             some = np.arange(len(single))[columns][judged[columns]]
-            single[some] = np.log(self._fitted(later[:, some], counts[some], some))
+            # the factors with which the means of limited statistics are as expected
+            seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
+            factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
+            for _ in range(_ROUNDS):
+                factor = factor * np.sum(np.minimum(seen / factor, most), axis=0) / mean
+            single[some] = np.log(factor)
             yield
         value, left = _drawn_together(
             single[judged], self._variance[judged] / independent[judged], self._sources
@@ -187,16 +191,6 @@ class NullCalibration:
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / left  # what a mean square of so many degrees varies by
-
-    def _fitted(
-        self, seen: FloatArray, counts: npt.NDArray[np.intp], some: npt.NDArray[np.intp]
-    ) -> FloatArray:
-        """Return the factors with which the means of limited statistics are as expected."""
-        most, mean = self._most[some], self._mean[some] * counts
-        factors = np.sum(seen, axis=0) / (self._sizes[some] * counts)
-        for _ in range(_ROUNDS):
-            factors = factors * np.sum(np.minimum(seen / factors, most), axis=0) / mean
-        return np.asarray(factors)
 
     @staticmethod
     def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:

@@ -13,7 +13,7 @@ filtered, which leaves their equation as true as it was without them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -257,9 +257,7 @@ def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatA
         return decimate(bridged(arm.torque(motion), unsure), used)
     margin = max(arm.neighbours(1.0 / used.rate_hz), _longest(unsure))
     blocks = []
-    for samples in _overlapping(len(motion), used):
-        around = slice(max(0, samples.start - margin), samples.stop + margin)
-        inside = slice(samples.start - around.start, samples.stop - around.start)
+    for _, around, inside in _overlapping(len(motion), used, margin):
         torque = bridged(arm.torque(motion.select(around)), unsure[around])
         blocks.append(decimate(torque[inside], used))
     return np.concatenate(blocks)
@@ -315,10 +313,8 @@ def filtered_columns(
     stride = used.smooth_stride if margin == 0 else 1
     margin = max(margin, _longest(unsure))
     first = 0
-    for samples in _overlapping(len(motion), used):
-        around = slice(max(0, samples.start - margin), samples.stop + margin)
+    for samples, around, inside in _overlapping(len(motion), used, margin):
         part = motion.select(around)
-        inside = slice(samples.start - around.start, samples.stop - around.start)
         count = len(decimated_samples(samples.stop - samples.start, used))
         for source in sources:
             if source.smooth and stride > 1:
@@ -428,9 +424,12 @@ def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
     return rest
 
 
-def _overlapping(n_samples: int, used: Conditioning) -> list[slice]:
-    """Cut samples into chunks that overlap by the filter, so that their outputs join."""
+def _overlapping(
+    n_samples: int, used: Conditioning, margin: int
+) -> Iterator[tuple[slice, slice, slice]]:
+    """Yield chunks that overlap by the filter, each with a margin, and where it is within that."""
     overlap = len(used.taps()) - 1
     step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
-    starts = range(0, max(1, n_samples - overlap), step)
-    return [slice(start, min(n_samples, start + step + overlap)) for start in starts]
+    for start in range(0, max(1, n_samples - overlap), step):
+        stop, first = min(n_samples, start + step + overlap), max(0, start - margin)
+        yield slice(start, stop), slice(first, stop + margin), slice(start - first, stop - first)
