@@ -28,7 +28,6 @@ from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, Ph
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
 from armid_ros.identification.rows.checks import (
     beyond_limits,
-    check_length,
     check_motion,
     check_stamps,
     check_torque,
@@ -300,7 +299,11 @@ def _require_samples(
     few = sum(part.tau.size for part in columns) < 2 * theory.rank
     if few:
         check_decimation(recordings, used, -(-2 * theory.rank // recordings[0].n_joints))
-    check_length(recordings, columns, used)
+    left = {part.source for part in columns}
+    for recording in recordings:
+        if recording.source not in left:
+            check_stamps([recording], used)
+            raise no_stretch(recording, used)
     if few:
         check_stamps(recordings, used)
         raise IdentificationError(

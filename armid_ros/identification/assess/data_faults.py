@@ -28,7 +28,7 @@ from armid_ros.identification.assess.mistakes import (
     effort_factor,
     find_mistake,
     is_factor,
-    slow_motions_of,
+    slow_motions,
 )
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
@@ -133,9 +133,9 @@ def check_data(
     )
     alone = not any(one.partner is not None for one in recordings)
     if alone and not mistaken:
-        now, then = (slow_motions_of(some, used) for some in (recordings, before))
+        now, then = (slow_motions(some, used) for some in (recordings, before))
         mistaken = (
-            _mistaken(arm, recordings, used, before)
+            _mistaken(arm, recordings, used, now, then)
             or list(units_beside_model(arm, now, then))
             or list(units_beyond_drives(arm.robot, recordings, now))
         )
@@ -164,10 +164,14 @@ def check_data(
 
 
 def _mistaken(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    motions: Sequence[Motion],
+    before: Sequence[Motion],
 ) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
-    then = _baseline_factor(arm, before, used)
+    then = _baseline_factor(arm, before)
     mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
     found = [one.hypotheses for one in mistakes if one is not None]
     if len(found) == len(recordings):
@@ -175,19 +179,18 @@ def _mistaken(
         (first, *others) = said
         if all(first) and not others:
             return [', or '.join(first)]
-    now = None if then is None else effort_factor(arm.body, recordings, used)
+    now = None if then is None else effort_factor(arm.body, motions)
     if now is None or then is None:
         return []
     units = [
         unit
         for unit, per in units_near(now / then).items()
-        if is_factor(arm.body, recordings, used, then * per)
+        if is_factor(arm.body, motions, then * per)
     ]
     scaled = len(found) == len(recordings) and all(likely[0].kind == 'scale' for likely in found)
     if not units and not scaled:
         return []
-    days = [slow_motions_of(some, used) for some in (recordings, before)]
-    apart = factors_apart(arm, days[0], days[1], units[0] if units else '')
+    apart = factors_apart(arm, motions, before, units[0] if units else '')
     if apart or not units:
         return [apart] if apart else []
     return [
@@ -226,17 +229,15 @@ def mistaken_recordings(
     return said
 
 
-def _baseline_factor(
-    arm: ArmModel, before: Sequence[Recording], used: Conditioning
-) -> float | None:
+def _baseline_factor(arm: ArmModel, before: Sequence[Motion]) -> float | None:
     """Return by what factor torques of a baseline are the model's; None where nothing tells."""
     # its masses are what it has wrong on both days, where a factor leaves less than none does; one
     # that knows the torque of no joint of the baseline tells nothing
-    then = effort_factor(arm.body, before, used)
+    then = effort_factor(arm.body, before)
     if then is None:
         return None
-    then = 1.0 if is_factor(arm.body, before, used, 1.0) else then
-    known = knows(ArmModel(arm.body), slow_motions_of(before, used), then)
+    then = 1.0 if is_factor(arm.body, before, 1.0) else then
+    known = knows(ArmModel(arm.body), before, then)
     return then if np.any(known) else None
 
 

@@ -131,7 +131,7 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
 
 def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
     """Return what `find_mistake` does, or else what links that are off explain as well."""
-    slow = slow_motions(recording, used)
+    slow = slow_motions([recording], used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
     tried = list(hypotheses(robot, slow))
@@ -202,49 +202,30 @@ def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Hy
         step = recording.q[row, joint] - recording.q[row - 1, joint]
         unit = robot.position_units[joint]
         first = f'the position of {name} jumps by {step:.3g} {unit} at {t:.3f} s'
-    without = tuple(slow_motions(recording.select(sound), used))
+    without = tuple(slow_motions([recording.select(sound)], used))
     count = len(np.unique(at[:, 0]))
     many = '' if count == 1 else f' (the first of {count})'
     text = f'{first}{many}: leave out what is faulty, or record again'
     return Hypothesis('samples', text, where=(text,), without=without)
 
 
-def effort_factor(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning
-) -> float | None:
+def effort_factor(robot: Robot, slow: Sequence[Motion]) -> float | None:
     """
-    Return how many times what is described the efforts of recordings are, all joints together.
+    Return how many times what is described the efforts of motions are, all joints together.
 
     Friction, offset and drive inertia of each joint are fitted beside it. None where motion is
     too short, or the efforts do not follow the description with any factor.
 
     """
-    found = _judge(robot, slow_motions_of(recordings, used))(other_scale(robot))
+    found = _judge(robot, slow)(other_scale(robot))
     if found is None or 100.0 * found[0].whole(robot) > LIMITS.unusable:
         return None
     factor = float(found[0].shared[0])
     return factor if factor > 0.0 else None
 
 
-def is_factor(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning, factor: float
-) -> bool:
-    """
-    Whether efforts are so many times what is described, as the one that fits leaves no less.
-
-    Parameters
-    ----------
-    robot : Robot
-        The description.
-    recordings : sequence of Recording
-        Data with torques.
-    used : Conditioning
-        Filters that they are identified with.
-    factor : float
-        Of their efforts on those of the description.
-
-    """
-    slow = slow_motions_of(recordings, used)
+def is_factor(robot: Robot, slow: Sequence[Motion], factor: float) -> bool:
+    """Whether efforts are so many times what is described: the one that fits leaves no less."""
     converted = [one.with_torque(one.tau / factor) for one in slow if one.tau is not None]
     free, fixed = (
         _judge(robot, motions)(hypothesis)
@@ -346,10 +327,10 @@ def _judged(
     return rows
 
 
-def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
-    """Return the stretches of a recording, with what is in the band of the motion alone."""
+def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
+    """Return the stretches of recordings, with what is in the band of the motion alone."""
     result = []
-    for motion in segments(recording, used):
+    for motion in (part for one in recordings for part in segments(one, used)):
         kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
         assert motion.tau is not None
         slow, tau = motion.select(kept), decimate(motion.tau, used)
@@ -357,8 +338,3 @@ def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
             parts = (within_band(slow, x) for x in (slow.q, slow.dq, slow.ddq, tau))
             result.append(Motion(slow.joints, slow.t, *parts))
     return result
-
-
-def slow_motions_of(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
-    """Return such stretches of several recordings."""
-    return [motion for one in recordings for motion in slow_motions(one, used)]

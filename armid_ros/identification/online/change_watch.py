@@ -229,23 +229,19 @@ class ChangeWatch:
             if narrow is not None:
                 waiting.append(narrow)
             if narrow is None or len(waiting) == _WIDENED or number == len(samples):
-                whole += self._with_nuisance(waiting)
+                seeds = [seed for _, seed in waiting if seed is not None]
+                own = [sample for sample, _ in waiting]
+                if self._nuisance is not None and seeds:
+                    narrow_rows = np.stack([sample.rows for sample in own])
+                    rows = np.concatenate([narrow_rows, self._nuisance.rows(seeds)], axis=2)
+                    pairs = zip(own, rows, strict=True)
+                    own = [sample._replace(rows=wide) for sample, wide in pairs]
+                whole += own
                 waiting = []
                 yield
             if narrow is None and self._nuisance is not None:
                 self._nuisance.reset()
         return whole
-
-    def _with_nuisance(self, samples: Sequence[Narrow]) -> list[WeightedSample]:
-        seeds = [seed for _, seed in samples if seed is not None]
-        if self._nuisance is None or not seeds:
-            return [sample for sample, _ in samples]
-        narrow = np.stack([sample.rows for sample, _ in samples])
-        rows = np.concatenate([narrow, self._nuisance.rows(seeds)], axis=2)
-        return [
-            WeightedSample(wide, sample.tau, sample.weights)
-            for wide, (sample, _) in zip(rows, samples, strict=True)
-        ]
 
     def _summed(
         self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned

@@ -252,11 +252,11 @@ class CausalFilter:
         """Pole of the motion filter [rad/s], None until the sampling period is known."""
         return None if self._lag is None else self._lag.pole
 
-    def update(
+    def signal(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
-    ) -> CausalMotion | None:
+    ) -> FloatArray | None:
         """
-        Take in one joint state.
+        Stack what is filtered of one joint state, shape (2 n,) or (3 n,).
 
         Parameters
         ----------
@@ -267,17 +267,10 @@ class CausalFilter:
 
         Returns
         -------
-        CausalMotion or None
-            None while the filter settles and for a sample that is left out.
+        ndarray or None
+            None for a sample that is left out.
 
         """
-        signal = self.signal(t, q, dq, tau)
-        return None if signal is None else self.advance(t, signal)
-
-    def signal(
-        self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
-    ) -> FloatArray | None:
-        """Stack what is filtered, shape (2 n,) or (3 n,); None for a sample to leave out."""
         parts = [q, dq, tau] if self._measured_velocity and dq is not None else [q, tau]
         if self._measured_velocity and dq is None:
             self._rejected['no_velocity'] += 1
@@ -296,7 +289,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter what `signal` has stacked; see `update`."""
+        """Filter what `signal` has stacked; None while the filter settles."""
         if not self._in_order(t):
             return None
         dt, self._last = 0.0 if self._last is None else t - self._last, t

@@ -73,7 +73,7 @@ def check_motion(
     recordings : sequence of Recording
         What was recorded.
     used : Conditioning, optional
-        Filters behind which something has to be left, where ``check_length`` does not see to it.
+        Filters behind which something has to be left, where nothing else sees to it.
 
     Returns
     -------
@@ -110,17 +110,6 @@ def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Say that recordings are short, all together."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < _SHORT else ()
-
-
-def check_length(
-    recordings: Sequence[Recording], problem: Sequence[Regression], used: Conditioning
-) -> None:
-    """Refuse recordings that are too short for the filters, as a whole or between gaps."""
-    left = {part.source for part in problem}
-    for recording in recordings:
-        if recording.source not in left:
-            check_stamps([recording], used)
-            raise no_stretch(recording, used)
 
 
 def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:

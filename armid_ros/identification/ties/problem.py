@@ -17,7 +17,6 @@ from armid_ros.identification.rows.signals import (
     decimated_samples,
 )
 from armid_ros.model import (
-    BaseParameters,
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
@@ -294,7 +293,18 @@ def _free_body(
 ) -> _Body:
     """Return the inertial columns that are identifiable with the springs, and the prior."""
     body = regressor(robot, motion)
-    base = _identifiable(robot, body, springs, names)
+    every = rigid_parameter_names(robot)
+    base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
+    w = np.concatenate([body[:, :, base.independent], springs], axis=2)
+    w = w.reshape(-1, w.shape[2])
+    scale = np.linalg.norm(w, axis=0)
+    scaled = w / np.where(scale > 0.0, scale, 1.0)
+    left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
+    if len(left) and left.min() < _RANK_TOLERANCE:
+        raise IdentificationError(
+            f'{names[int(np.argmin(left))]}: its stiffness cannot be distinguished from weight '
+            'and inertia along this motion; keep the inertias known, or move more'
+        )
     spread = base.grouping * described_spread(robot).ravel()
     return _Body(
         np.zeros_like(motion.q),
@@ -323,25 +333,6 @@ def _passed(used: Conditioning) -> tuple[FloatArray, FloatArray]:
     taps = used.taps()
     ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
     return result, np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
-
-
-def _identifiable(
-    robot: Robot, body: FloatArray, springs: FloatArray, names: Sequence[str]
-) -> BaseParameters:
-    """Return the base parameters that are identifiable together with the springs."""
-    every = rigid_parameter_names(robot)
-    base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
-    w = np.concatenate([body[:, :, base.independent], springs], axis=2)
-    w = w.reshape(-1, w.shape[2])
-    scale = np.linalg.norm(w, axis=0)
-    scaled = w / np.where(scale > 0.0, scale, 1.0)
-    left = np.abs(np.diag(np.linalg.qr(scaled, mode='r')))[base.rank :]
-    if len(left) and left.min() < _RANK_TOLERANCE:
-        raise IdentificationError(
-            f'{names[int(np.argmin(left))]}: its stiffness cannot be distinguished from weight '
-            'and inertia along this motion; keep the inertias known, or move more'
-        )
-    return base
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:
