@@ -19,7 +19,7 @@ import warnings
 from armid_ros.effects.learned import counted, TorqueMap
 from armid_ros.motion import FloatArray
 from armid_ros.residual.libraries import imported
-from armid_ros.residual.rows import BLOCKS, JointRows
+from armid_ros.residual.rows import JointRows
 import numpy as np
 import numpy.typing as npt
 
@@ -87,10 +87,7 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
     assert best is not None
     _, scales, cells = best
     predicted = np.zeros(len(rows))
-    for block in range(BLOCKS):
-        others = rows.outside(block)
-        if others.all() or not others.any():
-            continue
+    for others in rows.folds():
         own = _posterior(_cells(rows, cells.labels, others), scales)
         predicted[~others] = own.torque(rows.inputs[~others])
     return _posterior(cells, scales), predicted

@@ -156,7 +156,12 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = library(rows.inputs, *ends, prismatic)
     x = np.column_stack([values for _, _, values in columns])
-    losses = np.array([_losses(x, rows, count) for count in range(1, _TERMS + 1)])
+    # squared residuals of each block under laws of so many terms that are fitted to the others
+    losses = np.zeros((_TERMS, BLOCKS))
+    for block, others in enumerate(rows.folds()):
+        for more in range(_TERMS):
+            factors = _fit(x[others], rows.left[others], more + 1)
+            losses[more, block] = np.sum((rows.left[~others] - x[~others] @ factors) ** 2)
     best = int(np.argmin(losses.sum(axis=1)))
     # the fewest with which blocks are predicted as well as in the best way, to one deviation
     worse = losses[: best + 1] - losses[best]
@@ -191,15 +196,3 @@ def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
     factors = np.zeros(x.shape[1])
     factors[chosen] = np.linalg.lstsq(x[:, chosen], left, rcond=None)[0]
     return factors
-
-
-def _losses(x: FloatArray, rows: JointRows, count: int) -> FloatArray:
-    """Return the squared residual of each block under a law fitted to the others, (BLOCKS,)."""
-    result = np.zeros(BLOCKS)
-    for block in range(BLOCKS):
-        others = rows.outside(block)
-        if others.all() or not others.any():
-            continue
-        factors = _fit(x[others], rows.left[others], count)
-        result[block] = float(np.sum((rows.left[~others] - x[~others] @ factors) ** 2))
-    return result

@@ -171,7 +171,13 @@ def _mistaken(
     before: Sequence[Motion],
 ) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
-    then = _baseline_factor(arm, before)
+    # by what factor torques of a baseline are those of the model: its masses are wrong on both
+    # days, where a factor leaves less than none does; one that knows the torque of no joint of the
+    # baseline tells nothing
+    then = effort_factor(arm.body, before)
+    if then is not None:
+        then = 1.0 if is_factor(arm.body, before, 1.0) else then
+        then = then if np.any(knows(ArmModel(arm.body), before, then)) else None
     mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
     found = [one.hypotheses for one in mistakes if one is not None]
     if len(found) == len(recordings):
@@ -227,18 +233,6 @@ def mistaken_recordings(
         if all(faults):
             said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
     return said
-
-
-def _baseline_factor(arm: ArmModel, before: Sequence[Motion]) -> float | None:
-    """Return by what factor torques of a baseline are the model's; None where nothing tells."""
-    # its masses are what it has wrong on both days, where a factor leaves less than none does; one
-    # that knows the torque of no joint of the baseline tells nothing
-    then = effort_factor(arm.body, before)
-    if then is None:
-        return None
-    then = 1.0 if is_factor(arm.body, before, 1.0) else then
-    known = knows(ArmModel(arm.body), before, then)
-    return then if np.any(known) else None
 
 
 def _fault(mistake: Hypothesis, since: float | None) -> str:

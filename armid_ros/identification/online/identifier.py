@@ -237,7 +237,12 @@ class OnlineIdentifier:
         if motion is None:
             return ()
         if self._filter.generation != self._generation:
-            self._begin()
+            # the row filter starts anew, together with the motion filter
+            self._row_filter.reset()
+            self._learner.interrupt()
+            self._generation = self._filter.generation
+            self._last_row = self._last_useless = self._noise = None
+            self._last_moving[:] = -np.inf
         useless = self._watch_rest(motion)
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
@@ -352,16 +357,6 @@ class OnlineIdentifier:
         """Delay of the filters [s]; None until the sampling period is known."""
         pole = self._filter.pole
         return None if pole is None else 3.0 / pole + self._row_filter.delay
-
-    def _begin(self) -> None:
-        """Start the row filter anew, together with the motion filter."""
-        self._row_filter.reset()
-        self._learner.interrupt()
-        self._generation = self._filter.generation
-        self._last_row = None
-        self._last_moving[:] = -np.inf
-        self._last_useless = None
-        self._noise = None
 
     def _watch_rest(self, motion: CausalMotion) -> FloatArray:
         """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""

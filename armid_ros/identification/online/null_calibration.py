@@ -181,11 +181,16 @@ class NullCalibration:
                 factor = factor * np.sum(np.minimum(seen / factor, most), axis=0) / mean
             single[some] = np.log(factor)
             yield
-        value, left = _drawn_together(
-            single[judged], self._variance[judged] / independent[judged], self._sources
-        )
+        # shrunk towards their mean as far as they are uncertain
+        value, variance = single[judged], self._variance[judged] / independent[judged]
+        mean = np.average(value, weights=1.0 / variance)
+        seen = float(np.average((value - mean) ** 2 - variance, weights=1.0 / variance))
+        spread = max(seen, _LEAST_SPREAD**2)
+        middle = float(np.average(value, weights=1.0 / (variance + spread)))
+        drawn = variance / (variance + spread)
+        left = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources
         factors = np.full(len(self._sizes), np.nan)
-        factors[judged] = np.exp(value).clip(1.0)
+        factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
         tail = yield from self._tail_of(later[:, judged], (factors * self._rare)[judged])
         self.factors, self._tail = factors, max(1.0, tail)
@@ -251,19 +256,6 @@ def _in_pieces(values: FloatArray) -> Iterator[slice]:
     width = max(1, _AT_A_TIME // max(1, len(values)))
     for first in range(0, values.shape[1], width):
         yield slice(first, first + width)
-
-
-def _drawn_together(
-    values: FloatArray, variance: FloatArray, independent: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return values shrunk towards their mean as far as they are uncertain, and variances."""
-    mean = np.average(values, weights=1.0 / variance)
-    seen = float(np.average((values - mean) ** 2 - variance, weights=1.0 / variance))
-    spread = max(seen, _LEAST_SPREAD**2)
-    mean = np.average(values, weights=1.0 / (variance + spread))
-    share = variance / (variance + spread)
-    left = share * spread + share**2 * np.mean(variance + spread) / independent
-    return values + share * (mean - values), left
 
 
 class ResidualScale:

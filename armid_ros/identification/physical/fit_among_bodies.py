@@ -25,7 +25,7 @@ from armid_ros.identification.physical.physical_certificate import (
     walls_reached,
 )
 from armid_ros.identification.physical.physical_program import Box, PhysicalProgram
-from armid_ros.identification.rows.regression import Regression, regressions, weighted_rows
+from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters
 from armid_ros.model.pseudo_inertia import (
@@ -163,12 +163,15 @@ def _bodies(
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
-    blocks = _compress(problem, weights)
+    # weighted rows, shrunk to one triangular factor per block of successive samples
+    ends = np.cumsum([len(part) for part in np.array_split(weights, BLOCKS)])[:-1]
+    rows = np.column_stack(weighted_rows(problem, weights))
+    blocks = [_triangle(part) for part in np.split(rows, ends * weights.shape[1])]
     whole = np.concatenate(blocks)
     least = float(np.linalg.norm(_residual(whole, fit.solution.values)))
     least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
-    rows = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
-    share = np.array([part.sum() for part in rows], dtype=float)
+    counted = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
+    share = np.array([part.sum() for part in counted], dtype=float)
     counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
 
     tried = _held_out_errors(program, blocks, counts)
@@ -294,15 +297,6 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
                 f'has a radius of gyration of {1e3 * np.sqrt(least / mass):.2g} mm at least'
             )
     return theta, tuple(notes)
-
-
-def _compress(problem: Sequence[Regression], weights: FloatArray) -> tuple[FloatArray, ...]:
-    """Shrink weighted rows to one triangular factor per block of successive samples."""
-    columns, target = weighted_rows(problem, weights)
-    rows = np.column_stack([columns, target])
-    parts = np.array_split(np.arange(len(weights)), BLOCKS)
-    ends = np.cumsum([len(part) for part in parts])[:-1] * weights.shape[1]
-    return tuple(_triangle(part) for part in np.split(rows, ends))
 
 
 def _held_out_errors(

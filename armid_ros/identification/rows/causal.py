@@ -298,7 +298,12 @@ class CausalFilter:
             return None
         if self._start is None:
             self._start = t
-        signal = self._unwrapped(signal)
+        position = signal[: self._n_joints]
+        if self._position is not None:
+            step = position - self._position
+            if float(np.abs(step).max()) > math.pi:  # a driver that keeps a joint within +-pi
+                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
+        self._position = position
         missing = self._missing(t, dt, signal)
         for value in (*missing, signal):
             stages = self._lag.update(dt / (len(missing) + 1), value)
@@ -338,16 +343,6 @@ class CausalFilter:
         inside = np.arange(1, count) / count
         factors = np.linalg.solve(np.vander(place), values)
         return list(np.vander(inside, len(place)) @ factors)
-
-    def _unwrapped(self, signal: FloatArray) -> FloatArray:
-        """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
-        position = signal[: self._n_joints]
-        if self._position is not None:
-            step = position - self._position
-            if float(np.abs(step).max()) > math.pi:
-                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
-        self._position = position
-        return signal
 
     def _restart(self) -> None:
         self.generation += 1
