@@ -210,6 +210,10 @@ class Assistant:
         threading.Thread(target=_listen, args=own, daemon=True).start()
 
 
+#: Answers jobs one at a time.
+Helper = Assistant | InProcess
+
+
 def _listen(process: subprocess.Popen[bytes], results: queue.SimpleQueue[Result]) -> None:
     """Pass on what a process answers, until it ends."""
     assert process.stdout is not None

@@ -13,8 +13,8 @@ from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.errors import ArmidError, IdentificationError, OutputError
 from armid_ros.files.own import refuse_replacing
-from armid_ros.live import Answer, Assistant, InProcess, LiveDiagnosis, StreamWatch
-from armid_ros.live.assistant import Done, Plan, Save
+from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
+from armid_ros.live.assistant import Done, Helper, Plan, Save
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.freshness import Freshness
 from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
@@ -63,10 +63,7 @@ class LiveDiagnosisNode(ArmidNode):
     table = LIVE_PARAMETERS
 
     def __init__(
-        self,
-        live: LiveDiagnosis | None = None,
-        helper: Assistant | InProcess | None = None,
-        **kwargs: Any,
+        self, live: LiveDiagnosis | None = None, helper: Helper | None = None, **kwargs: Any
     ) -> None:
         """
         Make the node.
@@ -75,7 +72,7 @@ class LiveDiagnosisNode(ArmidNode):
         ----------
         live : LiveDiagnosis, optional
             Decides when to ask; by default made from the parameters, once the robot is known.
-        helper : Assistant or InProcess, optional
+        helper : Helper, optional
             Answers; by default a process of its own.
         **kwargs
             For rclpy's Node.

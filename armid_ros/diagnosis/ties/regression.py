@@ -24,14 +24,12 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import stacked, together_interaction_problem
-from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction, LEAST_Z
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
 
-#: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
-LEAST_Z = 4.0
 #: A tie so many standard deviations above zero is not excluded.
 _DOUBTFUL = 1.0
 #: Squares over noise that each fitted inertia has to explain for the description to be wrong: one

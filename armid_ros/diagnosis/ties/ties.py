@@ -31,13 +31,9 @@ from armid_ros.diagnosis.search.prune import View
 from armid_ros.diagnosis.search.round import Nuisance, Round
 from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.ties.regression import (
-    LEAST_Z,
-    rightly_described,
-    TieRegression,
-    without_bias,
-)
+from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
+from armid_ros.identification.ties.stiffness import LEAST_Z
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

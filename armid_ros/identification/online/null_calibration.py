@@ -183,9 +183,9 @@ class NullCalibration:
             yield
         # shrunk towards their mean as far as they are uncertain
         value, variance = single[judged], self._variance[judged] / independent[judged]
-        mean = np.average(value, weights=1.0 / variance)
-        seen = float(np.average((value - mean) ** 2 - variance, weights=1.0 / variance))
-        spread = max(seen, _LEAST_SPREAD**2)
+        middle = float(np.average(value, weights=1.0 / variance))
+        apart = float(np.average((value - middle) ** 2 - variance, weights=1.0 / variance))
+        spread = max(apart, _LEAST_SPREAD**2)
         middle = float(np.average(value, weights=1.0 / (variance + spread)))
         drawn = variance / (variance + spread)
         left = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources

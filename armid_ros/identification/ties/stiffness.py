@@ -33,6 +33,8 @@ _LINEAR = 4
 _CONVERGED = 1e-3
 #: Share of the residuals' mean square that is noise of torques where none was measured.
 _LEAST_SHARE = 0.01
+#: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
+LEAST_Z = 4.0
 #: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
 _DRAWN_OUT = 1e-9
 
