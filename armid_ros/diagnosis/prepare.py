@@ -188,6 +188,6 @@ def mended(
         whole.append(sound)
         harmed_ones = [one for one in part if not one.report.unharmed]
         notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
-        notes += map(str, repairs)
+        notes += repairs
     notes += filter(None, [given_twice([*recordings, *baseline], validate)])
     return whole[0], whole[1], whole[2], notes

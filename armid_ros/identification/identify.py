@@ -209,7 +209,7 @@ def identify(
     settings = settings or IdentificationSettings()
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
-    notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
+    notes = damage + check_motion(arm.robot, recordings)
     notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
@@ -229,13 +229,7 @@ def identify(
         notes += said
     else:
         fit = _fitted(arm, base, problem, recordings, used, settings)
-        rigid = len(arm.robot.rigid_parameters)
-        if not np.all(np.any(theory.grouping[:, rigid:], axis=0)):
-            # what the described arm does not show, such as a saturation that it never reaches
-            now = fit.arm.base_parameters(rng)
-            if now.rank > theory.rank:
-                found = excited(now, regressions(fit.arm, now.independent, recordings, used))
-                theory, fit = now, _fitted(fit.arm, *found, recordings, used, settings)
+        theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
         fit, said = fit_by_instruments(arm, fit, recordings, used)
         notes += said
@@ -248,7 +242,6 @@ def identify(
         notes += certificate.sentences()
     # halves predict each other, with the description weighed as the fit weighs it
     spread = base_spread(whole, fit.base) if _holds(settings) else None
-    values = fit.base.values(whole.theta)
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -260,7 +253,9 @@ def identify(
         used=used,
         settings=settings,
         notes=notes + _unsettled(fit),
-        halves=halves_error(fit.problem, fit.solution.weights, values, spread),
+        halves=halves_error(
+            fit.problem, fit.solution.weights, fit.base.values(whole.theta), spread
+        ),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
@@ -334,3 +329,22 @@ def _unsettled(fit: FittedValues) -> tuple[str, ...]:
         f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
         'change one another too much in these data; leave some out, or record more',
     )
+
+
+def _with_what_shows_now(
+    theory: BaseParameters,
+    fit: FittedValues,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    settings: IdentificationSettings,
+    rng: np.random.Generator,
+) -> tuple[BaseParameters, FittedValues]:
+    """Fit again with what the described arm does not show, such as saturation it never reaches."""
+    rigid = len(fit.arm.robot.rigid_parameters)
+    if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
+        return theory, fit
+    now = fit.arm.base_parameters(rng)
+    if now.rank <= theory.rank:
+        return theory, fit
+    columns = regressions(fit.arm, now.independent, recordings, used)
+    return now, _fitted(fit.arm, *excited(now, columns), recordings, used, settings)

@@ -69,10 +69,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     covariance = first.covariance_of(shared) + second.covariance_of(shared)
     scatter = np.concatenate([one.scatter for one in sides])
     joint = before.covariance is not None and after.covariance is not None
-    members: dict[str, list[int]] = {}  # the rigid body, and the effects of each joint
-    for position, name in enumerate(shared):
-        members.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
-    groups = [group for group in members.values() if joint and len(group) > 1]
+    groups = _groups(shared) if joint else []
     residuals = residual_changes(before.fit, after.fit)
     chance = CHANCE / sum((True, bool(groups), bool(residuals)))
     single = _beyond_chance(_single_chances(*sides), chance)
@@ -83,18 +80,14 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     ]
     rows = np.array([sides[0].values, sides[1].values, sides[0].std, sides[1].std]).T.tolist()
     changes = tuple(
-        ParameterChange(name, row[0], row[1], row[2], row[3], sure)
-        for name, row, sure in zip(shared, rows, single, strict=True)
+        ParameterChange(name, row[0], row[1], row[2], row[3], one)
+        for name, row, one in zip(shared, rows, single, strict=True)
     )
+    sure = _beyond_chance(together, chance)
     found = tuple(
-        GroupChange(
-            '' if shared[group[0]].rigid else shared[group[0]].joint,
-            tuple(shared[k] for k in group),
-            p_value,
-            sure,
-        )
-        for group, p_value, sure in zip(
-            groups, together, _beyond_chance(together, chance), strict=True
+        GroupChange('' if own[0].rigid else own[0].joint, own, p_value, one)
+        for own, p_value, one in zip(
+            [tuple(shared[k] for k in group) for group in groups], together, sure, strict=True
         )
     )
     rigid = [k for k, name in enumerate(shared) if name.rigid]
@@ -168,6 +161,14 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
             yield NotCompared(name, 'effect')
         else:
             yield NotCompared(name, 'deviation' if other.without_std else 'grouping')
+
+
+def _groups(names: Sequence[ParameterName]) -> list[list[int]]:
+    """Return the positions of the rigid body, and of the effects of each joint; two or more."""
+    groups: dict[str, list[int]] = {}
+    for position, name in enumerate(names):
+        groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
+    return [group for group in groups.values() if len(group) > 1]
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.identification.rows.row_noise import NOISE_OF_TORQUE
 from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
@@ -21,38 +21,9 @@ import numpy.typing as npt
 _NAMED = 3
 
 
-@dataclass(frozen=True)
-class Repair:
-    """
-    Samples that were made up for.
-
-    Attributes
-    ----------
-    source : str
-        The recording.
-    samples : int
-        How many.
-    worst : tuple of str
-        What jumped and when, of the first few.
-
-    """
-
-    source: str
-    samples: int
-    worst: tuple[str, ...]
-
-    def __str__(self) -> str:
-        """Say what was found."""
-        what = '1 sample jumps and comes back; it was'
-        if self.samples > 1:
-            what = f'{self.samples} samples jump and come back; they were'
-        more = ', ...' if self.samples > len(self.worst) else ''
-        return f'{self.source}: {what} interpolated across: {", ".join(self.worst)}{more}'
-
-
 def without_damage(
     recordings: Sequence[Recording], settings: SignalSettings
-) -> tuple[list[Recording], tuple[Repair, ...]]:
+) -> tuple[list[Recording], tuple[str, ...]]:
     """
     Interpolate across damaged samples.
 
@@ -63,17 +34,17 @@ def without_damage(
     -------
     list of Recording
         Those without damage are the same objects.
-    tuple of Repair
-        What was found.
+    tuple of str
+        What was found: recording, number of samples, and the first of them.
 
     """
     used = conditioning(list(recordings), settings)
     repaired, found = [], []
     for recording in recordings:
-        one = None
+        one = ''
         if recording.tau is not None and len(recording) > 2:
             one, bad = _damage(recording, used)
-        if one is not None:
+        if one:
             found.append(one)
             t, good = recording.t, ~bad
             q, dq, tau = (
@@ -86,10 +57,8 @@ def without_damage(
     return repaired, tuple(found)
 
 
-def _damage(
-    recording: Recording, used: Conditioning
-) -> tuple[Repair | None, npt.NDArray[np.bool_]]:
-    """Return the damage of a recording, None without, and which samples it is, shape (N,)."""
+def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[np.bool_]]:
+    """Return the damage of a recording in words, and which samples it is, shape (N,)."""
     assert recording.tau is not None
     middle = np.median(recording.tau, axis=0)
     spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
@@ -108,8 +77,12 @@ def _damage(
     damaged = [sample.t for one in excursions for sample in one.samples]
     bad = np.isin(recording.t, damaged)
     if not excursions or bad.all():
-        return None, bad
-    return Repair(recording.source, len(damaged), tuple(worst[:_NAMED])), bad
+        return '', bad
+    what = '1 sample jumps and comes back; it was'
+    if len(damaged) > 1:
+        what = f'{len(damaged)} samples jump and come back; they were'
+    named = ', '.join((*worst[:_NAMED], *(['...'] if len(damaged) > _NAMED else [])))
+    return f'{recording.source}: {what} interpolated across: {named}', bad
 
 
 def impossible_excursions(

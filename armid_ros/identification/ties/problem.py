@@ -217,9 +217,8 @@ def interaction_problem(
     slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.pulled(slack)
-    by_angles = np.concatenate(
-        tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack), axis=3
-    )
+    by_both = tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack)
+    by_angles = np.concatenate(by_both, axis=3)
     springs_by = np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], 3)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))

@@ -274,7 +274,7 @@ def test_by_how_much_is_not_said_where_it_is_not_known():
     )
     size = Estimate(parameters, np.array([0.0, 0.2]), np.diag([np.inf, 1e-4]))
     candidate = ChangeCandidate('friction', 'elbow', parameters, np.eye(2), np.eye(2))
-    assert str(Change(candidate, (), 1.0, 2.0, size)) == (
+    assert str(Change(candidate, (), 1.0, size)) == (
         'friction at elbow has changed: viscous_coefficient by an amount that is not known until '
         'it moves, coulomb_torque by +0.2 N m (0.18 to 0.22)'
     )
