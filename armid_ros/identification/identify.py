@@ -240,8 +240,6 @@ def identify(
             arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
-    # halves predict each other, with the description weighed as the fit weighs it
-    spread = base_spread(whole, fit.base) if _holds(settings) else None
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -253,9 +251,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes + _unsettled(fit),
-        halves=halves_error(
-            fit.problem, fit.solution.weights, fit.base.values(whole.theta), spread
-        ),
+        halves=_halves(whole, fit, settings),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
@@ -281,6 +277,15 @@ def _fitted(
 def _holds(settings: IdentificationSettings) -> bool:
     """Whether the description stays where it is surer; a fit among bodies weighs it by itself."""
     return settings.physical is None and settings.method == settings.least_squares
+
+
+def _halves(
+    description: ArmModel, fit: FittedValues, settings: IdentificationSettings
+) -> HalvesError:
+    """Let halves predict each other, with the description weighed as the fit weighs it."""
+    spread = base_spread(description, fit.base) if _holds(settings) else None
+    described = fit.base.values(description.theta)
+    return halves_error(fit.problem, fit.solution.weights, described, spread)
 
 
 def _require_samples(
