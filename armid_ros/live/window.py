@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 #: A sample that is so much earlier than one is due counts as due, as a share of the period.
 _EARLY = 0.25
+#: Below it in all joints a sample is no motion [rad/s or m/s].
+_REST_VELOCITY = 0.01
 #: Periods without a sample after which the stretch is broken, for its spectrum would have a hole;
 #: a step back in time that is as long is none of samples out of order.
 _LONGEST_GAP = 20.0
@@ -31,8 +33,6 @@ class SampleWindow:
         What is kept at most [s].
     period : float
         Between samples that are kept [s].
-    rest_velocity : float
-        Below it in all joints a sample is no motion [rad/s or m/s].
 
     Attributes
     ----------
@@ -41,13 +41,10 @@ class SampleWindow:
 
     """
 
-    def __init__(
-        self, joints: tuple[str, ...], duration: float, period: float, rest_velocity: float = 0.01
-    ) -> None:
+    def __init__(self, joints: tuple[str, ...], duration: float, period: float) -> None:
         self.joints = joints
         self.moved = 0.0
         self._period = period
-        self._rest = rest_velocity
         self._capacity = int(np.ceil(duration / (period * (1.0 - _EARLY)))) + 1
         n = len(joints)
         # twice the room: rows move to the front once in a while, and a window is one slice
@@ -110,7 +107,7 @@ class SampleWindow:
         if len(self):
             before = self._rows[self._end - 1]
             step = row[0] - before[0]
-            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > self._rest * step:
+            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > _REST_VELOCITY * step:
                 self.moved += step
         self._end += 1
         self._first = max(self._first, self._end - self._capacity)

@@ -99,7 +99,6 @@ class _RecordedTorque(Controller):
 
     motion: Motion
     robot: Robot
-    bandwidth: float
     inertia: FloatArray
     _data: pin.Data = field(init=False, repr=False)
 
@@ -117,8 +116,7 @@ class _RecordedTorque(Controller):
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Return the recorded torque and the feedback, shape (n,)."""
-        omega = self.bandwidth
-        pull = omega**2 * (desired[0] - q) + 2.0 * omega * (desired[1] - dq)
+        pull = BANDWIDTH**2 * (desired[0] - q) + 2.0 * BANDWIDTH * (desired[1] - dq)
         mass = pin.crba(self.robot.model, self._data, q)
         return np.asarray(feedforward + mass @ pull + self.inertia * pull)
 
@@ -129,7 +127,6 @@ def forward_validation(
     used: Conditioning,
     *,
     nominal: ArmModel | None = None,
-    bandwidth: float = BANDWIDTH,
     duration: float = 30.0,
 ) -> ForwardScore:
     """
@@ -146,8 +143,6 @@ def forward_validation(
     nominal : ArmModel, optional
         Gives the inertia matrix of the feedback; the same for all models that are compared, by
         default the model itself.
-    bandwidth : float
-        Natural frequency of the feedback [rad/s].
     duration : float
         At most this much of the first unbroken stretch is simulated [s].
 
@@ -172,7 +167,7 @@ def forward_validation(
     nominal = nominal or arm
     added = nominal.action().inertia
     rotors = np.zeros(motion.n_joints) if added is None else np.diag(added)
-    controller = _RecordedTorque(reference, nominal.body, bandwidth, rotors)
+    controller = _RecordedTorque(reference, nominal.body, rotors)
     plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
     run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
     t = run.truth.t

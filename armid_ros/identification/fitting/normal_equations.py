@@ -85,7 +85,7 @@ class NormalEquations:
         return NormalEquations(self.matrix - other.matrix, self.vector - other.vector)
 
 
-def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
+def informative_basis(products: FloatArray) -> FloatArray:
     """
     Return the identifiable directions.
 
@@ -93,9 +93,6 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
     ----------
     products : ndarray, shape (p, p)
         Products of columns with each other; positive semi-definite.
-    tolerance : float
-        Share of the largest eigenvalue, of columns scaled to one length, below which a direction
-        is not told.
 
     Returns
     -------
@@ -110,10 +107,10 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
         inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
         # the smallest eigenvalue is at least one over the trace of the inverse, and the largest
         # at most the trace of the products: every direction is told
-        if np.sum(inverse**2) * np.trace(scaled) * tolerance <= 1.0:
+        if np.sum(inverse**2) * np.trace(scaled) * UNINFORMATIVE <= 1.0:
             return np.asarray(scale[:, np.newaxis] * inverse.T)
     values, vectors = np.linalg.eigh(scaled)
-    good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
+    good = values > UNINFORMATIVE * max(float(values.max(initial=0.0)), 1e-300)
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
 
 

@@ -21,7 +21,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 
 from armid_ros.estimate import Estimate
-from armid_ros.identification.online.background import at_once, Background, Foreground, Job, Pieces
+from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_score import Block
 from armid_ros.identification.online.change_search import (
@@ -80,10 +80,10 @@ class ChangeWatch:
         Makes rows of what is learned for the tests alone.
     candidates : sequence of ChangeCandidate
         What may change.
-    settings : ChangeSettings, optional
+    settings : ChangeSettings
         How readily a change is believed.
-    work : Background, optional
-        Does what takes long; without it all is done at once.
+    work : Background
+        Does what takes long.
 
     Attributes
     ----------
@@ -97,15 +97,14 @@ class ChangeWatch:
         estimator: RecursiveLeastSquares,
         nuisance: NuisanceRows | None,
         candidates: Sequence[ChangeCandidate],
-        settings: ChangeSettings | None = None,
-        work: Background | None = None,
+        settings: ChangeSettings,
+        work: Background,
     ) -> None:
-        settings = settings or ChangeSettings()
         self._estimator = estimator
         self._nuisance = nuisance
         self._wider = estimator.with_more(() if nuisance is None else nuisance.parameters)
         self._asked = len(estimator.parameters)
-        self._work = work or Foreground()
+        self._work = work
         self._search = ChangeSearch(
             candidates,
             self._among_all(np.hstack([c.directions for c in candidates])),

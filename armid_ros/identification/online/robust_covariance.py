@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from armid_ros.identification.fitting.least_squares import LEAST_LEFT
-from armid_ros.identification.online.background import Background, Foreground, Job, Pieces
+from armid_ros.identification.online.background import Background, Job, Pieces
 from armid_ros.identification.online.square_root import PRIOR_STD
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -65,17 +65,15 @@ class RobustCovariance:
         Rows in a window, which should last longer than errors do.
     forgetting : float
         Share of what was that is not forgotten with a row; no window takes more than it brings.
-    work : Background, optional
-        Sums windows up; without it a window is summed up at once.
+    work : Background
+        Sums windows up.
 
     """
 
-    def __init__(
-        self, window: int, forgetting: float = 1.0, work: Background | None = None
-    ) -> None:
+    def __init__(self, window: int, forgetting: float, work: Background) -> None:
         self._window = window
         self.forgetting = forgetting
-        self._work = work or Foreground()
+        self._work = work
         self.reset()
 
     def reset(self) -> None:

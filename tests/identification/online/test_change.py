@@ -15,7 +15,7 @@ from armid_ros.identification.online.change_score import (
     ScoreStatistics,
     weighing,
 )
-from armid_ros.identification.online.change_watch import ChangeWatch
+from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 import numpy as np
@@ -24,11 +24,16 @@ from scipy import stats
 
 from benchmarks import changes
 from benchmarks.change_information import Noise, visibility
-from tests.identification.conftest import multisine
+from tests.identification.conftest import Foreground, multisine
 
 NAMES = tuple(ParameterName(f'p{k}', '', '') for k in range(5))
 TRUTH = np.array([1.0, -2.0, 0.5, 3.0, 0.0])
 CHANGED = np.array([[0.0], [0.0], [1.0], [0.0], [0.5]])
+
+
+def watching(estimator, candidate):
+    """Return what watches for one change, and does all its work at once."""
+    return ChangeWatch(estimator, None, [candidate], ChangeSettings(), Foreground())
 
 
 def learned_and_block(
@@ -237,7 +242,7 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
     widths = []
     rows, noise = rng.normal(size=(6000, 4, 3)), rng.normal(size=(6000, 4))
     for louder in (1.0, 3.0):
-        watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), None, [candidate])
+        watch = watching(RecursiveLeastSquares(parameters, np.ones(4)), candidate)
         for k in range(6000):
             after = k >= 5000
             now = truth + 5.0 * after * step[:, 0]
@@ -258,7 +263,7 @@ def test_what_shows_for_a_moment_before_an_arm_rests_is_no_change(rests):
     parameters = tuple(ParameterName(f'p{k}', '', '') for k in range(3))
     step = np.array([[0.0], [0.0], [1.0]])
     candidate = ChangeCandidate('friction', 'elbow', parameters[2:], step, step)
-    watch = ChangeWatch(RecursiveLeastSquares(parameters, np.ones(4)), None, [candidate])
+    watch = watching(RecursiveLeastSquares(parameters, np.ones(4)), candidate)
     for k in range(6000):
         rows = rng.normal(size=(4, 3))
         tau = rows @ (truth + 5.0 * (k >= 5000) * step[:, 0]) + rng.normal(size=4)
