@@ -225,14 +225,14 @@ def identify(
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = ungrouped(whole, whole.base_parameters(rng))
         fit = fit_values(whole, base, problem, recordings, used, settings.least_squares, free)
-        fit, said = with_uncertain_inertia(whole, fit, recordings, used)
-        notes += said
+        fit, remarks = with_uncertain_inertia(whole, fit, recordings, used)
+        notes += remarks
     else:
         fit = _fitted(arm, base, problem, recordings, used, settings)
         theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
-        fit, said = fit_by_instruments(arm, fit, recordings, used)
-        notes += said
+        fit, remarks = fit_by_instruments(arm, fit, recordings, used)
+        notes += remarks
     notes += _remarks(fit, theory)
     certificate = None
     if settings.physical is not None:
@@ -315,15 +315,15 @@ def _require_samples(
 
 def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     """Say what the data group, and what they were weighted down for."""
-    said: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     if fit.base.rank < theory.rank:
-        said += (
+        remarks += (
             f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
             'the others are grouped, or stay as described',
         )
     if fit.solution.outliers:
-        said += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
-    return said
+        remarks += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
+    return remarks
 
 
 def _unsettled(fit: FittedValues) -> tuple[str, ...]:

@@ -95,7 +95,7 @@ class Residual:
 
     def sentences(self) -> tuple[str, ...]:
         """Say what was learned, a joint a line."""
-        said = []
+        lines = []
         for one in self.joints:
             alone = ''
             if one.held_out is not None:
@@ -105,11 +105,11 @@ class Residual:
             like = 'no law of few terms'
             if one.law is not None:
                 like = f'{one.law.text} ({percent_of(one.law.share)})'
-            said.append(
+            lines.append(
                 f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is '
                 f'left{alone}; it looks like {like}'
             )
-        return tuple(said)
+        return tuple(lines)
 
     def document(self, table: str) -> dict[str, Any]:
         """Return what diagnosis.json holds; the table is a file's name."""

@@ -88,7 +88,7 @@ class Mistake:
 
     def sentence(self, robot: Robot) -> str:
         """Say what seems to be wrong, what to do and what shows it, without a full stop."""
-        said = ', or '.join(one.text for one in self.hypotheses)
+        text = ', or '.join(one.text for one in self.hypotheses)
         before, after = (
             100.0 * min(float(error.joints[self.joint]), 9.99)
             for error in (self.before, self.after)
@@ -97,11 +97,11 @@ class Mistake:
             return (
                 f'the arm as described predicts the torque of {robot.joints[self.joint]} to '
                 f'{before:.0f} %; links that are off as those of a description may be explain '
-                f'that, and this would do so too: {said}'
+                f'that, and this would do so too: {text}'
             )
         arm = 'fitted' if self.fitted else 'described'
         return (
-            f'{said} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
+            f'{text} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
             f'{before:.0f} % as recorded, to {after:.0f} % with that put right)'
         )
 
