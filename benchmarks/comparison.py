@@ -20,7 +20,7 @@ from armid_ros.identification import (
     identify,
     SignalSettings,
 )
-from armid_ros.identification.assess.comparison import compare
+from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot

@@ -19,10 +19,8 @@ from armid_ros.identification.ties.problem import (
     InteractionProblem,
     MachineNoise,
 )
-from armid_ros.identification.ties.search import find_interaction, InteractionFinding
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.identification.poses import choose_poses, stiffness_bound
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
@@ -36,8 +34,9 @@ from armid_ros.papers.exo.plant.torque_driven import splined
 import numpy as np
 
 from benchmarks.exo_deviations import deviations
-from benchmarks.exo_diagnosis import cases, diagnosed
-from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE, with_torques
+from benchmarks.exo_diagnosis import diagnosed
+from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques
+from benchmarks.exo_poses import choose_poses, stiffness_bound
 from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
 
 SECONDS = 6.0
@@ -52,15 +51,10 @@ def main() -> None:
     parser.add_argument('--repeats', type=int, default=400, help='for stated deviations')
     parser.add_argument('--sets', type=int, default=24, help='recordings with hidden springs')
     parser.add_argument('--first-seed', type=int, default=0, help='of the hidden sets')
-    parser.add_argument('--hidden', action='store_true', help='the hidden sets alone')
     asked = parser.parse_args()
-    if asked.hidden:
-        hidden(asked.sets, asked.first_seed)
-        return
     gait_by_torque()
     stiffness(asked.draws)
     deviations(asked.repeats)
-    hidden(asked.sets, asked.first_seed)
     diagnosed(asked.sets, asked.first_seed)
 
 
@@ -192,36 +186,6 @@ def _judged(
         f'    {plain.mean(axis=0)[worst]:+8.1f}        <= {wanted}'
         + (f'  (worst: {found[0].segments[worst]})' if len(mean) > 1 else '')
     )
-
-
-def hidden(sets: int, first: int = 0) -> None:
-    """Hide springs in recordings, and none in as many others."""
-    gait, every = read_gait(), leg_pair()
-    t = np.arange(0.0, SECONDS, 1e-3)
-    motions = stepping(every, gait, t)
-    right = alarms = 0
-    closed = []
-    for number, (k, segments) in enumerate(cases()[:sets]):
-        found = _search(every, leg_pair(k, segments), motions, first + number)
-        right += set(found.segments) == set(segments)
-        closed.append(found.closed_fraction)
-        if set(found.segments) != set(segments):
-            print(f'  {k:g} N/m at {", ".join(segments)}: named {", ".join(found.segments)}')
-    for number in range(sets):
-        found = _search(every, every.with_stiffness(0.0), motions, first + 1000 + number)
-        alarms += len(found.segments) > 0
-    print('hidden interaction, 1e3 to 5e4 N/m          wanted   measured')
-    print(f'  segments named right                      {sets}/{sets}    {right}/{sets}')
-    print(f'  named where there is none                 0/{sets}     {alarms}/{sets}')
-    least, median = min(closed), np.median(closed)
-    print(f'  held-out gap closed, least and median     -        {least:.3f}, {median:.3f}')
-
-
-def _search(every: TiedPair, real: TiedPair, motions: PairMotion, seed: int) -> InteractionFinding:
-    rng = np.random.default_rng(seed)
-    exact = with_torques(real, motions)
-    runs = [tuple(map(recorded, measured(exact, 0.05, rng))) for _ in range(2)]
-    return find_interaction(every.robot, every.other, every.ties, runs[0], runs[1])
 
 
 if __name__ == '__main__':

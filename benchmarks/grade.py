@@ -23,7 +23,7 @@ from unittest import mock
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.assess import mistakes, prediction_error
+from armid_ros.identification.assess import hypotheses, mistakes, prediction_error
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -115,7 +115,7 @@ def said_of(robot, recording):
 def judged(cases, limits):
     """Return how many sound recordings are suspected, and how many mistakes are missed."""
     with ExitStack() as stack:
-        for module in (mistakes, prediction_error):
+        for module in (hypotheses, mistakes, prediction_error):
             stack.enter_context(mock.patch.object(module, 'LIMITS', limits))
         said = [(expected, said_of(robot, recording)) for expected, robot, recording in cases]
     return (

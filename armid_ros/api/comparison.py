@@ -11,7 +11,7 @@ from typing import Any, TYPE_CHECKING
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.files import json_text, write_file
-from armid_ros.identification.assess.comparison import compare as run
+from armid_ros.identification.assess.compare import compare as run
 from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
 

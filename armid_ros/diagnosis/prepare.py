@@ -14,7 +14,7 @@ from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Traject
 from armid_ros.diagnosis.search.candidates import with_friction
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import Conditioning, conditioning, MODEL_BANDS
 from armid_ros.identification.ties.recorded import band_of_motion
@@ -188,6 +188,6 @@ def mended(
         whole.append(sound)
         harmed_ones = [one for one in part if not one.report.unharmed]
         notes += [f'{one.source}: {one.report.describe()}' for one in harmed_ones]
-        notes += map(str, repairs)
+        notes += repairs
     notes += filter(None, [given_twice([*recordings, *baseline], validate)])
     return whole[0], whole[1], whole[2], notes

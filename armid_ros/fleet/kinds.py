@@ -16,7 +16,7 @@ from armid_ros.files import load_json, reading
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Filters
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
-from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.model import BaseParameters

@@ -23,7 +23,6 @@ from armid_ros.identification.fitting.triangle import (
 )
 from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
-from armid_ros.identification.rows.signals import sampling_rate
 from armid_ros.identification.rows.streaming import streamed
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -204,7 +203,7 @@ def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression
         path,
         job.arm,
         job.theory.independent,
-        lambda piece: job.filters.at(sampling_rate(piece), path),
+        lambda piece: job.filters.at(1.0 / piece.period, path),
         job.samples,
         topic=job.topic,
         settings=job.reading,

@@ -27,33 +27,15 @@ _NOT_DATA = 'metadata.yaml'
 
 
 @dataclass(frozen=True)
-class FileContent:
-    """
-    What a recording holds, as far as it is needed to tell it from another one.
-
-    Attributes
-    ----------
-    size : int
-        Of its files together [bytes].
-    digest : str
-        SHA-256 of their sizes and of their beginnings and ends, in hexadecimal digits.
-
-    """
+class _Content:
+    """Size of the files of a recording [bytes], and SHA-256 of their sizes, begins and ends."""
 
     size: int
     digest: str
 
     @classmethod
-    def of(cls, path: Path) -> FileContent:
-        """
-        Read the content of a file, or of the files of a folder such as a bag.
-
-        Raises
-        ------
-        OSError
-            If one cannot be read.
-
-        """
+    def of(cls, path: Path) -> _Content:
+        """Read the content of a file, or of the files of a folder such as a bag."""
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]
         digest, total = hashlib.sha256(), 0
         for file in inside:
@@ -72,7 +54,7 @@ class FileContent:
 def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return identification.json with the contents of its recordings, of those that are there."""
     there = [(name, Path(name)) for name in _names(document)]
-    rows = [{'bag': name, **asdict(FileContent.of(path))} for name, path in there if path.exists()]
+    rows = [{'bag': name, **asdict(_Content.of(path))} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}
 
 
@@ -111,7 +93,7 @@ def require_as_identified(path: str | Path) -> None:
 
     """
     for place, known in _found(Path(path)).items():
-        if known is not None and FileContent.of(place) != known:
+        if known is not None and _Content.of(place) != known:
             raise ModelError(
                 f'{place}: is not the recording any more that {path} was identified from, its '
                 'content is another; name the baseline (--baseline), ask without one '
@@ -119,7 +101,7 @@ def require_as_identified(path: str | Path) -> None:
             )
 
 
-def _found(model: Path) -> dict[Path, FileContent | None]:
+def _found(model: Path) -> dict[Path, _Content | None]:
     """Return the recordings of a model that are there, and what they held, where that is known."""
     beside = model.with_name('identification.json')
     if not is_file(beside):
@@ -128,7 +110,7 @@ def _found(model: Path) -> dict[Path, FileContent | None]:
     with reading(beside, ModelError):
         document = load_json(text)
         known = {
-            str(row['bag']): FileContent(int(row['size']), str(row['digest']))
+            str(row['bag']): _Content(int(row['size']), str(row['digest']))
             for row in document.get('recordings', [])
         }
         starts = (Path(), beside.parent, beside.parent.parent)

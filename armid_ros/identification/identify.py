@@ -10,13 +10,10 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.cutoff import cutoff_of_torques
-from armid_ros.identification.fitting.excited import excited
-from armid_ros.identification.fitting.halves import halves_error, HalvesError
-from armid_ros.identification.fitting.held import base_spread, determined
+from armid_ros.identification.fitting.excited import base_spread, determined, excited
+from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, HalvesError
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
 from armid_ros.identification.fitting.instruments import fit_by_instruments
-from armid_ros.identification.fitting.jackknife import scatter
 from armid_ros.identification.fitting.least_squares import Estimator, ESTIMATORS, Method
 from armid_ros.identification.fitting.nonlinear import (
     fit_values,
@@ -25,13 +22,12 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
-from armid_ros.identification.fitting.quasi_static import free_directions, with_uncertain_inertia
-from armid_ros.identification.physical.fit_among_bodies import PhysicalSettings
+from armid_ros.identification.fitting.normal_equations import scatter
+from armid_ros.identification.fitting.quasi_static import with_uncertain_inertia
+from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate
-from armid_ros.identification.physical.physical_fit import fit_to_bodies
 from armid_ros.identification.rows.checks import (
     beyond_limits,
-    check_length,
     check_motion,
     check_stamps,
     check_torque,
@@ -39,7 +35,13 @@ from armid_ros.identification.rows.checks import (
 )
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.decimation import check_decimation
-from armid_ros.identification.rows.regression import predictions, Regression, regressions
+from armid_ros.identification.rows.regression import (
+    Fit,
+    predictions,
+    Regression,
+    regressions,
+    Score,
+)
 from armid_ros.identification.rows.signals import (
     Conditioning,
     conditioning,
@@ -47,10 +49,9 @@ from armid_ros.identification.rows.signals import (
     SignalSettings,
 )
 from armid_ros.model import BaseParameters
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-import numpy.typing as npt
 
 
 @dataclass(frozen=True)
@@ -89,79 +90,6 @@ class IdentificationSettings:
     def least_squares(self) -> Method:
         """Return the least squares that the method is, or starts from."""
         return 'wls' if self.method == 'iv' else self.method
-
-
-@dataclass(frozen=True)
-class Fit:
-    """
-    How a model predicts one unbroken stretch of a recording.
-
-    Attributes
-    ----------
-    source : str
-        The recording.
-    motion : Motion
-        Filtered and decimated motion with measured torque, M samples.
-    predicted : ndarray, shape (M, n)
-        Torque of the model, filtered alike [N m].
-    informative : ndarray of bool, shape (M, n)
-        False where a joint is held at rest by friction, where any torque is right.
-
-    """
-
-    source: str
-    motion: Motion
-    predicted: FloatArray
-    informative: npt.NDArray[np.bool_]
-
-    def __repr__(self) -> str:
-        """Return what it is, and how far off, in a line."""
-        error = Score.of([self]).relative_error_percent
-        return f'Fit of {self.source}: {len(self.motion)} samples, {error:.2f} % relative error'
-
-    @property
-    def residual(self) -> FloatArray:
-        """Measured minus predicted torque, shape (M, n) [N m]."""
-        assert self.motion.tau is not None
-        return self.motion.tau - self.predicted
-
-
-@dataclass(frozen=True)
-class Score:
-    """
-    How well a model predicts recordings.
-
-    Attributes
-    ----------
-    relative_error_percent : float
-        100 |tau - tau_hat| / |tau| over all joints and samples.
-    joint_relative_error_percent : ndarray, shape (n,)
-        The same of each joint.
-    rms : ndarray, shape (n,)
-        Root mean square residual of each joint [N m].
-    torque_rms : ndarray, shape (n,)
-        Root mean square torque of each joint [N m].
-
-    """
-
-    relative_error_percent: float
-    joint_relative_error_percent: FloatArray
-    rms: FloatArray
-    torque_rms: FloatArray
-
-    @staticmethod
-    def of(fits: Sequence[Fit]) -> Score:
-        """Score one or more stretches together."""
-        used = np.concatenate([fit.informative for fit in fits])
-        residual = used * np.concatenate([fit.residual for fit in fits])
-        tau = used * np.concatenate([fit.motion.tau for fit in fits if fit.motion.tau is not None])
-        lengths, count = np.linalg.norm(tau, axis=0), np.maximum(used.sum(axis=0), 1)
-        return Score(
-            float(100.0 * np.linalg.norm(residual) / np.linalg.norm(tau)),
-            100.0 * np.linalg.norm(residual, axis=0) / np.where(lengths > 0.0, lengths, np.inf),
-            np.linalg.norm(residual, axis=0) / np.sqrt(count),
-            lengths / np.sqrt(count),
-        )
 
 
 @dataclass(frozen=True)
@@ -239,9 +167,7 @@ class Identification:
         found = predictions(self.arm, recordings, self.used)
         if not found:
             raise no_stretch(recordings[0], self.used)
-        return tuple(
-            Fit(part.source, part.motion, part.torque, part.informative) for part in found
-        )
+        return tuple(found)
 
 
 def identify(
@@ -283,7 +209,7 @@ def identify(
     settings = settings or IdentificationSettings()
     recordings, damage = without_damage(recordings, settings.signals)
     used = conditioning(list(recordings), settings.signals)
-    notes = tuple(map(str, damage)) + check_motion(arm.robot, recordings)
+    notes = damage + check_motion(arm.robot, recordings)
     notes += beyond_limits(arm.robot, recordings) + too_short_to_tell(recordings)
     theory = arm.base_parameters(rng)
     # inertia of a motion that is taken as slow: as described, unless bodies are fitted to weight
@@ -297,17 +223,16 @@ def identify(
     notes += check_torque(arm, recordings, problem)
     if described:
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
-        free = free_directions(whole, rng)
+        free = ungrouped(whole, whole.base_parameters(rng))
         fit = fit_values(whole, base, problem, recordings, used, settings.least_squares, free)
-        fit, said = with_uncertain_inertia(whole, fit, recordings, used)
-        notes += said
+        fit, remarks = with_uncertain_inertia(whole, fit, recordings, used)
+        notes += remarks
     else:
         fit = _fitted(arm, base, problem, recordings, used, settings)
-        if _hidden(arm, theory):
-            theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
+        theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
-        fit, said = fit_by_instruments(arm, fit, recordings, used)
-        notes += said
+        fit, remarks = fit_by_instruments(arm, fit, recordings, used)
+        notes += remarks
     notes += _remarks(fit, theory)
     certificate = None
     if settings.physical is not None:
@@ -322,7 +247,7 @@ def identify(
         estimate=Estimate(fit.base.parameters, fit.values, fit.solution.covariance),
         condition_number=fit.solution.condition_number,
         joint_std=fit.solution.joint_std,
-        training=_training(fit),
+        training=fit.fits,
         used=used,
         settings=settings,
         notes=notes + _unsettled(fit),
@@ -374,7 +299,11 @@ def _require_samples(
     few = sum(part.tau.size for part in columns) < 2 * theory.rank
     if few:
         check_decimation(recordings, used, -(-2 * theory.rank // recordings[0].n_joints))
-    check_length(recordings, columns, used)
+    left = {part.source for part in columns}
+    for recording in recordings:
+        if recording.source not in left:
+            check_stamps([recording], used)
+            raise no_stretch(recording, used)
     if few:
         check_stamps(recordings, used)
         raise IdentificationError(
@@ -386,23 +315,15 @@ def _require_samples(
 
 def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     """Say what the data group, and what they were weighted down for."""
-    said: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     if fit.base.rank < theory.rank:
-        said += (
+        remarks += (
             f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
             'the others are grouped, or stay as described',
         )
     if fit.solution.outliers:
-        said += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
-    return said
-
-
-def _training(fit: FittedValues) -> tuple[Fit, ...]:
-    """Return how the model predicts the data that it was fitted to."""
-    return tuple(
-        Fit(part.source, part.motion, torque, part.informative)
-        for part, torque in zip(fit.problem, fit.predicted, strict=True)
-    )
+        remarks += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
+    return remarks
 
 
 def _unsettled(fit: FittedValues) -> tuple[str, ...]:
@@ -415,12 +336,6 @@ def _unsettled(fit: FittedValues) -> tuple[str, ...]:
     )
 
 
-def _hidden(arm: ArmModel, theory: BaseParameters) -> bool:
-    """Tell whether an effect has a parameter that no motion of the arm as it is shows."""
-    rigid = len(arm.robot.rigid_parameters)
-    return not bool(np.all(np.any(theory.grouping[:, rigid:], axis=0)))
-
-
 def _with_what_shows_now(
     theory: BaseParameters,
     fit: FittedValues,
@@ -429,12 +344,10 @@ def _with_what_shows_now(
     settings: IdentificationSettings,
     rng: np.random.Generator,
 ) -> tuple[BaseParameters, FittedValues]:
-    """
-    Fit again with what the fitted arm shows and the described one did not.
-
-    Such as a saturation that the torques of the description never reach.
-
-    """
+    """Fit again with what the described arm does not show, such as saturation it never reaches."""
+    rigid = len(fit.arm.robot.rigid_parameters)
+    if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
+        return theory, fit
     now = fit.arm.base_parameters(rng)
     if now.rank <= theory.rank:
         return theory, fit

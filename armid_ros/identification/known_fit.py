@@ -65,7 +65,13 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
 
     """
     if document.get('misfit') is not None:
-        return _of_misfit(document['misfit'])
+        known = misfit_of_block(document['misfit'])
+        torque = known.torque_rms or {}
+        errors = {j: 100.0 * left / torque[j] for j, left in known.rms.items() if torque.get(j)}
+        overall = known.relative_error_percent
+        reason = _worst(errors, overall, f'{known.data} data')
+        grade = by_error(max(errors.values(), default=overall))
+        return KnownFit(grade, reason, known.rms, errors, as_diagnosed=True)
     scores = document.get('validation') or [document.get('training')]
     if not scores[0]:
         return None
@@ -77,16 +83,6 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
     reasons = document.get('reasons') or [_worst(errors, overall, f'data {data}')]
     grade = document.get('grade', by_error(max(errors.values(), default=overall)))
     return KnownFit(str(grade), str(reasons[0]), rms, errors, max(count, 1))
-
-
-def _of_misfit(block: Mapping[str, Any]) -> KnownFit:
-    known = misfit_of_block(block)
-    torque = known.torque_rms or {}
-    errors = {j: 100.0 * left / torque[j] for j, left in known.rms.items() if torque.get(j)}
-    overall = known.relative_error_percent
-    reason = _worst(errors, overall, f'{known.data} data')
-    grade = by_error(max(errors.values(), default=overall))
-    return KnownFit(grade, reason, known.rms, errors, as_diagnosed=True)
 
 
 def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 import re
 from typing import Any
@@ -15,7 +16,8 @@ from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.assess.grade import Grade
 from armid_ros.identification.assess.verification import Verification
 from armid_ros.identification.description import kinematics_digest
-from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.identify import Identification
+from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -60,7 +62,9 @@ def identification_document(
         'covariance': [row[: k + 1].tolist() for k, row in enumerate(estimate.covariance)],
         'scatter': result.scatter.tolist(),
         'grouping': list(result.base.terms),
-        'not_identified': _lost(result),
+        'not_identified': [
+            {**asdict(lost.parameter), 'reason': lost.reason} for lost in result.unidentified
+        ],
         'condition_number': result.condition_number,
         'rank': result.base.rank,
         'training': {
@@ -92,19 +96,6 @@ def identification_document(
             'left_out': list(verification.left_out),
         }
     return document
-
-
-def _lost(result: Identification) -> list[dict[str, str]]:
-    """Return what the data do not tell, and why."""
-    return [
-        {
-            'name': lost.parameter.name,
-            'joint': lost.parameter.joint,
-            'unit': lost.parameter.unit,
-            'reason': lost.reason,
-        }
-        for lost in result.unidentified
-    ]
 
 
 def write_document(path: str | Path, document: Mapping[str, Any]) -> None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -204,13 +204,9 @@ def read_parameters(path: str | Path) -> ParameterFile:
 
 
 def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
-    """
-    Return what the identification.json beside a model.yaml says, if it is of this model.
-
-    It has what the model was made from: groups of parameters, with their covariance. It is of the
-    model if the values of the model make those of every group.
-
-    """
+    """Return what the identification.json beside a model.yaml says, if it is of this model."""
+    # It has what the model was made from: groups of parameters, with their covariance. It is of
+    # the model if the values of the model make those of every group.
     file = path.with_name('identification.json')
     if not is_file(file):
         return None
@@ -220,7 +216,11 @@ def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
         if not isinstance(document, dict) or document.get('schema') != _IDENTIFICATION:
             return None
         found = parameters_of(str(file), document)
-        values = {symbol(name): value for name, value in _model_values(model)}
+        rows = [*model['rigid_parameters']]
+        for effect in model['effects']:
+            rows += [*effect['parameters'], *effect.get('shapes', ())]
+        names = [ParameterName(str(row['name']), str(row['joint']), '') for row in rows]
+        values = {symbol(n): float(row['value']) for n, row in zip(names, rows, strict=True)}
         known = all(key in values for row in found.terms.values() for key in row)
         complete = len(found.terms) == len(found.values) > 0
         if not (complete and known and document.get('gravity') == model['gravity']):
@@ -231,15 +231,6 @@ def _beside(path: Path, model: Mapping[str, Any]) -> ParameterFile | None:
         if abs(made - value) > _SAME_GROUPING * (std + abs(value)):
             return None
     return found if found.kinematics else _with_robot(found, file)
-
-
-def _model_values(model: Mapping[str, Any]) -> Iterator[tuple[ParameterName, float]]:
-    """Yield the parameters of a model.yaml, shapes of effects included."""
-    rows = [*model['rigid_parameters']]
-    for effect in model['effects']:
-        rows += [*effect['parameters'], *effect.get('shapes', ())]
-    for row in rows:
-        yield ParameterName(str(row['name']), str(row['joint']), ''), float(row['value'])
 
 
 def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
@@ -268,12 +259,8 @@ def read_misfit(path: str | Path, arm: ArmModel) -> Misfit | None:
 
 
 def _with_robot(found: ParameterFile, path: Path, model: str = '') -> ParameterFile:
-    """
-    Look up the robot that a file without its kinematics names, where it is still there.
-
-    A text of a model.yaml has to have all parameters of it.
-
-    """
+    """Look up the robot that a file without its kinematics names, where it is still there."""
+    # A text of a model.yaml has to have all parameters of it.
     beside = path.parent / found.robot
     source = str(beside) if is_file(beside) else found.robot
     try:
@@ -301,21 +288,33 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
     values: dict[ParameterName, tuple[float, float]] = {}
     without_std: dict[ParameterName, float] = {}
     for row in rows:
-        name = _parameter(row)
+        if 'unit' not in row:
+            raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}': no unit")
+        name = ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
+        which = f'{name.name} of joint {name.joint}'
         if name in values or name in without_std:
-            raise ValueError(f'{name.name} of joint {name.joint} is given twice')
+            raise ValueError(f'{which} is given twice')
+        value = finite(row['value'], which)
         if row.get('std') is None:
-            without_std[name] = finite(row['value'], f'{name.name} of joint {name.joint}')
-        else:
-            values[name] = _value(row, name)
+            without_std[name] = value
+            continue
+        values[name] = value, finite(row['std'], f'the std of {which}')
+        if values[name][1] < 0.0:
+            raise ValueError(f'the std of {which} is negative: {row["std"]:g}')
     covariance = _covariance(document.get('covariance'), len(values))
-    grouping = [_terms(row) for row in document.get('grouping', [])]
+    grouping = [
+        {str(term): finite(factor, f'the factor of {term}') for term, factor in row.items()}
+        for row in document.get('grouping', [])
+    ]
     terms = dict(zip(values, grouping, strict=False))
     scores = [*document.get('validation', []), document.get('training'), document.get('misfit')]
     told = next((score for score in scores if score), None)
     error = None
     if told is not None:
         error = finite(told['relative_error_percent'], 'relative_error_percent')
+    scatter = [[finite(v, 'a scatter') for v in row] for row in document.get('scatter', ())]
+    if any(len(row) != len(values) for row in scatter):
+        raise ValueError(f'a scatter whose rows are not of {len(values)} values')
     about = document.get('description', {})
     return ParameterFile(
         source,
@@ -326,7 +325,7 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         terms,
         tuple(str(joint) for joint in about.get('joints', ())),
         str(about.get('kinematics', '')),
-        _scatter(document.get('scatter', ()), len(values)),
+        np.array(scatter).reshape(len(scatter), len(values)),
         without_std,
         frozenset(
             (str(row['name']), str(row['joint']))
@@ -335,35 +334,6 @@ def parameters_of(source: str, document: dict[str, Any]) -> ParameterFile:
         ),
         known_fit(document),
     )
-
-
-def _parameter(row: Mapping[str, Any]) -> ParameterName:
-    """Return which parameter a row has."""
-    if 'unit' not in row:
-        raise ValueError(f"parameter '{row['name']}' of joint '{row['joint']}': no unit")
-    return ParameterName(str(row['name']), str(row['joint']), str(row['unit']))
-
-
-def _value(row: Mapping[str, Any], name: ParameterName) -> tuple[float, float]:
-    """Return a value and its standard deviation, which are finite, and the latter not negative."""
-    which = f'{name.name} of joint {name.joint}'
-    value, std = finite(row['value'], which), finite(row['std'], f'the std of {which}')
-    if std < 0.0:
-        raise ValueError(f'the std of {which} is negative: {std:g}')
-    return value, std
-
-
-def _scatter(rows: Sequence[Sequence[Any]], size: int) -> FloatArray:
-    """Return changes of all values, a row for each recording."""
-    if any(len(row) != size for row in rows):
-        raise ValueError(f'a scatter whose rows are not of {size} values')
-    named = [[finite(value, 'a scatter') for value in row] for row in rows]
-    return np.array(named).reshape(len(rows), size)
-
-
-def _terms(row: Mapping[str, Any]) -> dict[str, float]:
-    """Return the factors of the parameters that one groups."""
-    return {str(term): finite(factor, f'the factor of {term}') for term, factor in row.items()}
 
 
 def _matrix(rows: Sequence[Mapping[str, float]], keys: Sequence[str]) -> FloatArray:

@@ -11,8 +11,7 @@ from typing import Literal
 from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
-from armid_ros.identification.rows.senders import two_senders
-from armid_ros.identification.rows.stamps import rounded_stamps
+from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
 from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling

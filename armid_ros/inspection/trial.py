@@ -11,9 +11,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import ArmidError
 from armid_ros.identification import Identification, identify, Score
-from armid_ros.identification.assess.grade import grade
+from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
 from armid_ros.motion import FloatArray

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import threading
 import traceback
-from typing import Any, ClassVar, IO, Protocol
+from typing import Any, ClassVar, IO
 
 from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
@@ -83,23 +83,6 @@ class Done:
 
 Job = DiagnosisRequest | Save | Plan
 Result = Answer | Done
-
-
-class Helper(Protocol):
-    """Answers jobs one at a time."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether a job is under way."""
-
-    def ask(self, job: Job) -> None:
-        """Begin a job; only when none is under way."""
-
-    def poll(self) -> Result | None:
-        """Return what came, once; None while nothing has."""
-
-    def close(self) -> None:
-        """End."""
 
 
 class InProcess:
@@ -225,6 +208,10 @@ class Assistant:
         self._results: queue.SimpleQueue[Result] = queue.SimpleQueue()
         own = self._process, self._results
         threading.Thread(target=_listen, args=own, daemon=True).start()
+
+
+#: Answers jobs one at a time.
+Helper = Assistant | InProcess
 
 
 def _listen(process: subprocess.Popen[bytes], results: queue.SimpleQueue[Result]) -> None:

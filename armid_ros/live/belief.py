@@ -96,44 +96,6 @@ class Belief:
         """Return the best model there is."""
         return self.accepted if self.proposed is None else self.proposed
 
-    def proposing(self, answer: Answer) -> Belief:
-        """Return the belief after a name that counts, unless it was rejected."""
-        if answer.named[0] in self.rejected:
-            return self.without_proposal()
-        return replace(self, proposed=answer.arm, named=answer.named)
-
-    def without_proposal(self) -> Belief:
-        """Return the belief where nothing is wrong."""
-        return replace(self, proposed=None, named=())
-
-    def accepting(self) -> Belief:
-        """
-        Return the belief where what is proposed is so.
-
-        Raises
-        ------
-        IdentificationError
-            If nothing is proposed.
-
-        """
-        if self.proposed is None:
-            raise IdentificationError('nothing is proposed')
-        return Belief(self.proposed, rejected=self.rejected)
-
-    def rejecting(self) -> Belief:
-        """
-        Return the belief where what is proposed is not so, and is not to be proposed again.
-
-        Raises
-        ------
-        IdentificationError
-            If nothing is proposed.
-
-        """
-        if self.proposed is None:
-            raise IdentificationError('nothing is proposed')
-        return Belief(self.accepted, rejected=self.rejected | {self.named[0]})
-
 
 class LiveDiagnosis:
     """
@@ -291,12 +253,14 @@ class LiveDiagnosis:
             if self._agreed and self._agreed[-1] != named:
                 self._agreed = []
             self._agreed.append(named)
-            if self.confirmed:
-                self.belief = self.belief.proposing(answer)
+            if self.confirmed and named not in self.belief.rejected:
+                self.belief = replace(self.belief, proposed=answer.arm, named=answer.named)
+            elif self.confirmed:
+                self.belief = replace(self.belief, proposed=None, named=())
         else:
             self._agreed = []
             if answer.verdict == 'consistent':
-                self.belief = self.belief.without_proposal()
+                self.belief = replace(self.belief, proposed=None, named=())
         return self.belief.model is not before
 
     def accept(self) -> None:
@@ -309,7 +273,8 @@ class LiveDiagnosis:
             If nothing is proposed.
 
         """
-        self.belief = self.belief.accepting()
+        proposed = self._proposed()
+        self.belief = Belief(proposed, rejected=self.belief.rejected)
         self._outdate()
         if self._baseline and self.latest is not None:
             self._baseline = (self.latest.window,)
@@ -325,9 +290,16 @@ class LiveDiagnosis:
             If nothing is proposed.
 
         """
-        self.belief = self.belief.rejecting()
+        self._proposed()
+        belief = self.belief
+        self.belief = Belief(belief.accepted, rejected=belief.rejected | {belief.named[0]})
         self._outdate()
         self._agreed = []
+
+    def _proposed(self) -> ArmModel:
+        if self.belief.proposed is None:
+            raise IdentificationError('nothing is proposed')
+        return self.belief.proposed
 
     def _outdate(self) -> None:
         """Have the answer that is under way dropped when it comes."""

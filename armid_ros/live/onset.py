@@ -53,7 +53,14 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     splits = range(_FEWEST, count)
     if not splits:
         return None
-    ratios = np.array([_ratio(logs, split) for split in splits])
+    # the F ratio of two means against one for every joint
+    ratios = np.empty((len(splits), logs.shape[1]))
+    for ratio, split in zip(ratios, splits, strict=True):
+        before, after = logs[:split], logs[split:]
+        within = ((before - before.mean(axis=0)) ** 2).sum(axis=0)
+        within += ((after - after.mean(axis=0)) ** 2).sum(axis=0)
+        between = (before.mean(axis=0) - after.mean(axis=0)) ** 2 * split * (count - split) / count
+        ratio[:] = between * (count - 2) / np.maximum(within, 1e-300)
     tried = len(splits) * logs.shape[1]
     limit = scipy.stats.f.isf(_ERROR_RATE / tried, 1, count - 2)
     best = int(np.argmax(ratios.max(axis=1)))
@@ -64,15 +71,8 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
 
 
 def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
-    """
-    Return the mean squares of the residual of short blocks; the last one ends with the motion.
-
-    Returns
-    -------
-    ndarray, shape (B, 1 + n)
-        Begin of each block [s], and the power of each joint [N^2 m^2].
-
-    """
+    """Return begin [s] and mean squares of the residual of short blocks, shape (B, 1 + n)."""
+    # the last one ends with the motion
     used = conditioning([recording], SignalSettings())
     rows = [np.empty((0, 1 + len(arm.robot.joints)))]
     for motion in segments(recording, used):
@@ -84,13 +84,3 @@ def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:
             own = squares[(t > begin) & (t <= begin + _BLOCK)]
             rows.append(np.r_[begin, own.mean(axis=0)][np.newaxis])
     return np.concatenate(rows)
-
-
-def _ratio(logs: FloatArray, split: int) -> FloatArray:
-    """Return the F ratio of two means against one for every joint, shape (n,)."""
-    before, after = logs[:split], logs[split:]
-    within = ((before - before.mean(axis=0)) ** 2).sum(axis=0)
-    within += ((after - after.mean(axis=0)) ** 2).sum(axis=0)
-    between = (before.mean(axis=0) - after.mean(axis=0)) ** 2
-    between *= len(before) * len(after) / len(logs)
-    return np.asarray(between * (len(logs) - 2) / np.maximum(within, 1e-300))

@@ -163,7 +163,11 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
         verdict: str, summary: str, findings: Sequence[Finding] = (), patched: ArmModel = arm
     ) -> Answer:
         spent = time.process_time() - begun
-        more = () if found is None else _gap(found)
+        gap = None if found is None else found.gap
+        more: tuple[GapOfJoint, ...] = ()
+        if gap is not None:
+            rows = zip(arm.robot.joints, gap.before, gap.after, gap.floor, strict=True)
+            more = tuple(GapOfJoint(joint, *map(float, numbers)) for joint, *numbers in rows)
         cut = window is not request.window
         return Answer(
             verdict, summary, tuple(findings), more, patched, window, request.end, spent, cut
@@ -179,32 +183,18 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
         if window.duration < request.shortest:
             text = f'the arm changed {window.duration:.0f} s ago: more motion is needed'
             return said(WAITING, text), None
+        rng, misfit = np.random.default_rng(request.seed), request.misfit
+        if request.healthy is not None and not request.baseline:
+            # what the model left before, in the band in which the window is looked at
+            misfit = request.healthy.misfit(choose_filters(arm, [window], (), settings, rng))
         found = diagnose(
             arm,
             [window],
             baseline=request.baseline,
-            misfit=_misfit(request, window, settings),
+            misfit=misfit,
             settings=settings,
             rng=np.random.default_rng(request.seed),
         )
     except ArmidError as error:
         return said('bad_data', str(error)), None
     return said(found.verdict, found.summary, found.findings, found.arm), found
-
-
-def _misfit(
-    request: DiagnosisRequest, window: Recording, settings: DiagnosisSettings
-) -> Misfit | None:
-    """Return what the model left before, in the band in which the window is looked at."""
-    if request.baseline or request.healthy is None:
-        return None if request.baseline else request.misfit
-    rng = np.random.default_rng(request.seed)
-    return request.healthy.misfit(choose_filters(request.arm, [window], (), settings, rng))
-
-
-def _gap(diagnosis: Diagnosis) -> tuple[GapOfJoint, ...]:
-    gap = diagnosis.gap
-    if gap is None:
-        return ()
-    rows = zip(diagnosis.arm.robot.joints, gap.before, gap.after, gap.floor, strict=True)
-    return tuple(GapOfJoint(joint, *map(float, numbers)) for joint, *numbers in rows)

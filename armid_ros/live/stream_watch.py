@@ -60,18 +60,16 @@ class StreamWatch:
         if self._tau is not None:
             self._changes += np.abs(tau - self._tau)
         self._tau, self._count = tau, self._count + 1
-        if t - self._since > _STILL and self._swings():
-            self._seen.add('frozen')
+        if t - self._since > _STILL:
+            swing = _range(self._at_rest)
+            much = swing > _SWING * _range(self._in_motion)
+            if np.any(much & (swing > _NOISE * self._changes / self._count)):
+                self._seen.add('frozen')
 
     def news(self) -> frozenset[str]:
         """Return what was seen since this was asked last: jump_back, out_of_order, frozen."""
         seen, self._seen = frozenset(self._seen), set()
         return seen
-
-    def _swings(self) -> bool:
-        swing = _range(self._at_rest)
-        much = swing > _SWING * _range(self._in_motion)
-        return bool(np.any(much & (swing > _NOISE * self._changes / self._count)))
 
     def _begin(self, t: float | None) -> None:
         """Begin to look for efforts that change though positions do not."""

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
 #: A sample that is so much earlier than one is due counts as due, as a share of the period.
 _EARLY = 0.25
+#: Below it in all joints a sample is no motion [rad/s or m/s].
+_REST_VELOCITY = 0.01
 #: Periods without a sample after which the stretch is broken, for its spectrum would have a hole;
 #: a step back in time that is as long is none of samples out of order.
 _LONGEST_GAP = 20.0
@@ -32,23 +33,18 @@ class SampleWindow:
         What is kept at most [s].
     period : float
         Between samples that are kept [s].
-    rest_velocity : float
-        Below it in all joints a sample is no motion [rad/s or m/s].
 
     Attributes
     ----------
     moved : float
-        Time in which any joint moved, since the window was made or cleared [s].
+        Time in which any joint moved, since the window was made [s].
 
     """
 
-    def __init__(
-        self, joints: tuple[str, ...], duration: float, period: float, rest_velocity: float = 0.01
-    ) -> None:
+    def __init__(self, joints: tuple[str, ...], duration: float, period: float) -> None:
         self.joints = joints
         self.moved = 0.0
         self._period = period
-        self._rest = rest_velocity
         self._capacity = int(np.ceil(duration / (period * (1.0 - _EARLY)))) + 1
         n = len(joints)
         # twice the room: rows move to the front once in a while, and a window is one slice
@@ -73,11 +69,6 @@ class SampleWindow:
     def nbytes(self) -> int:
         """Memory of the samples [bytes]."""
         return self._rows.nbytes
-
-    def clear(self) -> None:
-        """Forget all samples."""
-        self._first = self._end = 0
-        self.moved = 0.0
 
     def add(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -113,19 +104,14 @@ class SampleWindow:
         row = self._rows[self._end]
         row[0], row[1 : n + 1], row[2 * n + 1 :] = t, q, tau
         row[n + 1 : 2 * n + 1] = np.nan if dq is None else dq
-        self._count_motion(row, n)
+        if len(self):
+            before = self._rows[self._end - 1]
+            step = row[0] - before[0]
+            if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > _REST_VELOCITY * step:
+                self.moved += step
         self._end += 1
         self._first = max(self._first, self._end - self._capacity)
         return True
-
-    def _count_motion(self, row: FloatArray, n: int) -> None:
-        """Add to the time of motion if the joints moved since the sample before."""
-        if not len(self):
-            return
-        before = self._rows[self._end - 1]
-        step = row[0] - before[0]
-        if np.abs(row[1 : n + 1] - before[1 : n + 1]).max() > self._rest * step:
-            self.moved += step
 
     def recording(self, since: float = -np.inf, source: str = 'window') -> Recording:
         """

@@ -8,7 +8,6 @@ from armid_ros.model.base_parameters import (
     group_columns,
     levelled,
     regroup,
-    rigid_base_parameters,
 )
 from armid_ros.model.kinematics import LinkFrames, point_motion, points_motion
 from armid_ros.model.rigid_body import (
@@ -36,6 +35,5 @@ __all__ = [
     'random_motion',
     'regressor',
     'regroup',
-    'rigid_base_parameters',
     'rigid_parameter_names',
 ]

@@ -205,13 +205,6 @@ def _named(
     return BaseParameters(standard, parameters, independent, read_only(grouping))
 
 
-def rigid_base_parameters(robot: Robot, rng: np.random.Generator) -> BaseParameters:
-    """Find the base parameters of the rigid body for the gravity in use."""
-    robot = levelled(robot)
-    w = _stack(regressor(robot, random_motion(robot, 40 * robot.n_joints, rng)))
-    return group_columns(w, rigid_parameter_names(robot))
-
-
 def levelled(robot: Robot) -> Robot:
     """
     Return a robot whose gravity is along an axis of its first joint, if it is but for rounding.

@@ -9,7 +9,7 @@ from math import inf
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
-from armid_ros.identification.assess.residual_change import ResidualChange
+from armid_ros.identification.assess.load_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.report.families import full_label

@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.identification.assess.comparison import Comparison
-from armid_ros.identification.assess.not_compared import NotCompared
+from armid_ros.identification.assess.comparison import Comparison, NotCompared
 from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted
 

@@ -13,14 +13,13 @@ Rasmussen 2005.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 import warnings
 
 from armid_ros.effects.learned import counted, TorqueMap
 from armid_ros.motion import FloatArray
 from armid_ros.residual.libraries import imported
-from armid_ros.residual.rows import BLOCKS, JointRows
+from armid_ros.residual.rows import JointRows
 import numpy as np
 import numpy.typing as npt
 
@@ -39,19 +38,8 @@ _AMPLITUDES = (0.1, 2.0)
 _NOISES = (1e-6, 2.0)
 
 
-@dataclass(frozen=True)
-class Cells:
-    """
-    The rows of a joint in cells of its state.
-
-    Attributes
-    ----------
-    labels : ndarray of int, shape (N,)
-        Cell of each row.
-    points, torque : ndarray, shape (M, 3), (M,)
-        Mean state and torque of each cell.
-
-    """
+class _Cells(NamedTuple):
+    """Cell of each row, (N,), and mean state (M, 3) and torque (M,) of each cell."""
 
     labels: npt.NDArray[np.intp]
     points: FloatArray
@@ -83,20 +71,23 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
 
     """
     everywhere = np.ones(len(rows), dtype=bool)
-    best: tuple[float, _Scales, Cells] | None = None
+    best: tuple[float, _Scales, _Cells] | None = None
     for share in _KNEES:
         knee = max(share * float(np.abs(rows.inputs[:, 1]).max()), 1e-9)
-        cells = _cells(rows, _labels(rows, knee, rng), everywhere)
+        count = max(1, min(_POINTS, len(rows) // _ROWS))
+        means = imported('sklearn.cluster').MiniBatchKMeans(
+            count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
+        )
+        inputs = counted(rows.inputs, knee)
+        labels = np.asarray(means.fit_predict(inputs / _span(inputs)), dtype=np.intp)
+        cells = _cells(rows, labels, everywhere)
         evidence, scales = _fitted(cells, knee)
         if best is None or evidence > best[0]:
             best = evidence, scales, cells
     assert best is not None
     _, scales, cells = best
     predicted = np.zeros(len(rows))
-    for block in range(BLOCKS):
-        others = rows.outside(block)
-        if others.all() or not others.any():
-            continue
+    for others in rows.folds():
         own = _posterior(_cells(rows, cells.labels, others), scales)
         predicted[~others] = own.torque(rows.inputs[~others])
     return _posterior(cells, scales), predicted
@@ -111,21 +102,11 @@ class _Scales(NamedTuple):
     knee: float
 
 
-def _labels(rows: JointRows, knee: float, rng: np.random.Generator) -> npt.NDArray[np.intp]:
-    cluster = imported('sklearn.cluster')
-    count = max(1, min(_POINTS, len(rows) // _ROWS))
-    means = cluster.MiniBatchKMeans(
-        count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
-    )
-    inputs = counted(rows.inputs, knee)
-    return np.asarray(means.fit_predict(inputs / _span(inputs)), dtype=np.intp)
-
-
 def _span(inputs: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.ptp(inputs, axis=0), 1e-9))
 
 
-def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.bool_]) -> Cells:
+def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.bool_]) -> _Cells:
     """Return means of the cells over some rows; cells without any are left out."""
     own, n = labels[used], int(labels.max()) + 1
     count = np.bincount(own, minlength=n)
@@ -133,10 +114,10 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
     columns = np.column_stack([rows.inputs[used], rows.left[used]])
     sums: FloatArray = np.array([np.bincount(own, x, n) for x in columns.T], dtype=np.float64)
     means = (sums[:, there] / count[there]).T
-    return Cells(labels, means[:, :3], means[:, 3])
+    return _Cells(labels, means[:, :3], means[:, 3])
 
 
-def _fitted(cells: Cells, knee: float) -> tuple[float, _Scales]:
+def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     """Return the greatest marginal likelihood, as a logarithm, and what has it."""
     process = imported('sklearn.gaussian_process')
     kernels = process.kernels
@@ -160,7 +141,7 @@ def _fitted(cells: Cells, knee: float) -> tuple[float, _Scales]:
     return evidence - float(np.log(size)), _Scales(noise, lengths, amplitude, knee)
 
 
-def _posterior(cells: Cells, scales: _Scales) -> TorqueMap:
+def _posterior(cells: _Cells, scales: _Scales) -> TorqueMap:
     none = np.zeros(len(cells.torque))
     noise = np.full_like(none, scales.noise)
     return TorqueMap(cells.points, none, noise, *scales[1:]).given(cells.torque)

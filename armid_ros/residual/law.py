@@ -12,8 +12,8 @@ Source: Brunton, Proctor and Kutz 2016; Pati, Rezaiifar and Krishnaprasad 1993.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 import warnings
 
 from armid_ros.motion import FloatArray
@@ -78,29 +78,20 @@ class Law:
             said += f' {sign} {body}' if number else f'{sign}{body}'
         return said
 
+    def document(self) -> dict[str, Any]:
+        """Return it for programs to read."""
+        terms = [
+            {'term': one.text, 'coefficient': one.coefficient, 'unit': one.unit}
+            for one in self.terms
+        ]
+        return {'text': self.text, 'terms': terms, 'held_out_share': self.share}
 
-@dataclass(frozen=True)
-class Column:
+
+def library(
+    inputs: FloatArray, low: float, high: float, prismatic: bool
+) -> list[tuple[str, str, FloatArray]]:
     """
-    A term of the library along data.
-
-    Attributes
-    ----------
-    text, unit : str
-        What it is, and the unit of its factor.
-    values : ndarray, shape (N,)
-        Its values.
-
-    """
-
-    text: str
-    unit: str
-    values: FloatArray
-
-
-def library(inputs: FloatArray, low: float, high: float, prismatic: bool) -> tuple[Column, ...]:
-    """
-    Return the terms that are tried.
+    Return the terms that are tried: text, unit of the factor, and values along the data, (N,).
 
     Parameters
     ----------
@@ -142,7 +133,7 @@ def library(inputs: FloatArray, low: float, high: float, prismatic: bool) -> tup
     for place in low + np.array(_PLACES) * (high - low):
         terms.append((f'max(q - {place:.3g}, 0)', f'{force}/{x}', np.maximum(q - place, 0.0)))
         terms.append((f'max({place:.3g} - q, 0)', f'{force}/{x}', np.maximum(place - q, 0.0)))
-    return tuple(Column(*term) for term in terms)
+    return terms
 
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
@@ -164,10 +155,18 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = library(rows.inputs, *ends, prismatic)
-    x = np.column_stack([column.values for column in columns])
-    losses = np.array([_losses(x, rows, count) for count in range(1, _TERMS + 1)])
+    x = np.column_stack([values for _, _, values in columns])
+    # squared residuals of each block under laws of so many terms that are fitted to the others
+    losses = np.zeros((_TERMS, BLOCKS))
+    for block, others in enumerate(rows.folds()):
+        for more in range(_TERMS):
+            factors = _fit(x[others], rows.left[others], more + 1)
+            losses[more, block] = np.sum((rows.left[~others] - x[~others] @ factors) ** 2)
     best = int(np.argmin(losses.sum(axis=1)))
-    count = next(k for k in range(best + 1) if _as_good(losses[k], losses[best])) + 1
+    # the fewest with which blocks are predicted as well as in the best way, to one deviation
+    worse = losses[: best + 1] - losses[best]
+    allowed = np.std(worse, axis=1, ddof=1) * np.sqrt(BLOCKS)
+    count = int(np.argmax(worse.sum(axis=1) <= allowed)) + 1
     factors = _fit(x, rows.left, count)
     chosen = np.flatnonzero(factors)
     share = 1.0 - float(losses[count - 1].sum()) / max(float(np.sum(rows.left**2)), 1e-300)
@@ -175,7 +174,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
         return None
     size = np.abs(factors) * np.sqrt(np.mean(x**2, axis=0))
     order = sorted(chosen, key=lambda k: -size[k])
-    terms = tuple(Term(columns[k].text, float(factors[k]), columns[k].unit) for k in order)
+    terms = tuple(Term(columns[k][0], float(factors[k]), columns[k][1]) for k in order)
     return Law(terms, share)
 
 
@@ -197,21 +196,3 @@ def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
     factors = np.zeros(x.shape[1])
     factors[chosen] = np.linalg.lstsq(x[:, chosen], left, rcond=None)[0]
     return factors
-
-
-def _losses(x: FloatArray, rows: JointRows, count: int) -> FloatArray:
-    """Return the squared residual of each block under a law fitted to the others, (BLOCKS,)."""
-    result = np.zeros(BLOCKS)
-    for block in range(BLOCKS):
-        others = rows.outside(block)
-        if others.all() or not others.any():
-            continue
-        factors = _fit(x[others], rows.left[others], count)
-        result[block] = float(np.sum((rows.left[~others] - x[~others] @ factors) ** 2))
-    return result
-
-
-def _as_good(losses: Sequence[float] | FloatArray, best: Sequence[float] | FloatArray) -> bool:
-    """Tell whether blocks are predicted as well as in the best way, to one deviation."""
-    worse = np.asarray(losses) - np.asarray(best)
-    return bool(worse.sum() <= np.std(worse, ddof=1) * np.sqrt(len(worse)))

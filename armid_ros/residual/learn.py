@@ -95,7 +95,21 @@ class Residual:
 
     def sentences(self) -> tuple[str, ...]:
         """Say what was learned, a joint a line."""
-        return tuple(_sentence(one) for one in self.joints)
+        lines = []
+        for one in self.joints:
+            alone = ''
+            if one.held_out is not None:
+                alone = f' ({percent_of(one.held_out)} of held-out recordings)'
+                if one.held_out < 0.0:
+                    alone = ' (held-out recordings get worse: they go beyond its data)'
+            like = 'no law of few terms'
+            if one.law is not None:
+                like = f'{one.law.text} ({percent_of(one.law.share)})'
+            lines.append(
+                f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is '
+                f'left{alone}; it looks like {like}'
+            )
+        return tuple(lines)
 
     def document(self, table: str) -> dict[str, Any]:
         """Return what diagnosis.json holds; the table is a file's name."""
@@ -113,42 +127,16 @@ class Residual:
                     'length_scales': [
                         float(x) if np.isfinite(x) else None for x in one.learned.lengths
                     ],
-                    'law': None if one.law is None else _law(one.law),
+                    'law': None if one.law is None else one.law.document(),
                 }
                 for one in self.joints
             ],
         }
 
 
-def _sentence(one: JointResidual) -> str:
-    alone = ''
-    if one.held_out is not None:
-        alone = f' ({percent_of(one.held_out)} of held-out recordings)'
-        if one.held_out < 0.0:
-            alone = ' (held-out recordings get worse: they go beyond its data)'
-    like = 'no law of few terms'
-    if one.law is not None:
-        like = f'{one.law.text} ({percent_of(one.law.share)})'
-    return (
-        f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is left'
-        f'{alone}; it looks like {like}'
-    )
-
-
 def percent_of(share: float) -> str:
     """Return a share in whole per cent."""
     return f'{100.0 * share:.0f} %'
-
-
-def _law(law: Law) -> dict[str, Any]:
-    return {
-        'text': law.text,
-        'terms': [
-            {'term': term.text, 'coefficient': term.coefficient, 'unit': term.unit}
-            for term in law.terms
-        ],
-        'held_out_share': law.share,
-    }
 
 
 def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:
@@ -207,7 +195,10 @@ def _learned(
     if len(rows) < _FEW:
         return None
     learned, predicted = learn_map(rows, rng)
-    if not _predicts(rows, predicted):
+    # a map has to gain on blocks it has not seen, even without the best of them
+    saved = rows.left**2 - (rows.left - predicted) ** 2
+    blocks = np.bincount(rows.block, saved, BLOCKS)
+    if not blocks.sum() - blocks.max() > 0.0:
         return None
     parts = [(rows.left, predicted)]
     near = None if unseen is None else unseen.select(near_data(learned, unseen))
@@ -233,10 +224,3 @@ def _learned(
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return which rows a map knows something of: they lie near those it was learned from."""
     return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
-
-
-def _predicts(rows: JointRows, predicted: FloatArray) -> bool:
-    """Tell whether a map gains on blocks it has not seen, even without the best of them."""
-    gain = rows.left**2 - (rows.left - predicted) ** 2
-    blocks = np.bincount(rows.block, gain, BLOCKS)
-    return bool(blocks.sum() - blocks.max() > 0.0)

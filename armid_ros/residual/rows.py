@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
@@ -46,9 +46,12 @@ class JointRows:
         """Return some of the rows, shape (N,) of bool."""
         return JointRows(self.inputs[chosen], self.left[chosen], self.block[chosen])
 
-    def outside(self, block: int) -> npt.NDArray[np.bool_]:
-        """Return which rows are in other blocks, shape (N,)."""
-        return np.asarray(self.block != block)
+    def folds(self) -> Iterator[npt.NDArray[np.bool_]]:
+        """Yield which rows are in other blocks, shape (N,), for each block of which some are."""
+        for block in range(BLOCKS):
+            others = self.block != block
+            if others.any() and not others.all():
+                yield others
 
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from itertools import product
 
 from armid_ros.files.cells import csv_cell
-from armid_ros.residual.learn import JointResidual, Residual
+from armid_ros.residual.learn import Residual
 import numpy as np
 
 #: File beside model.yaml.
@@ -30,19 +30,15 @@ def lookup_table(residual: Residual) -> str:
     """
     lines = [_HEAD]
     for one in residual.joints:
-        lines += _joint_lines(one)
+        axes = [one.axis(number, count) for number, count in enumerate(_STEPS)]
+        loaded = one.learned.takes_load
+        if not loaded:
+            axes[2] = np.zeros(1)
+        inputs = np.array(list(product(*axes)))
+        torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+        name = csv_cell(one.joint)
+        lines += [
+            f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
+            for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
+        ]
     return '\n'.join(lines) + '\n'
-
-
-def _joint_lines(one: JointResidual) -> list[str]:
-    axes = [one.axis(number, count) for number, count in enumerate(_STEPS)]
-    loaded = one.learned.takes_load
-    if not loaded:
-        axes[2] = np.zeros(1)
-    inputs = np.array(list(product(*axes)))
-    torque, std = one.learned.torque(inputs), one.learned.std(inputs)
-    name = csv_cell(one.joint)
-    return [
-        f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
-        for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
-    ]

@@ -87,4 +87,4 @@ def test_numbers_of_a_folder_beside_it_are_on_the_page(tmp_path):
 def test_numbers_of_ties_are_on_the_page():
     places = {(row[0], row[3]) for row in rows(numbers_page(PACKAGE, MEASURED))}
     assert ('`_LEAST_GAIN`', '`ties/ties.py`') in places
-    assert ('`LEAST_Z`', '`armid_ros/identification/ties/search.py`') in places
+    assert ('`LEAST_Z`', '`armid_ros/identification/ties/stiffness.py`') in places

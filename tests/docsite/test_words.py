@@ -12,17 +12,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 154,
-    'said': 308,
-    'says': 163,
-    'tells': 80,
+    'told': 152,
+    'said': 296,
+    'says': 160,
+    'tells': 75,
     'asks': 21,
-    'asked': 245,
+    'asked': 242,
     'believes': 3,
     'believed': 75,
     'denies': 5,
     'denied': 11,
-    'beside': 197,
+    'beside': 191,
     'knows': 29,
     'heard': 15,
 }

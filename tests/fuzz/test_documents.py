@@ -10,7 +10,7 @@ from armid_ros.errors import RobotError
 from armid_ros.excitation import Excitation, load_excitation, save_excitation
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.files import json_text
-from armid_ros.identification.assess.comparison import compare
+from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.robots import load_robot
 from armid_ros.robots.shipped import shipped_path

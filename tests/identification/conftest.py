@@ -4,6 +4,7 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
+from armid_ros.identification.online.background import at_once, Background
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
@@ -11,6 +12,14 @@ import numpy as np
 import pytest
 
 FRICTION = {'viscous_friction': 0.08, 'coulomb_friction': 0.05, 'torque_offset': 0.02}
+
+
+class Foreground(Background):
+    """What does every job at once, where nothing waits for it."""
+
+    def begin(self, job, *, urgent=False):
+        """Do a job."""
+        at_once(job)
 
 
 @pytest.fixture(scope='session')

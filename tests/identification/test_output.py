@@ -4,7 +4,7 @@ from dataclasses import replace
 import json
 
 from armid_ros.identification import identification_document, identify, write_document
-from armid_ros.identification.assess.comparison import compare
+from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.motion import Motion
 import numpy as np

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
+from armid_ros.arm import ArmModel
 from armid_ros.model import (
     gravity_composites,
     group_columns,
     random_motion,
     regressor,
-    rigid_base_parameters,
     rigid_parameter_names,
 )
 from armid_ros.robots import load_robot, robot_from_urdf
@@ -81,7 +81,7 @@ def test_no_gravity_needs_no_composites(rng):
 
 def test_base_regressor_predicts_the_same_torque(rng):
     robot = load_robot('humanoid_arm')
-    base = rigid_base_parameters(robot, rng)
+    base = ArmModel(robot).base_parameters(rng)
     y = regressor(robot, random_motion(robot, 20, rng))
     beta = base.values(robot.rigid_parameters)
     full = y @ robot.rigid_parameters
@@ -92,12 +92,12 @@ def test_rank_agrees_with_the_singular_values(rng):
     robot = load_robot('humanoid_arm')
     y = regressor(robot, random_motion(robot, 200, rng)).reshape(-1, 60)
     s = np.linalg.svd(y, compute_uv=False)
-    assert rigid_base_parameters(robot, rng).rank == int(np.sum(s > 1e-9 * s[0]))
+    assert ArmModel(robot).base_parameters(rng).rank == int(np.sum(s > 1e-9 * s[0]))
 
 
 def test_lift_has_the_base_parameters_asked_for_and_stays_near(rng):
     robot = load_robot('humanoid_arm')
-    base = rigid_base_parameters(robot, rng)
+    base = ArmModel(robot).base_parameters(rng)
     prior = robot.rigid_parameters
     np.testing.assert_allclose(base.lift(base.values(prior), prior), prior, atol=1e-12)
     beta = base.values(prior) + rng.normal(size=base.rank)
@@ -140,21 +140,21 @@ def hung(angle):
 @pytest.mark.parametrize('angle', ['3.1415926', '3.14159', '3.1416', '3.14'])
 def test_what_a_rounded_angle_shows_is_no_parameter(rng, angle):
     """Of 3.1416 first moments of an upright link show by 7e-6 of what others do."""
-    exact = rigid_base_parameters(hung(repr(np.pi)), rng)
-    rounded = rigid_base_parameters(hung(angle), rng)
+    exact = ArmModel(hung(repr(np.pi))).base_parameters(rng)
+    rounded = ArmModel(hung(angle)).base_parameters(rng)
     assert [exact.standard[k].name for k in exact.independent] == [
         rounded.standard[k].name for k in rounded.independent
     ]
 
 
 def test_an_arm_that_leans_shows_them(rng):
-    names = [p.name for p in rigid_base_parameters(hung('3.13'), rng).parameters]
+    names = [p.name for p in ArmModel(hung('3.13')).base_parameters(rng).parameters]
     assert any(name.startswith('mx1') for name in names)
 
 
 def test_parameters_among_more_keep_their_values(rng):
     robot = load_robot('humanoid_arm')
-    some = rigid_base_parameters(robot, rng)
+    some = ArmModel(robot).base_parameters(rng)
     longer = (*rigid_parameter_names(robot), *rigid_parameter_names(robot))
     columns = np.arange(60, 120)
     among = some.among(longer, columns)
@@ -166,7 +166,7 @@ def test_parameters_among_more_keep_their_values(rng):
 
 
 def test_a_link_without_mass_gets_one_for_its_moments(rng):
-    base = rigid_base_parameters(load_robot('humanoid_arm'), rng)
+    base = ArmModel(load_robot('humanoid_arm')).base_parameters(rng)
     beta = rng.normal(size=base.rank)
     lifted = base.lift(beta, np.zeros(60))
     np.testing.assert_allclose(base.values(lifted), beta, atol=1e-9)

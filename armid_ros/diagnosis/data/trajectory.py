@@ -29,7 +29,7 @@ from armid_ros.identification.rows.signals import (
     segments,
     velocity_error,
 )
-from armid_ros.identification.ties.sensor_noise import SensorNoise
+from armid_ros.identification.ties.recorded import SensorNoise
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np

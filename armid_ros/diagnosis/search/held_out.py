@@ -36,11 +36,11 @@ from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.round import Before, Nuisance
 from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.identification.fitting.jackknife import jackknife
 from armid_ros.identification.fitting.normal_equations import (
     independent_inverse,
     informative_basis,
     informative_solution,
+    jackknife,
     NormalEquations,
     UNINFORMATIVE,
 )

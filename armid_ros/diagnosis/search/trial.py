@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeAlias
 
 from armid_ros.diagnosis.data.rows import each_times
 from armid_ros.effects import Effect
-from armid_ros.identification.fitting.jackknife import jackknife
+from armid_ros.identification.fitting.normal_equations import jackknife
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np

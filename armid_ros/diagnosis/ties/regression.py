@@ -24,8 +24,7 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import stacked, together_interaction_problem
-from armid_ros.identification.ties.search import LEAST_Z, with_springs
-from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
+from armid_ros.identification.ties.stiffness import identify_interaction, Interaction, LEAST_Z
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
@@ -108,7 +107,7 @@ class TieRegression:
                 for k, joint in enumerate(problem.spring_joints)
                 if joint in named or (joint not in there and doubtful[k])
             ]
-            return identify_interaction(with_springs(problem, np.array(kept)))
+            return identify_interaction(problem.with_springs(np.array(kept)))
         except IdentificationError:
             return None
 

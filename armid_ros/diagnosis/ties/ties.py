@@ -33,7 +33,7 @@ from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, S
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
-from armid_ros.identification.ties.search import LEAST_Z
+from armid_ros.identification.ties.stiffness import LEAST_Z
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

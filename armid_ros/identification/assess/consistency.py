@@ -31,8 +31,8 @@ from armid_ros.identification.fitting.instruments import (
 )
 from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.identify import Identification
-from armid_ros.identification.rows.regression import Regression
-from armid_ros.identification.rows.signals import even_positions, sampling_rate
+from armid_ros.identification.rows.regression import Regression, weighted_rows
+from armid_ros.identification.rows.signals import even_positions
 from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
@@ -195,12 +195,12 @@ def check_noise(
     noise = np.sqrt(np.mean([position_noise(r) ** 2 for r in recordings], axis=0))
     values, std = result.estimate.values, result.estimate.std
     scale = np.where(std > 0.0, std, 1.0)
-    w, torque = _weighted(exact, weights, scale), _torque(exact, weights, values)
+    w, torque = weighted_rows(exact, weights)[0] * scale, _torque(exact, weights, values)
     biases = []
     for k in range(repeats):
         noisy = about([replace(r, q=r.q + noise * rng.normal(size=r.q.shape)) for r in calm])
         both = np.column_stack([w, torque - _torque(noisy, weights, values)])
-        gain = np.linalg.lstsq(_weighted(noisy, weights, scale), both, rcond=None)[0]
+        gain = np.linalg.lstsq(weighted_rows(noisy, weights)[0] * scale, both, rcond=None)[0]
         biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
         report((k + 3.0) / (repeats + 2))
     return NoiseCheck(
@@ -222,7 +222,7 @@ def position_noise(recording: Recording) -> FloatArray:
     It is the top of the spectrum of stretches without a gap: a jump across one is no noise.
 
     """
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     frequency, power = mean_spectrum(even_positions(recording), rate, detrend='linear')
     level = np.mean(power[frequency > _NOISE_ABOVE * rate], axis=0)
     return np.asarray(np.sqrt(level * 0.5 * rate))
@@ -231,8 +231,3 @@ def position_noise(recording: Recording) -> FloatArray:
 def _torque(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
     """Return the weighted torque of linear models, shape (N n,)."""
     return np.asarray((weights * np.concatenate([p.torque(values) for p in problem])).ravel())
-
-
-def _weighted(problem: Sequence[Regression], weights: FloatArray, scale: FloatArray) -> FloatArray:
-    columns = np.concatenate([part.columns for part in problem]) * scale
-    return np.asarray((weights[:, :, np.newaxis] * columns).reshape(-1, len(scale)))

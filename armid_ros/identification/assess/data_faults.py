@@ -17,14 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
-from armid_ros.identification.assess.hypotheses import (
-    Exchanged,
-    InDegrees,
-    InUnit,
-    OtherUnit,
-    Reversed,
-)
-from armid_ros.identification.assess.hypothesis import Hypothesis
+from armid_ros.identification.assess.hypotheses import Hypothesis
 from armid_ros.identification.assess.joint_units import (
     factors_apart,
     knows,
@@ -35,7 +28,7 @@ from armid_ros.identification.assess.mistakes import (
     effort_factor,
     find_mistake,
     is_factor,
-    slow_motions_of,
+    slow_motions,
 )
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
@@ -55,8 +48,6 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Mistakes that are of the data and of nothing that may happen to an arm.
-_OF_DATA = Exchanged | InDegrees | InUnit | Reversed
 #: A torque of so many times the limit of its drive is said.
 _BEYOND = 1.5
 #: Share of samples at the very extreme of a reading, above which it is clipped.
@@ -142,9 +133,9 @@ def check_data(
     )
     alone = not any(one.partner is not None for one in recordings)
     if alone and not mistaken:
-        now, then = (slow_motions_of(some, used) for some in (recordings, before))
+        now, then = (slow_motions(some, used) for some in (recordings, before))
         mistaken = (
-            _mistaken(arm, recordings, used, before)
+            _mistaken(arm, recordings, used, now, then)
             or list(units_beside_model(arm, now, then))
             or list(units_beyond_drives(arm.robot, recordings, now))
         )
@@ -161,7 +152,7 @@ def check_data(
         moved, torques = [part.motion for part in data], [part.torque for part in data]
         driven = driven_by_friction(arm.robot, moved, torques)
         faults += [wrong_sign(driven)] if driven else []
-    notes = [*_clipped(arm.robot, recordings), *_beyond_limits(arm.robot, recordings)]
+    notes = [note for one in recordings for note in _extremes(arm.robot, one)]
     notes += _described_friction(arm)
     for held in held_elsewhere(arm.robot, recordings, [part.motion for part in data]):
         (faults if held.spoils else notes).append(held.text)
@@ -173,32 +164,39 @@ def check_data(
 
 
 def _mistaken(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, before: Sequence[Recording]
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    motions: Sequence[Motion],
+    before: Sequence[Motion],
 ) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
-    then = _baseline_factor(arm, before, used)
+    # by what factor torques of a baseline are those of the model: its masses are wrong on both
+    # days, where a factor leaves less than none does; one that knows the torque of no joint of the
+    # baseline tells nothing
+    then = effort_factor(arm.body, before)
+    if then is not None:
+        then = 1.0 if is_factor(arm.body, before, 1.0) else then
+        then = then if np.any(knows(ArmModel(arm.body), before, then)) else None
     mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
     found = [one.hypotheses for one in mistakes if one is not None]
     if len(found) == len(recordings):
-        said = {tuple(_fault(one, arm.robot, then) for one in likely) for likely in found}
+        said = {tuple(_fault(one, then) for one in likely) for likely in found}
         (first, *others) = said
         if all(first) and not others:
             return [', or '.join(first)]
-    now = None if then is None else effort_factor(arm.body, recordings, used)
+    now = None if then is None else effort_factor(arm.body, motions)
     if now is None or then is None:
         return []
     units = [
         unit
         for unit, per in units_near(now / then).items()
-        if is_factor(arm.body, recordings, used, then * per)
+        if is_factor(arm.body, motions, then * per)
     ]
-    scaled = len(found) == len(recordings) and all(
-        isinstance(likely[0], OtherUnit) for likely in found
-    )
+    scaled = len(found) == len(recordings) and all(likely[0].kind == 'scale' for likely in found)
     if not units and not scaled:
         return []
-    days = [slow_motions_of(some, used) for some in (recordings, before)]
-    apart = factors_apart(arm, days[0], days[1], units[0] if units else '')
+    apart = factors_apart(arm, motions, before, units[0] if units else '')
     if apart or not units:
         return [apart] if apart else []
     return [
@@ -231,36 +229,18 @@ def mistaken_recordings(
         mistake = find_mistake(arm.body, recording, used)
         if mistake is None or not joints[mistake.joint]:
             continue
-        faults = [_fault(one, arm.robot, None) for one in mistake.hypotheses]
+        faults = [_fault(one, None) for one in mistake.hypotheses]
         if all(faults):
             said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
     return said
 
 
-def _baseline_factor(
-    arm: ArmModel, before: Sequence[Recording], used: Conditioning
-) -> float | None:
-    """
-    Return by what factor torques of a baseline are those of the model; None where nothing tells.
-
-    Its masses are what it has wrong on both days, where a factor leaves less than none does. One
-    that knows the torque of no joint of the baseline tells nothing.
-
-    """
-    then = effort_factor(arm.body, before, used)
-    if then is None:
-        return None
-    then = 1.0 if is_factor(arm.body, before, used, 1.0) else then
-    known = knows(ArmModel(arm.body), slow_motions_of(before, used), then)
-    return then if np.any(known) else None
-
-
-def _fault(mistake: Hypothesis, robot: Robot, since: float | None) -> str:
+def _fault(mistake: Hypothesis, since: float | None) -> str:
     """Say what is wrong with data; empty if it is something that may happen to an arm."""
-    if isinstance(mistake, OtherUnit):
+    if mistake.kind == 'scale':
         unit = '' if since is not None else unit_of(mistake.factor)
         return f'torques are in {unit} instead of N m: convert them' if unit else ''
-    return mistake.sentence(robot) if isinstance(mistake, _OF_DATA) else ''
+    return mistake.text if mistake.of_data else ''
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
@@ -301,32 +281,23 @@ def _described_friction(arm: ArmModel) -> list[str]:
     ]
 
 
-def _clipped(robot: Robot, recordings: Sequence[Recording]) -> list[str]:
-    notes = []
-    for recording in recordings:
-        if recording.tau is None:
-            continue
-        for j, joint in enumerate(recording.joints):
-            reading = recording.tau[:, j]
-            top = np.abs(reading).max()
-            share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
-            if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
-                notes.append(
-                    f'{recording.source or "recording"}: {100 * share:.0f} % of the torque of '
-                    f'{joint} is at {top:.4g} {robot.torque_units[j]}, its highest value: a limit'
-                )
-    return notes
-
-
-def _beyond_limits(robot: Robot, recordings: Sequence[Recording]) -> Iterator[str]:
-    """Say where a torque is beyond what the description lets a drive give."""
-    limit = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
-    for recording in recordings:
-        if recording.tau is None:
-            continue
-        largest = np.max(np.abs(recording.tau), axis=0)
-        for j in np.flatnonzero(largest > _BEYOND * limit).tolist():
+def _extremes(robot: Robot, recording: Recording) -> Iterator[str]:
+    """Say where torques stay at their highest value, or are beyond what a drive can give."""
+    if recording.tau is None:
+        return
+    source = recording.source or 'recording'
+    limits = np.where(robot.torque_limit > 0.0, robot.torque_limit, np.inf)
+    for j, (joint, limit) in enumerate(zip(robot.joints, limits, strict=True)):
+        reading, unit = recording.tau[:, j], robot.torque_units[j]
+        top = np.abs(reading).max()
+        share = float(np.mean(np.abs(reading) >= top * (1.0 - 1e-9)))
+        if top > 0.0 and share > _CLIPPED and len(np.unique(reading)) > 10:
             yield (
-                f'{recording.source or "recording"}: the torque of {robot.joints[j]} reaches '
-                f'{largest[j]:.4g}, its limit is {limit[j]:.4g} {robot.torque_units[j]}'
+                f'{source}: {100 * share:.0f} % of the torque of {joint} is at {top:.4g} {unit}, '
+                'its highest value: a limit'
+            )
+        if top > _BEYOND * limit:
+            yield (
+                f'{source}: the torque of {joint} reaches {top:.4g}, its limit is {limit:.4g} '
+                f'{unit}'
             )

@@ -86,10 +86,8 @@ def dead_channels(arm: ArmModel, recording: Recording, motions: Sequence[Motion]
         if stop - start < least or not moved or at_limit:
             continue
         if _changes(arm, motions, j, float(t[start]), float(t[stop - 1])):
-            always = stop - start == len(reading)
-            when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+            when, remedy = _when(t, start, stop, 'record with the joint held still')
             value = f'{reading[start] + 0.0:.4g} {units[j]}'
-            remedy = 'record with the joint held still' if always else 'leave that time out'
             yield (
                 f'in {recording.source or "a recording"} the torque of {joint} stays at '
                 f'{value} {when} while the joint moves: its channel is dead; {remedy}'
@@ -143,15 +141,13 @@ def dead_encoders(
         steps = np.abs(np.diff(q))
         hidden = REST_RANGE + (float(steps[steps > 0.0].min()) if steps.any() else 0.0)
         goes = _distance(recording, j, start, stop)
-        always = stop - start == len(recording)
         t = recording.t
-        when = 'throughout' if always else f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s'
+        when, remedy = _when(t, start, stop, 'record again')
         reads = f'{recording.q[start, j]:.4g} {unit}'
         said = f'in {source} the position of {joint} stays at {reads} {when}'
         if goes > hidden:
             yield (
-                f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; '
-                + ('record again' if always else 'leave that time out')
+                f'{said}, while its velocity goes {goes:.3g} {unit}: its encoder is dead; {remedy}'
             )
         elif (
             robot is not None
@@ -163,19 +159,14 @@ def dead_encoders(
         ):
             yield (
                 f'{said}, while its torque is not what weight and the other joints make of a '
-                'joint at rest: its encoder is dead; '
-                + ('record again' if always else 'leave that time out')
+                f'joint at rest: its encoder is dead; {remedy}'
             )
     yield from _dead_velocities(recording, source, units)
 
 
 def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) -> Iterator[str]:
-    """
-    Say which velocities stay the same, if those of other joints that move do not.
-
-    A wheel or a turntable may go at constant speed: then its way is the integral of that.
-
-    """
+    """Say which velocities stay the same, if those of other joints that move do not."""
+    # A wheel or a turntable may go at constant speed: then its way is the integral of that.
     if recording.dq is None:
         return
     way = recording.q - recording.dq * (recording.t - recording.t[0])[:, np.newaxis]
@@ -195,6 +186,13 @@ def _dead_velocities(recording: Recording, source: str, units: Sequence[str]) ->
         )
 
 
+def _when(t: FloatArray, start: int, stop: int, always: str) -> tuple[str, str]:
+    """Return when a reading stays the same, in words, and what to do."""
+    if stop - start == len(t):
+        return 'throughout', always
+    return f'from {t[start]:.3f} s to {t[stop - 1]:.3f} s', 'leave that time out'
+
+
 def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
     """Return where the longest run without a larger step starts and stops."""
     edges = np.flatnonzero(np.abs(np.diff(reading)) > step) + 1
@@ -204,12 +202,8 @@ def _longest_same(reading: FloatArray, step: float = 0.0) -> tuple[int, int]:
 
 
 def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
-    """
-    Return how far a recorded velocity goes beyond its mean, [rad or m].
-
-    What the integral of its white noise may reach by chance is taken off.
-
-    """
+    """Return how far a recorded velocity goes beyond its mean, [rad or m]."""
+    # What the integral of its white noise may reach by chance is taken off.
     if recording.dq is None or stop - start < 3:
         return 0.0
     dq, t = recording.dq[start:stop, joint], recording.t[start:stop]
@@ -223,18 +217,19 @@ def _distance(recording: Recording, joint: int, start: int, stop: int) -> float:
 def _moves_unseen(
     robot: Robot, motions: Sequence[Motion], joint: int, time: tuple[float, float]
 ) -> bool:
-    """
-    Return whether the torque of a joint that reads the same for a time is none of one at rest.
-
-    A joint at rest takes what its links weigh and what the other joints do to them. Its friction
-    answers to that: the drive gives what is left, none at least and all at most. What is described
-    is within a factor of two, so that a joint at rest is off it by no more than it varies itself.
-    One that is off by more, and by more than noise of its sensor, is at rest where a good model of
-    that describes it, with free masses and a share of the friction of other joints. A joint that
-    moves before or after varies as much then, and no more by far.
-
-    """
-    within, other = _divided(motions, time)
+    """Return whether the torque of a joint that reads the same is none of one at rest."""
+    # A joint at rest takes what its links weigh and what the other joints do to them. Its friction
+    # answers to that: the drive gives what is left, none at least and all at most. What is
+    # described is within a factor of two, so that a joint at rest is off it by no more than it
+    # varies itself. One that is off by more, and by more than noise of its sensor, is at rest
+    # where a good model of that describes it, with free masses and a share of the friction of
+    # other joints. A joint that moves before or after varies as much then, and no more by far.
+    within, other = [], []  # parts of motions within the time, and those before and after it
+    for one in motions:
+        first, last = np.searchsorted(one.t, [time[0], time[1] + 1e-9])
+        within.append(one.select(slice(first, last)))
+        pieces = (one.select(slice(0, first)), one.select(slice(last, len(one))))
+        other += [piece for piece in pieces if len(piece)]
     motion = thinned(within, _ROWS)
     if motion is None or len(motion) < min(_LEAST, sum(len(one) for one in motions)):
         return False
@@ -254,20 +249,6 @@ def _moves_unseen(
     left = left_of_blocks(columns, (torque - described)[:, np.newaxis] / size)[:, 0]
     smooth = float(np.mean(left**2)) - _white(left)
     return bool(100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor)
-
-
-def _divided(
-    motions: Sequence[Motion], time: tuple[float, float]
-) -> tuple[list[Motion], list[Motion]]:
-    """Return the parts of motions within a time, and those before and after it."""
-    within, other = [], []
-    for motion in motions:
-        first, last = np.searchsorted(motion.t, [time[0], time[1] + 1e-9])
-        pieces = slice(0, first), slice(first, last), slice(last, len(motion))
-        before, inside, after = (motion.select(one) for one in pieces)
-        within.append(inside)
-        other += [one for one in (before, after) if len(one)]
-    return within, other
 
 
 def _white(values: FloatArray) -> float:

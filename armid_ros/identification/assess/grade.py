@@ -4,7 +4,9 @@
 What an identification is good for, in one word, and why.
 
 The word follows the torque error on data that were not fitted, of the joint that is predicted
-worst, and what the recordings show to be wrong with them.
+worst, and what the recordings show to be wrong with them. Errors of joints are shares of their own
+torque: a slide takes newtons and a wrist newton metres, and their sum has no unit. No model
+predicts white noise of a torque, or where in its dry friction a joint is that rests.
 
 """
 
@@ -17,17 +19,19 @@ from typing import Literal, NamedTuple
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.joint_errors import beyond_noise
 from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import Mistake, suspected_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
-from armid_ros.identification.identify import Fit, Identification, Score
+from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
+from armid_ros.identification.rows.regression import Fit, Score
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.rows.stamps import rounded_stamps, uneven_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
+from scipy import stats
 
 Word = Literal['good', 'poor', 'unusable']
 _WORDS: tuple[Word, ...] = ('good', 'poor', 'unusable')
@@ -142,18 +146,14 @@ def by_error(error: float) -> Word:
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
 ) -> tuple[list[_Reason], list[_Reason]]:
-    """
-    Return what recordings show to be wrong, and what links explain as well, which is a note.
-
-    Zeros and names are those of a day: what one recording of several suggests is of its motion.
-
-    """
+    """Return what recordings show to be wrong, and what links explain as well, which is a note."""
+    # Zeros and names are those of a day: what one recording of several suggests is of its motion.
     robot = description.body
     alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     for recording in recordings:
         mistake = suspected_mistake(robot, recording, result.used)
         if mistake is not None:
-            kind = (mistake.links, *mistake.hypotheses[0].kind)
+            kind = (mistake.links, mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
             alike.setdefault(kind, []).append((recording.source, mistake))
     mistakes, suspicions = [], []
     for found in alike.values():
@@ -302,3 +302,63 @@ def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
         rounded = rounded_stamps(recording)
         if rounded:
             yield _Reason('good', f'in {recording.source or "a recording"} {rounded}')
+
+
+def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
+    """
+    Return what is left of errors of joints without the noise of their torques.
+
+    Noise counts twice: a row has it, and so has the prediction of a row, where that is as sure as
+    a measurement of it (leverage of one, Hoaglin and Welsch 1978). A model that is no further off
+    than a sensor is not what is wrong.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n,)
+        Norm of the residual of each joint over that of its torque [%].
+    fits : sequence of Fit
+        Where they come from.
+    used : Conditioning
+        Filters of the rows.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The same without the noise [%]; zero of a joint that rests throughout.
+
+    """
+    told = np.concatenate([fit.informative for fit in fits])
+    torque = told * np.concatenate([_torque(fit) for fit in fits])
+    rows = np.maximum(np.count_nonzero(told, axis=0), 1)
+    size = np.sqrt(np.sum(torque**2, axis=0) / rows)
+    noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
+    left = np.sqrt(np.maximum(np.square(errors) - 2.0 * np.square(100.0 * noise), 0.0))
+    return np.where(moving(fit.motion for fit in fits), left, 0.0)
+
+
+def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
+    """
+    Return the standard deviation of the white noise in rows of measured torque, (n,) [N m].
+
+    It shows in second differences (Gasser, Sroka and Jennen-Steinmetz 1986), whose deviation is
+    taken from their median: what the motion makes of a torque changes little from row to row, and
+    friction steps in few of them.
+
+    """
+    parts = [np.abs(np.diff(_torque(fit), 2, axis=0)) for fit in fits]
+    differences = np.concatenate(parts)
+    if not len(differences):
+        return np.zeros(fits[0].motion.n_joints)
+    deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))
+    # the variance of second differences of rows over that of rows, of white noise
+    taps, step = used.taps(), used.decimation
+    own, next_one, after = (
+        float(taps[: len(taps) - lag] @ taps[lag:]) if lag < len(taps) else 0.0
+        for lag in (0, step, 2 * step)
+    )
+    return np.asarray(deviation / np.sqrt((6.0 * own - 8.0 * next_one + 2.0 * after) / own))
+
+
+def _torque(fit: Fit) -> FloatArray:
+    assert fit.motion.tau is not None
+    return fit.motion.tau

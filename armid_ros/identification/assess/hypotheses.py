@@ -11,13 +11,13 @@ decides that.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
-from typing import ClassVar
+from typing import Literal
 
-from armid_ros.identification.assess.grade_limits import GradeLimits
-from armid_ros.identification.assess.hypothesis import changed, Hypothesis, Quantity, scaled
+from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.checks import (
     effort_unit,
     FOLLOWS,
@@ -32,361 +32,269 @@ import numpy as np
 
 #: Angles that the zero of a joint may be off by [degrees]: an encoder's, an axis', a drawing's.
 TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
-QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
+#: Finer steps of these [degrees].
+_FINER = (-15.0, 15.0)
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
 
-
-@dataclass(frozen=True)
-class AsRecorded(Hypothesis):
-    """Nothing is wrong."""
-
-    values: ClassVar[int] = 0
-
-    def sentence(self, robot: Robot) -> str:
-        """Say so."""
-        return 'the data are as they should be'
-
-
-@dataclass(frozen=True)
-class WithoutBody(Hypothesis):
-    """The description says nothing of this arm: friction and drives take all there is."""
-
-    values: ClassVar[int] = 0
-
-    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-        """Leave the body out."""
-        return np.zeros_like(motion.q), np.empty((*motion.q.shape, 0))
-
-    def sentence(self, robot: Robot) -> str:
-        """Say so."""
-        return 'the description says nothing of the torques'
+Quantity = Literal['position', 'torque', 'position and torque']
+QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
+Kind = Literal[
+    'nothing',
+    'body',
+    'gravity',
+    'scale',
+    'degrees',
+    'unit',
+    'sign',
+    'exchange',
+    'zero',
+    'delay',
+    'samples',
+]
 
 
-@dataclass(frozen=True)
-class Reversed(Hypothesis):
-    """Position, torque or both of a joint have the opposite sign."""
-
-    joint: int
-    quantity: Quantity
-
-    def motion(self, motion: Motion) -> Motion:
-        """Turn the sign of the joint."""
-        return scaled(motion, self.joint, self.quantity, -1.0)
-
-    def sentence(self, robot: Robot) -> str:
-        """Name the joint."""
-        joint = robot.joints[self.joint]
-        if self.quantity == 'position and torque':
-            return f'position and torque of {joint} seem to have the opposite sign: negate both'
-        return f'the {self.quantity} of {joint} seems to have the opposite sign: negate it'
+def _as_described(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    return inverse_dynamics(robot, motion), np.empty((*motion.q.shape, 0))
 
 
-@dataclass(frozen=True)
-class Exchanged(Hypothesis):
-    """Two joints have each other's position, torque or both."""
-
-    first: int
-    second: int
-    quantity: Quantity
-
-    def motion(self, motion: Motion) -> Motion:
-        """Exchange them back."""
-        order = np.arange(motion.n_joints)
-        order[[self.first, self.second]] = order[[self.second, self.first]]
-        return changed(motion, self.quantity, lambda values: values[:, order])
-
-    def sentence(self, robot: Robot) -> str:
-        """Name the joints."""
-        a, b = robot.joints[self.first], robot.joints[self.second]
-        return (
-            f'the {self.quantity} of {a} and of {b} seem to be exchanged: check the names of '
-            'the joints'
-        )
-
-
-@dataclass(frozen=True)
-class ZeroOff(Hypothesis):
-    """The zero of a joint is not that of the description."""
-
-    joint: int
-    degrees: float
-
-    def motion(self, motion: Motion) -> Motion:
-        """Shift the position back."""
-        shift = np.zeros(motion.n_joints)
-        shift[self.joint] = -np.deg2rad(self.degrees)
-        return replace(motion, q=motion.q + shift)
-
-    def nearby(self) -> Iterator[Hypothesis]:
-        """Yield angles in steps of 15 degrees."""
-        for step in (-15.0, 15.0):
-            yield replace(self, degrees=self.degrees + step)
-
-    def sentence(self, robot: Robot) -> str:
-        """Name the joint and the angle."""
-        wrong = 180.0 - (180.0 - self.degrees) % 360.0
-        remedy = f'{"subtract" if wrong > 0 else "add"} {np.deg2rad(abs(wrong)):.4g} rad'
-        return (
-            f'the zero of {robot.joints[self.joint]} seems to be off by about {wrong:.0f} '
-            f'degrees: {remedy}'
-        )
-
-
-@dataclass(frozen=True)
-class LateTorque(Hypothesis):
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
     """
-    Torque comes later than the position that it belongs to, or earlier.
+    One thing that may be wrong with a recording.
 
     Attributes
     ----------
-    seconds : float
-        By how much [s]; negative for earlier.
-    half_width : float
-        Of the 95 % interval [s].
-
-    """
-
-    seconds: float
-    half_width: float = 0.0
-
-    def motion(self, motion: Motion) -> Motion:
-        """
-        Take the motion of the time that the torque belongs to.
-
-        The torque stays as it is, for its noise would be less between samples.
-
-        """
-        t = motion.t - self.seconds
-        inside = (t >= motion.t[0]) & (t <= motion.t[-1])
-        q, dq, ddq = (
-            np.column_stack([np.interp(t, motion.t, column) for column in x.T])
-            for x in (motion.q, motion.dq, motion.ddq)
-        )
-        return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
-
-    def sentence(self, robot: Robot) -> str:
-        """Say by how much."""
-        side = 'later' if self.seconds > 0.0 else 'earlier'
-        return (
-            f'the torque seems to come about {1e3 * abs(self.seconds):.0f} ms {side} than the '
-            f'position (+- {np.ceil(1e3 * self.half_width):.0f} ms): stamp both alike'
-        )
-
-
-@dataclass(frozen=True)
-class InDegrees(Hypothesis):
-    """Positions are in degrees: those of all joints that turn, or of one."""
-
-    joint: int | None = None
-
-    def possible(self, motions: Sequence[Motion]) -> bool:
-        """Whether some position is beyond a turn, as an arm that moves by a few degrees has it."""
-        joint = slice(None) if self.joint is None else self.joint
-        return max(float(np.abs(one.q[:, joint]).max()) for one in motions) > 2.0 * np.pi
-
-    def motion(self, motion: Motion) -> Motion:
-        """Convert them."""
-        joint = slice(None) if self.joint is None else self.joint
-        return scaled(motion, joint, 'position', np.deg2rad(1.0))
-
-    def sentence(self, robot: Robot) -> str:
-        """Name the joint, if it is one alone."""
-        if self.joint is None:
-            return 'the positions seem to be in degrees: convert them to rad'
-        joint = robot.joints[self.joint]
-        return f'the position of {joint} seems to be in degrees: convert it to rad'
-
-
-@dataclass(frozen=True)
-class OtherGravity(Hypothesis):
-    """Gravity is not the vector of the description; torque is linear in it, so data give it."""
-
-    values: ClassVar[int] = 3
-    of_masses: ClassVar[bool] = True
-
-    vector: tuple[float, float, float] = (np.nan, np.nan, np.nan)
-
-    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-        """Leave gravity free."""
-        weightless = robot.with_gravity(np.zeros(3))
-        return inverse_dynamics(weightless, motion), gravity_sensitivity(robot, motion.q)
-
-    def settled(self, values: FloatArray) -> Hypothesis:
-        """Return the vector that fits."""
-        return OtherGravity((float(values[0]), float(values[1]), float(values[2])))
-
-    def material(self, robot: Robot, limits: GradeLimits) -> bool:
-        """
-        Whether it is too far from the description to be wrong masses, and may be a planet's.
-
-        Masses make all weight larger or smaller, and turn it nowhere.
-
-        """
-        told, found = robot.gravity, np.array(self.vector)
-        size, length = (float(np.linalg.norm(vector)) for vector in (told, found))
-        if not limits.gravity_change * max(size, 1.0) < np.linalg.norm(found - told):
-            return False
-        weighs = length / size if size > 0.0 else np.inf
-        turned = np.linalg.norm(found / max(length, 1e-9) - told / max(size, 1e-9))
-        turns = turned > limits.gravity_change
-        return length < _STRONGEST and bool(turns or _beyond_masses(weighs, limits))
-
-    def sentence(self, robot: Robot) -> str:
-        """Say the direction and the option that puts it right."""
-        axis, option = known_gravity(np.array(self.vector), robot.gravity)
-        direction = ', '.join(f'{part:.3g}' for part in axis)
-        size = float(np.linalg.norm(self.vector))
-        return (
-            f'gravity seems to act along ({direction}) of the base with {size:.3g} m/s^2: '
-            f'--gravity {option}'
-        )
-
-
-@dataclass(frozen=True)
-class OtherUnit(Hypothesis):
-    """
-    Efforts are a factor from N m: a unit where it is that of every joint, else currents.
-
-    Attributes
-    ----------
+    kind : str
+        What is wrong.
+    text : str
+        What seems to be wrong and what to do, without a full stop.
+    motion : callable
+        Returns a motion and its torque as they would be without the mistake.
+    where : tuple
+        Joints and quantity, without by how much.
+    values : int
+        Numbers that are chosen to fit the data.
+    torque : callable
+        Returns what the described body takes along the changed motion of a robot: torque that is
+        known, shape (N, n) [N m], and what free values are multiplied by, shape (N, n, k).
+    settled : callable or None
+        Returns the hypothesis with the free values that fit, where there are any.
+    detailed : callable or None
+        Returns the hypothesis with what motions show of single joints, once it is believed.
+    nearby : callable
+        Returns finer steps of the same kind.
+    material : bool
+        Whether the description cannot be what is wrong instead.
     factor : float
+        Of the torques of all joints together, where they are off by one.
+    disputable : bool
+        Whether other masses would explain as much, so that a person has to say which it is.
+    without : tuple of Motion
+        The recording without faulty samples, where there are any.
+
+    """
+
+    kind: Kind
+    text: str
+    motion: Callable[[Motion], Motion] = lambda motion: motion
+    where: tuple[object, ...] = ()
+    values: int = 1
+    torque: Callable[[Robot, Motion], tuple[FloatArray, FloatArray]] = _as_described
+    settled: Callable[[FloatArray], Hypothesis] | None = None
+    detailed: Callable[[Sequence[Motion]], Hypothesis] | None = None
+    nearby: Callable[[], Sequence[Hypothesis]] = tuple
+    material: bool = True
+    factor: float = 1.0
+    disputable: bool = False
+    without: tuple[Motion, ...] = ()
+
+    @property
+    def of_masses(self) -> bool:
+        """Whether masses that are all off by a factor do the same, up to where it is material."""
+        return self.kind in ('gravity', 'scale')
+
+    @property
+    def of_data(self) -> bool:
+        """Whether it is of the data, and of nothing that may happen to an arm."""
+        return self.kind in ('exchange', 'degrees', 'unit', 'sign')
+
+    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
+        """Return all of a recording as it would be without the mistake."""
+        return list(self.without) or [self.motion(motion) for motion in stretches]
+
+
+AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
+#: The description says nothing of this arm: friction and drives take all there is.
+WITHOUT_BODY = Hypothesis(
+    'body',
+    'the description says nothing of the torques',
+    values=0,
+    torque=lambda robot, motion: (np.zeros_like(motion.q), np.empty((*motion.q.shape, 0))),
+)
+
+
+def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
+    """
+    Yield what may be wrong with recorded motions of an arm, but for delays and faulty samples.
+
+    Of an arm that moves by a few degrees some position is beyond a turn, if it is in degrees.
+
+    """
+    turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi
+    yield other_gravity(robot)
+    yield other_scale(robot)
+    if np.any(turned) and not np.all(robot.prismatic):
+        yield _in_degrees(robot)
+    for joint in range(robot.n_joints):
+        for unit in TORQUE_UNITS:
+            yield in_unit(robot, joint, unit)
+        for quantity in QUANTITIES:
+            yield _reversed(robot, joint, quantity)
+        if not robot.prismatic[joint]:
+            if robot.n_joints > 1 and turned[joint]:
+                yield _in_degrees(robot, joint)
+            for degrees in TURNS:
+                yield _zero_off(robot, joint, degrees)
+    for first, second in combinations(range(robot.n_joints), 2):
+        for quantity in QUANTITIES:
+            yield _exchanged(robot, first, second, quantity)
+
+
+def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
+    """Return that a joint's torque is in a unit; no load makes it a thousand times as large."""
+    wrong, right = effort_unit(robot, joint, unit), robot.torque_units[joint]
+    return Hypothesis(
+        'unit',
+        f'the torque of {robot.joints[joint]} seems to be in {wrong} instead of {right}: '
+        'convert it',
+        partial(_scaled, joint=joint, quantity='torque', factor=1.0 / TORQUE_UNITS[unit]),
+        (joint, unit),
+    )
+
+
+def delayed(seconds: float, half_width: float) -> Hypothesis:
+    """Return that torque comes later than its position, or earlier, with its 95 % interval [s]."""
+    side = 'later' if seconds > 0.0 else 'earlier'
+    return Hypothesis(
+        'delay',
+        f'the torque seems to come about {1e3 * abs(seconds):.0f} ms {side} than the '
+        f'position (+- {np.ceil(1e3 * half_width):.0f} ms): stamp both alike',
+        lambda motion: shifted(motion, seconds),
+    )
+
+
+def shifted(motion: Motion, seconds: float) -> Motion:
+    """
+    Return the motion of the time that a late torque belongs to.
+
+    The torque stays as it is, for its noise would be less between samples.
+
+    """
+    t = motion.t - seconds
+    inside = (t >= motion.t[0]) & (t <= motion.t[-1])
+    q, dq, ddq = (
+        np.column_stack([np.interp(t, motion.t, column) for column in x.T])
+        for x in (motion.q, motion.dq, motion.ddq)
+    )
+    return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
+
+
+def other_gravity(robot: Robot, vector: FloatArray | None = None) -> Hypothesis:
+    """
+    Return that gravity is not as described; torque is linear in it, so data give it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    vector : ndarray, shape (3,), optional
+        What it is instead [m/s^2]. It is material if it may be a planet's and is too far from the
+        description to be wrong masses: these make all weight larger or smaller, and turn it
+        nowhere.
+
+    """
+    if vector is None:
+
+        def torque(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+            weightless = robot.with_gravity(np.zeros(3))
+            return inverse_dynamics(weightless, motion), gravity_sensitivity(robot, motion.q)
+
+        return Hypothesis(
+            'gravity', '', values=3, torque=torque, settled=partial(other_gravity, robot)
+        )
+    told = robot.gravity
+    size, length = (float(np.linalg.norm(one)) for one in (told, vector))
+    far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
+    weighs = length / size if size > 0.0 else np.inf
+    turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
+    turns = turned > LIMITS.gravity_change
+    material = bool(far and length < _STRONGEST and (turns or _beyond_masses(weighs)))
+    if not material:
+        return Hypothesis('gravity', '', values=3, material=False)
+    axis, option = known_gravity(vector, told) if length > 0.0 else (vector, '0,0,0')
+    direction = ', '.join(f'{part:.3g}' for part in axis)
+    return Hypothesis(
+        'gravity',
+        f'gravity seems to act along ({direction}) of the base with {length:.3g} m/s^2: '
+        f'--gravity {option}',
+        values=3,
+    )
+
+
+def other_scale(
+    robot: Robot, factor: float | None = None, of_joints: Sequence[float] = ()
+) -> Hypothesis:
+    """
+    Return that efforts are a factor from N m: a unit where it is that of every joint, or currents.
+
+    Parameters
+    ----------
+    robot : Robot
+        The description.
+    factor : float, optional
         Of all joints together.
-    of_joints : tuple of float
+    of_joints : sequence of float
         Of each joint, NaN where its torque does not show it.
 
     """
+    if factor is None:
 
-    of_masses: ClassVar[bool] = True
+        def torque(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
+            described = inverse_dynamics(robot, motion)
+            return np.zeros_like(described), described[:, :, np.newaxis]
 
-    factor: float = np.nan
-    of_joints: tuple[float, ...] = ()
+        return Hypothesis(
+            'scale', '', torque=torque, settled=lambda values: other_scale(robot, float(values[0]))
+        )
 
-    @property
-    def disputable(self) -> bool:
-        """Whether it is no unit, and masses may be what is wrong."""
-        return not self._unit
-
-    @property
-    def _unit(self) -> str:
-        return unit_of(self.factor, [one for one in self.of_joints if one > 0.0])
-
-    def torque(self, robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-        """Leave the factor free."""
-        described = inverse_dynamics(robot, motion)
-        return np.zeros_like(described), described[:, :, np.newaxis]
-
-    def settled(self, values: FloatArray) -> Hypothesis:
-        """Return the factor that fits."""
-        return OtherUnit(float(values[0]))
-
-    def detailed(self, robot: Robot, motions: Sequence[Motion]) -> Hypothesis:
-        """Return the factor of each joint, too."""
+    def detailed(motions: Sequence[Motion]) -> Hypothesis:
         torques = [motion.tau for motion in motions if motion.tau is not None]
         factors, correlation = torque_factors(robot, motions, torques)
-        return replace(self, of_joints=tuple(np.where(correlation > FOLLOWS, factors, np.nan)))
+        clear = np.where(correlation > FOLLOWS, factors, np.nan)
+        return other_scale(robot, factor, tuple(clear))
 
-    def material(self, robot: Robot, limits: GradeLimits) -> bool:
-        """Whether it is too far from one for masses to be what is wrong."""
-        return _beyond_masses(self.factor, limits)
-
-    def sentence(self, robot: Robot) -> str:
-        """Say the unit, or else the factor, and the gain of each joint."""
-        if self._unit:
-            return (
-                f'the efforts of all joints seem to be in {self._unit} instead of N m: convert '
-                'them'
-            )
-        gains = ','.join(
-            f'{1.0 / (one if one > 0.0 else self.factor):.3g}'
-            for one in self.of_joints or (self.factor,)
-        )
-        return (
-            f'the efforts of all joints seem to be {self.factor:.2g} times the torque in N m '
-            '(currents?): convert them, unless it is the masses of the description; by those they '
-            f'need --current-gain {gains}'
-        )
-
-
-@dataclass(frozen=True)
-class InUnit(Hypothesis):
-    """The torque of a joint is in another unit; no load makes it a thousand times as large."""
-
-    joint: int
-    unit: str
-
-    def motion(self, motion: Motion) -> Motion:
-        """Convert it."""
-        return scaled(motion, self.joint, 'torque', 1.0 / TORQUE_UNITS[self.unit])
-
-    def sentence(self, robot: Robot) -> str:
-        """Name the joint and the unit."""
-        joint, right = robot.joints[self.joint], robot.torque_units[self.joint]
-        wrong = effort_unit(robot, self.joint, self.unit)
-        return f'the torque of {joint} seems to be in {wrong} instead of {right}: convert it'
-
-
-@dataclass(frozen=True)
-class Faulty(Hypothesis):
-    """
-    A few samples are wrong: a torque far out of the rest, a position that jumps.
-
-    Attributes
-    ----------
-    what : str
-        The first of them, in words.
-    count : int
-        How many there are.
-    without : tuple of Motion
-        The recording without them.
-
-    """
-
-    what: str
-    count: int
-    without: tuple[Motion, ...] = field(repr=False, compare=False)
-
-    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
-        """Return the recording without faulty samples."""
-        return list(self.without)
-
-    def sentence(self, robot: Robot) -> str:
-        """Say how many, and where the first is."""
-        many = '' if self.count == 1 else f' (the first of {self.count})'
-        return f'{self.what}{many}: leave out what is faulty, or record again'
-
-
-def hypotheses(robot: Robot) -> Iterator[Hypothesis]:
-    """Yield what may be wrong with any recording of an arm, but for delays and faulty samples."""
-    yield OtherGravity()
-    yield OtherUnit()
-    if not np.all(robot.prismatic):
-        yield InDegrees()
-    for joint in range(robot.n_joints):
-        yield from _of_joint(robot, joint)
-    for first, second in combinations(range(robot.n_joints), 2):
-        for quantity in QUANTITIES:
-            yield Exchanged(first, second, quantity)
-
-
-def _of_joint(robot: Robot, joint: int) -> Iterator[Hypothesis]:
-    for unit in TORQUE_UNITS:
-        yield InUnit(joint, unit)
-    for quantity in QUANTITIES:
-        yield Reversed(joint, quantity)
-    if robot.prismatic[joint]:
-        return
-    if robot.n_joints > 1:
-        yield InDegrees(joint)
-    for degrees in TURNS:
-        yield ZeroOff(joint, degrees)
-
-
-def _beyond_masses(factor: float, limits: GradeLimits) -> bool:
-    """Whether masses are not off by a factor, all of them."""
-    return not 1.0 / limits.torque_factor < factor < limits.torque_factor
+    unit = unit_of(factor, [one for one in of_joints if one > 0.0])
+    gains = ','.join(
+        f'{1.0 / (one if one > 0.0 else factor or np.inf):.3g}' for one in of_joints or (factor,)
+    )
+    text = (
+        f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
+        if unit
+        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m '
+        '(currents?): convert them, unless it is the masses of the description; by those they '
+        f'need --current-gain {gains}'
+    )
+    return Hypothesis(
+        'scale',
+        text,
+        detailed=detailed,
+        material=_beyond_masses(factor),
+        factor=factor,
+        disputable=not unit,
+    )
 
 
 def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
@@ -420,3 +328,73 @@ def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str
         if np.allclose(size * direction, value, atol=1e-6):
             return direction, name
     return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
+
+
+def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
+    change = partial(_scaled, joint=joint, quantity=quantity, factor=-1.0)
+    name = robot.joints[joint]
+    text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
+    if quantity == 'position and torque':
+        text = f'position and torque of {name} seem to have the opposite sign: negate both'
+    return Hypothesis('sign', text, change, (joint, quantity))
+
+
+def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hypothesis:
+    order = np.arange(robot.n_joints)
+    order[[first, second]] = order[[second, first]]
+    return Hypothesis(
+        'exchange',
+        f'the {quantity} of {robot.joints[first]} and of {robot.joints[second]} seem to be '
+        'exchanged: check the names of the joints',
+        lambda motion: _changed(motion, quantity, lambda values: values[:, order]),
+        (first, second, quantity),
+    )
+
+
+def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
+    shift = np.zeros(robot.n_joints)
+    shift[joint] = -np.deg2rad(degrees)
+    wrong = 180.0 - (180.0 - degrees) % 360.0
+    remedy = f'{"subtract" if wrong > 0 else "add"} {np.deg2rad(abs(wrong)):.4g} rad'
+    return Hypothesis(
+        'zero',
+        f'the zero of {robot.joints[joint]} seems to be off by about {wrong:.0f} degrees: '
+        f'{remedy}',
+        lambda motion: replace(motion, q=motion.q + shift),
+        (joint,),
+        nearby=lambda: [_zero_off(robot, joint, degrees + step) for step in _FINER],
+    )
+
+
+def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
+    """Return that positions are in degrees: those of all joints that turn, or of one."""
+    columns = slice(None) if joint is None else joint
+    text = 'the positions seem to be in degrees: convert them to rad'
+    if joint is not None:
+        text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
+    change = partial(_scaled, joint=columns, quantity='position', factor=np.deg2rad(1.0))
+    return Hypothesis('degrees', text, change, (joint,))
+
+
+def _beyond_masses(factor: float) -> bool:
+    """Whether masses are not off by a factor, all of them."""
+    return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
+
+
+def _scaled(motion: Motion, joint: int | slice, quantity: Quantity, factor: float) -> Motion:
+    """Return a motion in which a quantity of one joint, or of some, is multiplied."""
+    scale = np.ones(motion.n_joints)
+    scale[joint] = factor
+    return _changed(motion, quantity, lambda values: values * scale)
+
+
+def _changed(
+    motion: Motion, quantity: Quantity, change: Callable[[FloatArray], FloatArray]
+) -> Motion:
+    """Return a motion with a change of a quantity."""
+    if quantity != 'torque':
+        motion = replace(motion, q=change(motion.q), dq=change(motion.dq), ddq=change(motion.ddq))
+    if quantity != 'position':
+        assert motion.tau is not None
+        motion = motion.with_torque(change(motion.tau))
+    return motion

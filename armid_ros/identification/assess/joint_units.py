@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.hypotheses import InUnit
+from armid_ros.identification.assess.hypotheses import in_unit
 from armid_ros.identification.rows.checks import (
     effort_unit,
     FOLLOWS,
@@ -102,7 +102,7 @@ def units_beside_model(
     """
     factors = _since(arm, motions, before)
     found = [
-        InUnit(joint, unit).sentence(arm.robot)
+        in_unit(arm.robot, joint, unit).text
         for joint, factor in enumerate(factors)
         for unit, per in TORQUE_UNITS.items()
         if per / NEAR < factor < per * NEAR
@@ -138,12 +138,8 @@ def factors_apart(
 
 
 def _since(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]) -> FloatArray:
-    """
-    Return the factors of torques on the model's, over those of a baseline, (n,).
-
-    Zero where one is not clear, or the model does not know the torque of the baseline.
-
-    """
+    """Return the factors of torques on the model's, over those of a baseline, (n,)."""
+    # Zero where one is not clear, or the model does not know the torque of the baseline.
     factors = _factors(arm, motions)
     if not before:
         return factors

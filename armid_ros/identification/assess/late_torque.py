@@ -15,12 +15,13 @@ opposite, as friction is; a body that is off from its description is therefore n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from armid_ros.effects.load import described_spread
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.effects.timing import smoothed, within_band
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
-from armid_ros.identification.assess.hypotheses import LateTorque
+from armid_ros.identification.assess.hypotheses import shifted
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
@@ -49,7 +50,14 @@ _BLOCKS = 10
 _STEPS, _SETTLED = 10, 1e-4
 
 
-def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateTorque | None:
+class Delay(NamedTuple):
+    """By how much a torque is late, negative for earlier, and half of the 95 % interval [s]."""
+
+    seconds: float
+    half_width: float
+
+
+def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
     Return a delay that is told from zero.
 
@@ -64,14 +72,14 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateT
 
     Returns
     -------
-    LateTorque or None
+    Delay or None
         With its 95 % interval; None where that holds zero.
 
     """
     stretches = list(segments(recording, used))
     seconds, half = 0.0, np.inf
     for _ in range(_STEPS):
-        moved = [LateTorque(seconds).motion(motion) for motion in stretches]
+        moved = [shifted(motion, seconds) for motion in stretches]
         rows = [
             _rows(robot, motion, used)
             for motion in moved
@@ -84,7 +92,7 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> LateT
         seconds = float(np.clip(seconds + step, -LONGEST, LONGEST))
         if abs(seconds - before) < _SETTLED:
             break
-    return LateTorque(seconds, half) if abs(seconds) > half else None
+    return Delay(seconds, half) if abs(seconds) > half else None
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:
@@ -121,22 +129,17 @@ def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:
 
 
 def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
-    """
-    Fit a delay of the torque of all joints beside friction, drives and a body near the described.
-
-    The deviation allows for residuals that are alike for long, or in all of a joint (Liang and
-    Zeger 1986): sums of their products with the rate over parts of the recording, or over joints,
-    whichever vary more.
-
-    Returns
-    -------
-    delay, half_width : float
-        Of its 95 % interval [s]; None where the torque of the body does not change.
-
-    """
+    """Fit a delay beside friction, drives and a near body; return it and its half width [s]."""
+    # the deviation allows for residuals that are alike for long, or in all of a joint (Liang and
+    # Zeger 1986): sums of their products with the rate over parts of the recording, or over
+    # joints, whichever vary more
     rows = np.concatenate(parts, axis=1)
     own, shared = np.split(rows[:, :, :-1], [_OWN], axis=2)
-    shared = _without(own, shared / _size(rows[:, :, -1:]))
+    # what columns of each joint's own leave of the others (Frisch and Waugh 1933)
+    shared, own = shared / _size(rows[:, :, -1:]), own / _size(own)
+    turned = own.transpose(0, 2, 1)
+    normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
+    shared = shared - own @ np.linalg.solve(normal, turned @ shared)
     near, rate, rest = shared[:, :, :-2], shared[:, :, -2], shared[:, :, -1]
     stacked = near.reshape(-1, near.shape[2])
     prior = LIMITS.floor**2 * near.shape[1] / FREEDOM
@@ -151,14 +154,6 @@ def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
     blocks = [float(part.sum()) for part in np.array_split(score, _BLOCKS, axis=1)]
     deviation = max(_spread(np.array(blocks)), _spread(score.sum(axis=1))) / known
     return delay, float(student.ppf(0.975, _BLOCKS - 1)) * deviation
-
-
-def _without(own: FloatArray, shared: FloatArray) -> FloatArray:
-    """Return what columns of each joint's own leave of others (Frisch and Waugh 1933)."""
-    own = own / _size(own)
-    turned = own.transpose(0, 2, 1)
-    normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
-    return np.asarray(shared - own @ np.linalg.solve(normal, turned @ shared))
 
 
 def _size(columns: FloatArray) -> FloatArray:

@@ -1,25 +1,32 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The load that explains how the inertial parameters of an arm changed.
+The load that explains how inertial parameters changed, and changes of what a model leaves.
 
 A body that is fixed to link k adds its ten parameters to those of the link, and base parameters
 change by G_k p, with the factors G_k that group the parameters of link k in them. Ten numbers p
 that explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
+
+Whether a model leaves more of the torque than another one did is a change that no parameter has.
+The mean squares of two residuals are held against each other (Fisher's F). What a model gets wrong
+of an arm is slow, so a recording has few independent values of it, however many rows.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
 import re
 from typing import Any
 
+from armid_ros.identification.assess.grade_limits import FREEDOM
+from armid_ros.identification.known_fit import KnownFit
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg
-from scipy.stats import chi2
+from scipy.stats import chi2, f
 
 #: Parameters of a link as base parameters name them, without its number.
 _SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
@@ -29,6 +36,8 @@ _REFUSED = 0.01
 _UNSEEN = 1e-9
 #: A mass differs from zero if it is this many standard deviations away.
 _TOLD = 1.96
+#: Share of its torque below which the residual of a joint is of filters, and not of an arm [%].
+LEAST_ERROR = 0.1
 
 
 @dataclass(frozen=True)
@@ -60,14 +69,8 @@ class LoadChange:
 
     def document(self) -> dict[str, Any]:
         """Return the load for programs to read."""
-        return {
-            'link': self.link,
-            'mass': self.mass,
-            'mass_std': self.mass_std,
-            'center': None if self.center is None else self.center.tolist(),
-            'p_value': self.p_value,
-            'rivals': list(self.rivals),
-        }
+        center = None if self.center is None else self.center.tolist()
+        return {**asdict(self), 'center': center, 'rivals': list(self.rivals)}
 
 
 def find_load(
@@ -133,3 +136,80 @@ def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | Non
         return None
     whole = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
     return LoadChange(link, mass, std, values[1:4] / mass if whole else None, p_value)
+
+
+@dataclass(frozen=True)
+class ResidualChange:
+    """
+    What two models leave of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        Which.
+    before, after : float
+        Root mean square residual, as the file has it [N m].
+    before_error, after_error : float or None
+        The same over the torque of the joint [%].
+    ratio : float
+        Of the second to the first, divided by how much more torque there was.
+    p_value : float
+        Probability that motions alone make them differ as much.
+    changed : bool
+        Whether they differ by more than chance.
+
+    """
+
+    joint: str
+    before: float
+    after: float
+    before_error: float | None
+    after_error: float | None
+    ratio: float
+    p_value: float
+    changed: bool = False
+
+    def document(self) -> dict[str, Any]:
+        """Return it for programs to read."""
+        return asdict(self) | {'ratio': self.ratio if isfinite(self.ratio) else None}
+
+
+def residual_changes(
+    before: KnownFit | None, after: KnownFit | None
+) -> tuple[ResidualChange, ...]:
+    """
+    Hold against each other what two models leave of each joint.
+
+    Empty where it is not known alike: the misfit of model.yaml and the residual of
+    identification.json are of other rows.
+
+    """
+    if before is None or after is None or before.as_diagnosed != after.as_diagnosed:
+        return ()
+    freedoms = FREEDOM * after.recordings, FREEDOM * before.recordings
+    found = []
+    for joint in (one for one in before.rms if one in after.rms):
+        ratio = _ratio(before, after, joint)
+        with np.errstate(over='ignore'):
+            square = np.square(ratio)
+        p_value = 2.0 * min(float(f.sf(square, *freedoms)), float(f.cdf(square, *freedoms)))
+        errors = before.errors.get(joint), after.errors.get(joint)
+        left = before.rms[joint], after.rms[joint]
+        found.append(ResidualChange(joint, *left, *errors, ratio, min(p_value, 1.0)))
+    return tuple(found)
+
+
+def _ratio(before: KnownFit, after: KnownFit, joint: str) -> float:
+    """Return by how many times more is left than a model would leave of as much torque."""
+    torques = before.torque(joint), after.torque(joint)
+    first, second = (
+        max(one.rms[joint], LEAST_ERROR / 100.0 * torque)
+        for one, torque in zip((before, after), torques, strict=True)
+    )
+    if first == second:
+        return 1.0
+    ratio = second / first if first > 0.0 else float('inf')
+    growth = torques[1] / torques[0] if min(torques) > 0.0 else 1.0
+    if ratio > 1.0:
+        return max(ratio / max(growth, 1.0), 1.0)
+    return min(ratio / min(growth, 1.0), 1.0)

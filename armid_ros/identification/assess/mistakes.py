@@ -19,15 +19,13 @@ from typing import NamedTuple
 from armid_ros.effects.timing import within_band
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
-    AsRecorded,
-    Faulty,
+    AS_RECORDED,
+    delayed,
     hypotheses,
-    InUnit,
-    OtherGravity,
-    OtherUnit,
-    WithoutBody,
+    Hypothesis,
+    other_scale,
+    WITHOUT_BODY,
 )
-from armid_ros.identification.assess.hypothesis import Hypothesis
 from armid_ros.identification.assess.late_torque import late_torque
 from armid_ros.identification.assess.prediction_error import (
     described_error,
@@ -90,7 +88,7 @@ class Mistake:
 
     def sentence(self, robot: Robot) -> str:
         """Say what seems to be wrong, what to do and what shows it, without a full stop."""
-        said = ', or '.join(one.sentence(robot) for one in self.hypotheses)
+        text = ', or '.join(one.text for one in self.hypotheses)
         before, after = (
             100.0 * min(float(error.joints[self.joint]), 9.99)
             for error in (self.before, self.after)
@@ -99,11 +97,11 @@ class Mistake:
             return (
                 f'the arm as described predicts the torque of {robot.joints[self.joint]} to '
                 f'{before:.0f} %; links that are off as those of a description may be explain '
-                f'that, and this would do so too: {said}'
+                f'that, and this would do so too: {text}'
             )
         arm = 'fitted' if self.fitted else 'described'
         return (
-            f'{said} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
+            f'{text} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
             f'{before:.0f} % as recorded, to {after:.0f} % with that put right)'
         )
 
@@ -133,27 +131,31 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
 
 def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
     """Return what `find_mistake` does, or else what links that are off explain as well."""
-    slow = slow_motions(recording, used)
+    slow = slow_motions([recording], used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
-    tried = [one for one in hypotheses(robot) if one.possible(slow)]
+    tried = list(hypotheses(robot, slow))
     late = late_torque(robot, recording, used)
-    tried += [] if late is None else [late]
+    tried += [] if late is None else [delayed(*late)]
     faulty = faulty_samples(robot, recording, used)
     tried += [] if faulty is None else [faulty]
-    found = _best(robot, tried, _described(robot, slow), _nearest(robot, slow))
+    described, fitted = (_judge(robot, slow, fitted=fitted) for fitted in (False, True))
+    found = _best(robot, tried, described, fitted)
     if found is not None:
-        likely = tuple(one.detailed(robot, slow) for one in found.hypotheses)
-        found = replace(found, hypotheses=likely)
+        likely = (one.detailed(slow) if one.detailed else one for one in found.hypotheses)
+        found = replace(found, hypotheses=tuple(likely))
     if found is not None and not found.links:
         return found
-    if any(_predicts(judge(robot, slow)) for judge in (_described, _nearest)):
-        return found
-    changes = [one for one in tried if not isinstance(one, InUnit | OtherGravity | OtherUnit)]
-    return _best(robot, changes, _nearest(robot, slow)) or found
+    for judge in (described, fitted):
+        as_recorded = judge(AS_RECORDED)
+        # data that are predicted as they were recorded, or are too few to ask
+        if as_recorded is None or 100.0 * float(as_recorded[0].joints.max()) < LIMITS.poor:
+            return found
+    changes = [one for one in tried if one.kind != 'unit' and not one.of_masses]
+    return _best(robot, changes, fitted) or found
 
 
-def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Faulty | None:
+def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Hypothesis | None:
     """
     Find samples that no arm can have given: torques far out of the rest, positions that jump.
 
@@ -168,7 +170,7 @@ def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Fa
 
     Returns
     -------
-    Faulty or None
+    Hypothesis or None
         The recording without them; None where there are none.
 
     """
@@ -200,77 +202,49 @@ def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Fa
         step = recording.q[row, joint] - recording.q[row - 1, joint]
         unit = robot.position_units[joint]
         first = f'the position of {name} jumps by {step:.3g} {unit} at {t:.3f} s'
-    without = tuple(slow_motions(recording.select(sound), used))
-    return Faulty(first, len(np.unique(at[:, 0])), without)
+    without = tuple(slow_motions([recording.select(sound)], used))
+    count = len(np.unique(at[:, 0]))
+    many = '' if count == 1 else f' (the first of {count})'
+    text = f'{first}{many}: leave out what is faulty, or record again'
+    return Hypothesis('samples', text, where=(text,), without=without)
 
 
-def effort_factor(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning
-) -> float | None:
+def effort_factor(robot: Robot, slow: Sequence[Motion]) -> float | None:
     """
-    Return how many times what is described the efforts of recordings are, all joints together.
+    Return how many times what is described the efforts of motions are, all joints together.
 
     Friction, offset and drive inertia of each joint are fitted beside it. None where motion is
     too short, or the efforts do not follow the description with any factor.
 
     """
-    found = _described(robot, slow_motions_of(recordings, used))(OtherUnit())
+    found = _judge(robot, slow)(other_scale(robot))
     if found is None or 100.0 * found[0].whole(robot) > LIMITS.unusable:
         return None
     factor = float(found[0].shared[0])
     return factor if factor > 0.0 else None
 
 
-def is_factor(
-    robot: Robot, recordings: Sequence[Recording], used: Conditioning, factor: float
-) -> bool:
-    """
-    Whether efforts are so many times what is described, as the one that fits leaves no less.
-
-    Parameters
-    ----------
-    robot : Robot
-        The description.
-    recordings : sequence of Recording
-        Data with torques.
-    used : Conditioning
-        Filters that they are identified with.
-    factor : float
-        Of their efforts on those of the description.
-
-    """
-    slow = slow_motions_of(recordings, used)
+def is_factor(robot: Robot, slow: Sequence[Motion], factor: float) -> bool:
+    """Whether efforts are so many times what is described: the one that fits leaves no less."""
     converted = [one.with_torque(one.tau / factor) for one in slow if one.tau is not None]
     free, fixed = (
-        _described(robot, motions)(hypothesis)
-        for motions, hypothesis in ((slow, OtherUnit()), (converted, AsRecorded()))
+        _judge(robot, motions)(hypothesis)
+        for motions, hypothesis in ((slow, other_scale(robot)), (converted, AS_RECORDED))
     )
     return free is not None and fixed is not None and fixed[0].gain(free[0]) < LIMITS.gain**0.5
 
 
-def _predicts(judge: Judge) -> bool:
-    """Whether data are predicted as they were recorded, or are too few to ask."""
-    as_recorded = judge(AsRecorded())
-    return as_recorded is None or 100.0 * float(as_recorded[0].joints.max()) < LIMITS.poor
+def _judge(robot: Robot, slow: Sequence[Motion], *, fitted: bool = False) -> Judge:
+    """Return what predicts data with the body as described, or with the nearest that fits."""
 
-
-def _described(robot: Robot, slow: Sequence[Motion]) -> Judge:
     def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = thinned(one.stretches(slow), _ROWS)
+        motion = thinned(one.stretches(slow), _ROWS_FITTED if fitted else _ROWS)
         if motion is None or len(motion) < _FEWEST:
             return None
+        if fitted:
+            return nearest_error(robot, motion), one
         error = described_error(motion, *one.torque(robot, motion))
-        return error, one.settled(error.shared)
-
-    return judge
-
-
-def _nearest(robot: Robot, slow: Sequence[Motion]) -> Judge:
-    def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = thinned(one.stretches(slow), _ROWS_FITTED)
-        if motion is None or len(motion) < _FEWEST:
-            return None
-        return nearest_error(robot, motion), one
+        return error, one.settled(error.shared) if one.settled else one
 
     return judge
 
@@ -278,26 +252,23 @@ def _nearest(robot: Robot, slow: Sequence[Motion]) -> Judge:
 def _best(
     robot: Robot, tried: Sequence[Hypothesis], judge: Judge, near: Judge | None = None
 ) -> Mistake | None:
-    """
-    Return the hypothesis that gains most, if that is enough for what it is free to choose.
-
-    Beside a judge by the body as described, another one by bodies near it says which are of links.
-
-    """
-    as_recorded = judge(AsRecorded())
+    """Return the hypothesis that gains most, if that is enough for what it is free to choose."""
+    # Beside a judge by the body as described, another one by bodies near it says which are of
+    # links.
+    as_recorded = judge(AS_RECORDED)
     if as_recorded is None:
         return None
     before, fitted = as_recorded[0], near is None
-    nothing = None if fitted else judge(WithoutBody())
+    nothing = None if fitted else judge(WITHOUT_BODY)
     rival = before if nothing is None else before.least(nothing[0])
     price = LIMITS.gain if not fitted else LIMITS.gain**LIMITS.free_body
     if rival.best_gain() < price:
         return None
-    rows = _judged(robot, tried, judge, rival, price)
+    rows = _judged(tried, judge, rival, price)
     if not rows:
         return None
     nearest = max(rows, key=lambda row: row.surplus)
-    rows += _judged(robot, list(nearest.hypothesis.nearby()), judge, rival, price)
+    rows += _judged(nearest.hypothesis.nearby(), judge, rival, price)
     believed = [
         row
         for row in rows
@@ -308,33 +279,27 @@ def _best(
     if not believed:
         return None
     sure = believed
-    likeliest = None if near is None else near(AsRecorded())
+    likeliest = None if near is None else near(AS_RECORDED)
     if near is not None and likeliest is not None:
-        sure = [r for r in believed if _beyond_bodies(r.hypothesis, near, likeliest[0])]
+        # where the centre of a wrist lies near its axis, a few millimetres turn its weight by as
+        # much as a wrong zero; a factor of all masses is none where it is material
+        def beyond_bodies(one: Hypothesis) -> bool:
+            put_right = None if one.of_masses else near(one)
+            if put_right is None:
+                return True
+            return likeliest[0].gain(put_right[0]) >= LIMITS.gain**one.values
+
+        sure = [row for row in believed if beyond_bodies(row.hypothesis)]
         believed = sure or believed
     first = max(believed, key=lambda row: row.surplus)
     as_good = {
-        type(row.hypothesis): row.hypothesis
+        row.hypothesis.kind: row.hypothesis
         for row in sorted(believed, key=lambda row: row.gain)
-        if type(row.hypothesis) is not type(first.hypothesis)
+        if row.hypothesis.kind != first.hypothesis.kind
         and row.gain * LIMITS.gain**0.5 > first.gain
     }
     likely = (first.hypothesis, *as_good.values())
     return Mistake(likely, before, first.after, fitted, links=not sure)
-
-
-def _beyond_bodies(one: Hypothesis, near: Judge, as_recorded: PredictionError) -> bool:
-    """
-    Whether a change of the data explains what no body that the description may mean does.
-
-    Where the centre of a wrist lies near its axis, a few millimetres turn its weight by as much as
-    a wrong zero. Of a factor of all masses `Hypothesis.material` has said that it is none.
-
-    """
-    if one.of_masses:
-        return True
-    put_right = near(one)
-    return put_right is None or as_recorded.gain(put_right[0]) >= LIMITS.gain**one.values
 
 
 class _Row(NamedTuple):
@@ -347,7 +312,6 @@ class _Row(NamedTuple):
 
 
 def _judged(
-    robot: Robot,
     tried: Sequence[Hypothesis],
     judge: Judge,
     rival: PredictionError,
@@ -356,17 +320,17 @@ def _judged(
     rows = []
     for one in tried:
         pair = judge(one)
-        if pair is not None and pair[1].material(robot, LIMITS):
+        if pair is not None and pair[1].material:
             after, settled = pair
             gain = rival.gain(after)
             rows.append(_Row(settled, after, gain, gain / price**settled.values))
     return rows
 
 
-def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
-    """Return the stretches of a recording, with what is in the band of the motion alone."""
+def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
+    """Return the stretches of recordings, with what is in the band of the motion alone."""
     result = []
-    for motion in segments(recording, used):
+    for motion in (part for one in recordings for part in segments(one, used)):
         kept = np.array(decimated_samples(len(motion), used), dtype=np.intp)
         assert motion.tau is not None
         slow, tau = motion.select(kept), decimate(motion.tau, used)
@@ -374,8 +338,3 @@ def slow_motions(recording: Recording, used: Conditioning) -> list[Motion]:
             parts = (within_band(slow, x) for x in (slow.q, slow.dq, slow.ddq, tau))
             result.append(Motion(slow.joints, slow.t, *parts))
     return result
-
-
-def slow_motions_of(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:
-    """Return such stretches of several recordings."""
-    return [motion for one in recordings for motion in slow_motions(one, used)]

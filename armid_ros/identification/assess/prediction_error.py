@@ -220,13 +220,9 @@ def _left(columns: FloatArray, rest: FloatArray, fitted: npt.NDArray[np.bool_]) 
 def _shared_values(
     own: FloatArray, rest: FloatArray, shared: FloatArray, fitted: npt.NDArray[np.bool_]
 ) -> FloatArray:
-    """
-    Fit what joints share, with what each has of its own taken out (Frisch and Waugh 1933).
-
-    Joints count by what they leave, down to the floor: one whose friction is another than what is
-    fitted to it tells little of what all have in common.
-
-    """
+    """Fit what joints share, with what each has of its own taken out (Frisch and Waugh 1933)."""
+    # Joints count by what they leave, down to the floor: one whose friction is another than what
+    # is fitted to it tells little of what all have in common.
     if shared.shape[2] == 0:
         return np.empty(0)
     both = np.concatenate([shared[fitted], rest[fitted, :, np.newaxis]], axis=2)
@@ -250,13 +246,9 @@ def _own_columns(motion: Motion, joint: int) -> FloatArray:
 
 
 def _weight(motion: Motion) -> FloatArray:
-    """
-    Return weights of rows, shape (N, n), of mean square one.
-
-    They are zero where a joint rests or turns round. Dry friction is any torque there: a bristle
-    that gives way before it slips looks like a torque that comes late.
-
-    """
+    """Return weights of rows, shape (N, n), of mean square one."""
+    # They are zero where a joint rests or turns round. Dry friction is any torque there: a bristle
+    # that gives way before it slips looks like a torque that comes late.
     speed = np.abs(motion.dq)
     moves = speed > _SLOW * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True

@@ -19,7 +19,7 @@ from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.checks import REST_RANGE
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import PositionRange, Recording
+from armid_ros.recording import Recording
 from armid_ros.robots import described_at, held_joints, HeldJoint, Robot
 import numpy as np
 
@@ -69,14 +69,15 @@ def held_elsewhere(
 
     """
     for joint in held_joints(robot):
-        found = _range(joint.name, recordings)
-        if found is None:
+        seen = [other for one in recordings for other in one.others if other.joint == joint.name]
+        if not seen:
             continue
-        moves = found.highest - found.lowest > REST_RANGE
+        lowest, highest = min(one.lowest for one in seen), max(one.highest for one in seen)
+        moves = highest - lowest > REST_RANGE
         if not (moves or joint.carries):
             continue  # a part of the body that carries it, in whatever position
-        places = list(np.linspace(found.lowest, found.highest, _PLACES if moves else 1))
-        places += [joint.position] if moves or joint.carries else []
+        places = list(np.linspace(lowest, highest, _PLACES if moves else 1))
+        places.append(joint.position)
         # the largest change of the described torque between places, as a share
         measured = np.concatenate([motion.tau for motion in motions if motion.tau is not None])
         described = [
@@ -95,22 +96,14 @@ def held_elsewhere(
         worst = int(np.argmax(shares))
         if shares[worst] > LIMITS.floor or (moves and joint.carries):
             what = f'{100.0 * shares[worst]:.0f} % of the torque of {robot.joints[worst]}'
-            yield Elsewhere(_text(joint, found, moves, what), float(shares[worst]))
+            yield Elsewhere(_text(joint, lowest, highest, moves, what), float(shares[worst]))
 
 
-def _range(joint: str, recordings: Sequence[Recording]) -> PositionRange | None:
-    found = [other for one in recordings for other in one.others if other.joint == joint]
-    if not found:
-        return None
-    lowest, highest = min(one.lowest for one in found), max(one.highest for one in found)
-    return PositionRange(joint, lowest, highest)
-
-
-def _text(joint: HeldJoint, found: PositionRange, moves: bool, change: str) -> str:
+def _text(joint: HeldJoint, lowest: float, highest: float, moves: bool, change: str) -> str:
     name, unit = joint.name, joint.unit
     if not moves:
         return (
-            f'joint {name} is not driven and stands at {found.lowest:.3g} {unit}, where '
+            f'joint {name} is not driven and stands at {lowest:.3g} {unit}, where '
             f'the model has it at {joint.position:.3g} {unit}, which makes {change}; '
             'make it fixed there in the description, or drive it (--joints)'
         )
@@ -121,7 +114,7 @@ def _text(joint: HeldJoint, found: PositionRange, moves: bool, change: str) -> s
         else 'drive it as well (--joints), or hold it still where its torque is not measured'
     )
     return (
-        f'joint {name} is not driven, but moves from {found.lowest:.3g} to {found.highest:.3g} '
+        f'joint {name} is not driven, but moves from {lowest:.3g} to {highest:.3g} '
         f'{unit}{carries}; the model has it at {joint.position:.3g} {unit}; where it is makes '
         f'up to {change}; {remedy}'
     )

@@ -18,7 +18,6 @@ from armid_ros.identification.rows.signals import GAP_PERIODS
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import cumulative_trapezoid
 
 #: Velocities are integrated over pieces of at most so many seconds, which is a period and more of
@@ -63,8 +62,17 @@ def velocity_ratio(recording: Recording) -> VelocityRatio | None:
     """Compare velocities of a recording with its positions; None where it has none."""
     if recording.dq is None:
         return None
-    pairs = [_pair(recording, part) for part in _pieces(recording)]
-    n = recording.n_joints
+    # positions and integrated velocities of unbroken pieces, both without their line
+    pairs, n = [], recording.n_joints
+    breaks = np.flatnonzero(np.diff(recording.t) > GAP_PERIODS * recording.period) + 1
+    for stretch in np.split(np.arange(len(recording.t)), breaks):
+        duration = recording.t[stretch[-1]] - recording.t[stretch[0]]
+        for part in np.array_split(stretch, max(1, int(np.ceil(duration / _PIECE)))):
+            if len(part) > 3:
+                t = recording.t[part] - recording.t[part[0]]
+                line = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
+                made = cumulative_trapezoid(recording.dq[part], t, axis=0, initial=0.0)
+                pairs.append([x - line @ (line.T @ x) for x in (recording.q[part], made)])
     if not pairs:
         return VelocityRatio(np.full(n, np.nan), np.zeros(n))
     moved, made = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
@@ -128,23 +136,3 @@ def velocity_faults(recording: Recording) -> Iterator[str]:
         off = np.flatnonzero(follows & (relative > 1.0 / _NEAR) & (relative < _NEAR))
         if len(off):
             yield f'velocities of {", ".join(recording.joints[k] for k in off)} {text}'
-
-
-def _pieces(recording: Recording) -> list[npt.NDArray[np.intp]]:
-    """Return the samples of unbroken pieces."""
-    breaks = np.flatnonzero(np.diff(recording.t) > GAP_PERIODS * recording.period) + 1
-    pieces = []
-    for part in np.split(np.arange(len(recording.t)), breaks):
-        duration = recording.t[part[-1]] - recording.t[part[0]]
-        pieces += np.array_split(part, max(1, int(np.ceil(duration / _PIECE))))
-    return [part for part in pieces if len(part) > 3]
-
-
-def _pair(recording: Recording, part: npt.NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-    """Return positions and integrated velocities of a piece, both without their line, (N, n)."""
-    assert recording.dq is not None
-    t = recording.t[part] - recording.t[part[0]]
-    line = np.linalg.qr(np.column_stack([np.ones(len(t)), t]))[0]
-    made = cumulative_trapezoid(recording.dq[part], t, axis=0, initial=0.0)
-    moved, made = (x - line @ (line.T @ x) for x in (recording.q[part], made))
-    return moved, made

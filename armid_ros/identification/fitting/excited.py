@@ -1,12 +1,23 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What certain data tell apart of an arm's parameters, and the bounds of that."""
+"""
+What certain data determine of an arm's parameters, and the bounds of that.
+
+What a motion does not tell apart is grouped. What data determine worse than the description does
+stays as described: the mean squared error of an estimate without bias is its variance, that of the
+description what it may be off by. Where joints are moved one after the other, a column that other
+joints make is small and not a part of others: a value that is fitted to it is what noise makes it.
+
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects.load import described_spread
+from armid_ros.identification.fitting.least_squares import Method, solve
 from armid_ros.identification.fitting.triangle import Triangle
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns, regroup
@@ -79,3 +90,72 @@ def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]
     upper = np.concatenate([free, *(limits[1] for limits in effects)])[base.independent]
     alone = np.count_nonzero(base.grouping, axis=1) == 1
     return np.where(alone, lower, -np.inf), np.where(alone, upper, np.inf)
+
+
+def determined(
+    arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
+) -> tuple[BaseParameters, tuple[Regression, ...]]:
+    """
+    Hold at the description what is less sure than it, the least sure first.
+
+    The others get surer by what is held, so that one is held at a time.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The description.
+    base : BaseParameters
+        What the data tell apart.
+    problem : sequence of Regression
+        Its columns.
+    method : {'ols', 'wls', 'irls'}
+        Of the fit.
+
+    Returns
+    -------
+    base : BaseParameters
+        What the data determine.
+    problem : tuple of Regression
+        Its columns, and the torque of what is held as a constant.
+
+    """
+    problem = tuple(problem)
+    spread = base_spread(arm, base)
+    while base.rank:
+        std = np.sqrt(np.diag(solve(problem, method, bounds(arm, base)).covariance))
+        worst = int(np.argmax(std / spread))
+        if std[worst] <= spread[worst]:
+            break
+        kept = np.delete(np.arange(base.rank), worst)
+        value = float(base.values(arm.theta)[worst])
+        torques = [part.columns[:, :, worst] * value for part in problem]
+        problem = tuple(
+            replace(part, constant=torque + (0.0 if part.constant is None else part.constant))
+            for part, torque in zip(problem, torques, strict=True)
+        )
+        problem = tuple(part.restrict(kept) for part in problem)
+        parameters = tuple(base.parameters[k] for k in kept)
+        base = replace(
+            base,
+            parameters=parameters,
+            independent=base.independent[kept],
+            grouping=base.grouping[kept],
+        )
+        spread = spread[kept]
+    return base, problem
+
+
+def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
+    """
+    Return what base parameters of a description may be off by, shape (r,).
+
+    Infinite where an effect takes part that does not know the size of its values, and where no
+    link has a mass.
+
+    """
+    effects = [effect.spread(arm.robot) for effect in arm.effects]
+    spread = np.concatenate([described_spread(arm.robot).ravel(), *effects])
+    unknown = np.any(base.grouping[:, ~np.isfinite(spread)], axis=1)
+    known = np.where(np.isfinite(spread), spread, 0.0)
+    size = np.linalg.norm(base.grouping * known, axis=1)
+    return np.where(~unknown & (size > 0.0), size, np.inf)

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.identification.assess.forward import unlimited
 from armid_ros.identification.fitting.excited import bounds
 from armid_ros.identification.fitting.least_squares import noise_products
 from armid_ros.identification.fitting.nonlinear import (
@@ -30,10 +29,14 @@ from armid_ros.identification.fitting.nonlinear import (
     ungrouped,
 )
 from armid_ros.identification.fitting.triangle import semi_definite, within
-from armid_ros.identification.rows.regression import filtered_columns, Regression, regressions
+from armid_ros.identification.rows.regression import (
+    filtered_columns,
+    Regression,
+    regressions,
+    weighted_rows,
+)
 from armid_ros.identification.rows.signals import (
     Conditioning,
-    sampling_rate,
     segments,
     unbroken,
 )
@@ -56,6 +59,8 @@ _MOST_ROUNDS = 4
 _SETTLED = 0.02
 #: An arm under computed torque that is off by more than this share of its motion is no arm.
 _ASTRAY = 0.05
+#: Far enough for no joint to be at a limit [rad or m].
+_FAR = 1e4
 
 
 @dataclass(frozen=True)
@@ -172,14 +177,11 @@ def by_instruments(
         If the instruments do not correlate with the columns in every parameter.
 
     """
-    rank = problem[0].columns.shape[2]
-    w, z = (
-        (weights[:, :, np.newaxis] * np.concatenate(parts)).reshape(-1, rank)
-        for parts in ([part.columns for part in problem], instruments)
-    )
+    w, target = weighted_rows(problem, weights)
+    rank = w.shape[1]
+    z = (weights[:, :, np.newaxis] * np.concatenate(instruments)).reshape(-1, rank)
     scale = np.linalg.norm(w, axis=0)
     w, z = w / scale, z / scale
-    target = (weights * np.concatenate([part.target for part in problem])).ravel()
     (triangle,) = scipy.linalg.qr(w, mode='r', check_finite=False)
     triangle = triangle[:rank]
     try:
@@ -214,7 +216,7 @@ def smoothed(recordings: Sequence[Recording], used: Conditioning) -> list[Record
         cutoff = _SHARE * used.cutoff_hz * recording.period * 2.0
         sections = signal.butter(4, min(0.9, cutoff), output='sos')
         q = recording.q.copy()
-        for part in unbroken(recording, sampling_rate(recording)):
+        for part in unbroken(recording, 1.0 / recording.period):
             edge = min(_EDGE, len(part) - 1)
             q[part] = signal.sosfiltfilt(sections, recording.q[part], axis=0, padlen=edge)
         calm.append(replace(recording, q=q, dq=None))
@@ -257,3 +259,11 @@ def _simulated_columns(
         along = replace(motion, q=q, dq=dq, ddq=ddq)
         found.append(filtered_columns(arm, fit.base.independent, along, used))
     return found
+
+
+def unlimited(arm: ArmModel) -> ArmModel:
+    """Return an arm whose joints have no limits that a simulation could run into."""
+    n = arm.robot.n_joints
+    far, free = np.full(n, _FAR), np.full(n, np.inf)
+    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
+    return replace(arm, robot=robot)

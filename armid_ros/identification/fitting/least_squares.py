@@ -18,7 +18,7 @@ from typing import get_args, Literal
 from armid_ros.identification.fitting.triangle import (
     fit_scaled,
     fit_triangle,
-    freedom_factor,
+    joint_std,
     positive,
     ROUNDS,
     Triangle,
@@ -120,12 +120,10 @@ def solve(
     residual = _residual(problem, values)
     weights = np.asarray(relative / fit.scale)
     products = noise_products(problem, residual * weights, weights, fit.inverse)
-    counts = np.maximum(triangle.counts, 1.0)
-    squares = np.sum(residual**2, axis=0, where=used)
     return Solution(
         values=values,
         covariance=fit.covariance(products),
-        joint_std=np.sqrt(freedom_factor(triangle) * squares / counts),
+        joint_std=joint_std(triangle, values),
         condition_number=fit.condition_number,
         outliers=int(np.sum(used & (relative**2 < 0.5))),
         weights=weights,
@@ -220,65 +218,35 @@ def noise_products(
 def _noise_spectrum(
     residual: FloatArray, told: npt.NDArray[np.bool_], leverage: FloatArray
 ) -> FloatArray:
-    """
-    Estimate the power spectrum of the noise from a residual.
-
-    Its autocovariance is that of the samples that tell something, lag by lag over as many pairs
-    as there are (Parzen 1963), without the negative power that it may have where there are gaps.
-    The residual is whitened by an autoregression, its spectrum smoothed by a Parzen window over
-    lags, and coloured again, which keeps peaks from being smoothed away (Andrews and Monahan
-    1992). What the fit took is made up for in the same band.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (M,)
-        Residual; zero where it tells nothing.
-    told : ndarray of bool, shape (M,)
-        Where it tells something.
-    leverage : ndarray, shape (M + 1,)
-        Share of the noise that the fit takes, on the bins of an rfft of 2 M samples.
-
-    Returns
-    -------
-    ndarray, shape (M + 1,)
-        Power on the same bins.
-
-    """
+    """Estimate the power of noise (M + 1,) on the bins of an rfft from a residual (M,)."""
     count = len(residual)
     size = 2 * count
-    lags = _autocovariance(residual, told)
+    # the autocovariance of the samples that tell something, over as many pairs as there are
+    # (Parzen 1963), without the negative power that it may have where there are gaps
+    sums, pairs = (
+        np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2)[:count]
+        for signal in (residual, told.astype(float))
+    )
+    lags = sums / np.maximum(pairs, 1.0) * np.arange(count, 0, -1) / count
     power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real.clip(0.0)
     lags = np.fft.irfft(power, size)[:count]
-    whitening = _whitening(lags, size)
+    # whitened by an autoregression, smoothed by a Parzen window over lags, and coloured again,
+    # which keeps peaks from being smoothed away (Andrews and Monahan 1992)
+    order, whitening = min(AR_ORDER, len(lags) - 1), np.ones(count + 1)
+    if lags[0] > 0.0 and order >= 1:
+        regular = lags[: order + 1].copy()
+        regular[0] *= 1.0 + 1e-6
+        coefficients = scipy.linalg.solve_toeplitz(regular[:order], regular[1:])
+        filtered = np.fft.rfft(np.concatenate([[1.0], -coefficients]), size)
+        whitening = np.abs(filtered) ** 2
     lags = np.fft.irfft(power * whitening, size)[: count // 2]
     # how many lags matter: four times the first at which the correlation is noise
     quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
     first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
     reach = int(np.clip(4 * first, min(10, len(lags)), len(lags)))
+    # what the fit took is made up for in the same band
     left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
     return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
-
-
-def _autocovariance(residual: FloatArray, told: npt.NDArray[np.bool_]) -> FloatArray:
-    """Return the autocovariance of a signal with gaps, biased as if it had none, shape (M,)."""
-    count = len(residual)
-    sums, pairs = (
-        np.fft.irfft(np.abs(np.fft.rfft(signal, 2 * count)) ** 2)[:count]
-        for signal in (residual, told.astype(float))
-    )
-    return np.asarray(sums / np.maximum(pairs, 1.0) * np.arange(count, 0, -1) / count)
-
-
-def _whitening(lags: FloatArray, size: int) -> FloatArray:
-    """Return the power gain that whitens a signal of given autocovariance, shape (size/2 + 1,)."""
-    order = min(AR_ORDER, len(lags) - 1)
-    if lags[0] <= 0.0 or order < 1:
-        return np.ones(size // 2 + 1)
-    regular = lags[: order + 1].copy()
-    regular[0] *= 1.0 + 1e-6
-    coefficients = scipy.linalg.solve_toeplitz(regular[:order], regular[1:])
-    filtered = np.fft.rfft(np.concatenate([[1.0], -coefficients]), size)
-    return np.asarray(np.abs(filtered) ** 2)
 
 
 def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:

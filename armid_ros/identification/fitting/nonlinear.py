@@ -18,7 +18,13 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.identification.fitting.excited import bounds
 from armid_ros.identification.fitting.least_squares import Method, Solution, solve
-from armid_ros.identification.rows.regression import predictions, Regression, regressions
+from armid_ros.identification.rows.regression import (
+    Fit,
+    predictions,
+    Regression,
+    regressions,
+    weighted_rows,
+)
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, LINK_PARAMETERS
 from armid_ros.motion import FloatArray, Motion
@@ -89,6 +95,14 @@ class FittedValues:
     predicted: Torques
     passes: int = 1
     settled: bool = True
+
+    @property
+    def fits(self) -> tuple[Fit, ...]:
+        """Return how the model predicts the data that it was fitted to."""
+        return tuple(
+            Fit(part.source, part.motion, torque, part.informative)
+            for part, torque in zip(self.problem, self.predicted, strict=True)
+        )
 
 
 def fit_values(
@@ -191,21 +205,18 @@ def moved(arm: ArmModel, base: BaseParameters, values: FloatArray, free: FloatAr
     rigid = _rigid(arm)
     change[:rigid] -= free @ (free.T @ change[:rigid])
     theta = arm.theta + change
-    return arm.with_theta(np.concatenate([_carried(theta[:rigid], free), theta[rigid:]]))
+    theta[:rigid] = _carried(theta[:rigid], free)
+    return arm.with_theta(theta)
 
 
 def _carried(rigid: FloatArray, free: FloatArray) -> FloatArray:
-    """
-    Return rigid parameters with a mass where a first moment has none, shape (10 n,).
-
-    A link that a description leaves without a mass has got a moment from the data, which tell no
-    mass apart: any changes no torque where those of links before it change along with it.
-
-    """
+    """Return rigid parameters with a mass where a first moment has none, shape (10 n,)."""
     links = rigid.reshape(-1, len(LINK_PARAMETERS))
     lacking = (np.abs(links[:, 0]) < NO_MASS) & np.any(np.abs(links[:, 1:4]) >= NO_MASS, axis=1)
     if not np.any(lacking):
         return rigid
+    # a link that is described without a mass has got a moment from the data, which tell no mass
+    # apart: any changes no torque where those of links before it change along with it
     mass = np.zeros_like(links)
     mass[lacking, 0] = np.linalg.norm(links[lacking, 1:4], axis=1) / _REACH
     return np.asarray(rigid + free @ (free.T @ mass.ravel()))
@@ -232,7 +243,7 @@ def linearised(
 
 def torques(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> Torques:
     """Return the filtered torque of an arm along every stretch of recordings."""
-    return tuple(part.torque for part in predictions(arm, recordings, used))
+    return tuple(part.predicted for part in predictions(arm, recordings, used))
 
 
 def through(
@@ -285,7 +296,8 @@ def _iterate(
             if values is solution.values and now.cost(predicted) <= _KEPT * now.cost(promised):
                 break
         if trial is None:
-            settled = all(now.gain(now.linear(values)) < _STUCK * now.cost() for values in steps)
+            vain = [now.gain(tuple(p.torque(values) for p in now.problem)) for values in steps]
+            settled = max(vain) < _STUCK * now.cost()
             break
         settled = agree(now.problem, solution.weights, promised, trial.predicted)
         settled = settled or now.gain(trial.predicted) < _LITTLE
@@ -300,19 +312,7 @@ def _iterate(
 
 
 class _State:
-    """
-    Where an iteration is: an arm, its values, its linear model, and what that leaves.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        The arm.
-    values : ndarray, shape (r,)
-        Its base parameters.
-    problem : sequence of Regression
-        Linear models that have its torque at its values.
-
-    """
+    """Where an iteration is: an arm, its values, its linear model, and what that leaves."""
 
     def __init__(self, arm: ArmModel, values: FloatArray, problem: Sequence[Regression]) -> None:
         self.arm, self.values, self.problem = arm, values, tuple(problem)
@@ -332,14 +332,9 @@ class _State:
             return 0.0
         return self.cost() - self.cost(predicted)
 
-    def linear(self, values: FloatArray) -> Torques:
-        """Return what the linear models take the torque for."""
-        return tuple(part.torque(values) for part in self.problem)
-
     def damped(self, damping: float, limits: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the values after a step of Levenberg and Marquardt, within limits."""
-        columns = np.concatenate([part.columns for part in self.problem])
-        w = (self._weights[:, :, np.newaxis] * columns).reshape(-1, len(self.values))
+        w, _ = weighted_rows(self.problem, self._weights)
         size = np.linalg.norm(w, axis=0)
         scaled = w / np.where(size > 0.0, size, 1.0)
         normal = scaled.T @ scaled + damping * np.eye(len(size))

@@ -1,12 +1,19 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Normal equations of which data do not tell every direction."""
+"""
+Normal equations of which data do not tell every direction, and what they vary by without a part.
+
+Noise makes values as uncertain as their covariance. What a model gets wrong differs from motion
+to motion, and other motions give other values: recordings that are left out show by how much.
+
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg
@@ -78,7 +85,7 @@ class NormalEquations:
         return NormalEquations(self.matrix - other.matrix, self.vector - other.vector)
 
 
-def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) -> FloatArray:
+def informative_basis(products: FloatArray) -> FloatArray:
     """
     Return the identifiable directions.
 
@@ -86,9 +93,6 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
     ----------
     products : ndarray, shape (p, p)
         Products of columns with each other; positive semi-definite.
-    tolerance : float
-        Share of the largest eigenvalue, of columns scaled to one length, below which a direction
-        is not told.
 
     Returns
     -------
@@ -98,29 +102,16 @@ def informative_basis(products: FloatArray, tolerance: float = UNINFORMATIVE) ->
     """
     scale = 1.0 / np.sqrt(np.maximum(np.diag(products), 1e-300))
     scaled = products * np.outer(scale, scale)
-    whole = _inverse_factor(scaled, tolerance)
-    if whole is not None:
-        return np.asarray(scale[:, np.newaxis] * whole)
+    lower, failed = scipy.linalg.lapack.dpotrf(scaled, lower=True)
+    if not failed and len(scaled):
+        inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
+        # the smallest eigenvalue is at least one over the trace of the inverse, and the largest
+        # at most the trace of the products: every direction is told
+        if np.sum(inverse**2) * np.trace(scaled) * UNINFORMATIVE <= 1.0:
+            return np.asarray(scale[:, np.newaxis] * inverse.T)
     values, vectors = np.linalg.eigh(scaled)
-    good = values > tolerance * max(float(values.max(initial=0.0)), 1e-300)
+    good = values > UNINFORMATIVE * max(float(values.max(initial=0.0)), 1e-300)
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
-
-
-def _inverse_factor(products: FloatArray, tolerance: float) -> FloatArray | None:
-    """
-    Return B of the inverse B B' where every direction is told; None where one may not be.
-
-    The smallest eigenvalue is at least one over the trace of the inverse, and the largest is at
-    most the trace of the products.
-
-    """
-    lower, failed = scipy.linalg.lapack.dpotrf(products, lower=True)
-    if failed or not len(products):
-        return None
-    inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
-    if np.sum(inverse**2) * np.trace(products) * tolerance > 1.0:
-        return None
-    return np.asarray(inverse.T)
 
 
 def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray:
@@ -180,3 +171,74 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
     basis = informative_basis(products)
     return np.asarray(basis @ (basis.T @ aim))
+
+
+def jackknife(
+    values: FloatArray, std: FloatArray, held_values: FloatArray, held_std: FloatArray
+) -> FloatArray:
+    """
+    Return the variance of least-squares values whatever the colour of the noise, shape (p,).
+
+    What a value changes by without a part counts by what the other parts tell of it: where noise
+    is white the mean of this is its variance, also where one part tells most of a value, as where
+    a joint moves in that part alone. A value that the others do not tell counts nothing.
+
+    Parameters
+    ----------
+    values, std : ndarray, shape (p,)
+        Fitted to all parts, and deviations as far as white noise goes.
+    held_values, held_std : ndarray, shape (K, p)
+        The same without each part; deviations are zero where nothing tells a value.
+
+    References
+    ----------
+    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
+    Statistics 14, 1986.
+
+    """
+    return np.asarray(np.sum(changes(values, std, held_values, held_std) ** 2, axis=0))
+
+
+def changes(
+    values: FloatArray, std: FloatArray, held_values: FloatArray, held_std: FloatArray
+) -> FloatArray:
+    """Return what values change by without each part, (K, p), whose squares `jackknife` sums."""
+    seen = held_std > 0.0
+    told = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
+    return np.asarray(told * (held_values - values))
+
+
+def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+    """
+    Return the changes of values without each recording, of which squares sum up to a variance.
+
+    A change counts by what the others tell of the value; see `jackknife`.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        N rows of r columns.
+    weights : ndarray, shape (N, n)
+        What the fit multiplied the rows of every joint by.
+    values : ndarray, shape (r,)
+        What was fitted.
+
+    Returns
+    -------
+    ndarray, shape (K, r)
+        For each of K recordings; empty for a single one, zero where one alone tells a value.
+
+    """
+    parts: dict[str, NormalEquations] = {}
+    first = 0
+    for part in problem:
+        weight = weights[first : first + len(part.target)]
+        first += len(part.target)
+        columns, target = weighted_rows([part], weight)
+        own = NormalEquations.of_rows(columns, target - columns @ values)
+        parts[part.source] = parts[part.source] + own if part.source in parts else own
+    if len(parts) < 2:
+        return np.zeros((0, len(values)))
+    whole = sum(parts.values(), start=NormalEquations.none(len(values)))
+    held = [(whole - recording).solution() for recording in parts.values()]
+    return changes(*whole.solution(), *np.array(held).transpose(1, 0, 2))

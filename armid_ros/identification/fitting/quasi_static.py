@@ -17,22 +17,15 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.nonlinear import FittedValues, torques
-from armid_ros.identification.rows.regression import Regression, regressions
+from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-import scipy.linalg
 
 #: Inertia that adds less than this share to a standard deviation does not matter.
 _NEGLIGIBLE = 0.1
-
-
-def free_directions(arm: ArmModel, rng: np.random.Generator) -> FloatArray:
-    """Return what of the rigid parameters no motion of an arm tells, shape (10 n, k)."""
-    rigid = len(arm.robot.rigid_parameters)
-    grouping = arm.base_parameters(rng).grouping[:, :rigid]
-    return np.asarray(scipy.linalg.null_space(grouping))
+#: Below this share of the speed no motion is slow enough.
+_SLOWEST = 0.02
 
 
 def with_uncertain_inertia(
@@ -65,7 +58,13 @@ def with_uncertain_inertia(
     """
     rigid = len(description.robot.rigid_parameters)
     everything = regressions(fit.arm, np.arange(rigid), recordings, used)
-    pull = _fit_of(fit.problem, fit.solution.weights, everything) - fit.base.grouping[:, :rigid]
+    # what the weighted fit makes of the columns of the body
+    rows, body = (
+        weighted_rows(part, fit.solution.weights)[0] for part in (fit.problem, everything)
+    )
+    scale = np.linalg.norm(rows, axis=0)
+    made = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
+    pull = made - fit.base.grouping[:, :rigid]
     spread = described_spread(description.robot).ravel() / np.sqrt(3.0)  # of a uniform density
     added = (pull * spread) @ (pull * spread).T
     plain = fit.solution.covariance
@@ -79,31 +78,16 @@ def with_uncertain_inertia(
             np.concatenate(torques(arm, recordings, used)) for arm in (description, still)
         )
         share = float(np.linalg.norm(whole - weight) / np.linalg.norm(whole))
+        # what inertia takes goes with the square of the speed
+        speed = float(np.sqrt(_NEGLIGIBLE / ratio))
+        slower = (
+            'no speed is slow enough for torques as free of noise as these'
+            if speed < _SLOWEST
+            else f'at {speed:.2g} times the speed it would not matter'
+        )
         notes = (
             f'too fast for quasi-static: inertia takes {100.0 * share:.2g} % of the torque by the '
             'description, which is taken off, and what that may be wrong by is in the intervals; '
-            + _slower(float(ratio)),
+            + slower,
         )
     return replace(fit, solution=solution), notes
-
-
-def _slower(ratio: float) -> str:
-    """Say how slow would do: what inertia takes goes with the square of the speed."""
-    share = np.sqrt(_NEGLIGIBLE / ratio)
-    if share < 0.02:
-        return 'no speed is slow enough for torques as free of noise as these'
-    return f'at {share:.2g} times the speed it would not matter'
-
-
-def _fit_of(
-    problem: Sequence[Regression], weights: FloatArray, other: Sequence[Regression]
-) -> FloatArray:
-    """Return what a weighted fit makes of other columns, shape (r, k)."""
-    w, d = (
-        weights[:, :, np.newaxis] * np.concatenate([part.columns for part in parts])
-        for parts in (problem, other)
-    )
-    w, d = (columns.reshape(-1, columns.shape[2]) for columns in (w, d))
-    scale = np.linalg.norm(w, axis=0)
-    solution = np.linalg.lstsq(w / scale, d, rcond=None)[0]
-    return np.asarray(solution / scale[:, np.newaxis])

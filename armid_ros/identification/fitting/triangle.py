@@ -205,16 +205,12 @@ def semi_definite(covariance: FloatArray) -> FloatArray:
     return np.asarray(root @ root.T)
 
 
-def freedom_factor(triangle: Triangle) -> float:
-    """Return rows over degrees of freedom, by which squares of residuals are too small."""
-    rows = float(np.maximum(triangle.counts, 1.0).sum())
-    return rows / max(1.0, rows - triangle.rank)
-
-
 def joint_std(triangle: Triangle, values: FloatArray) -> FloatArray:
     """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
     counts = np.maximum(triangle.counts, 1.0)
-    return np.asarray(np.sqrt(freedom_factor(triangle) * triangle.squares(values) / counts))
+    rows = float(counts.sum())
+    freedom = rows / max(1.0, rows - triangle.rank)  # by which squares of residuals are too small
+    return np.asarray(np.sqrt(freedom * triangle.squares(values) / counts))
 
 
 def fit_triangle(

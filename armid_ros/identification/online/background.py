@@ -73,11 +73,3 @@ class Background:
             job.close()
         self._urgent.clear()
         self._patient.clear()
-
-
-class Foreground(Background):
-    """What does every job at once, where nothing waits for it."""
-
-    def begin(self, job: Job, *, urgent: bool = False) -> None:
-        """Do a job."""
-        at_once(job)

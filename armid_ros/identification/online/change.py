@@ -77,8 +77,8 @@ class Change:
         What explains the torques best.
     rivals : tuple of ChangeCandidate
         What explains them nearly as well.
-    t, detected : float
-        When it changed, to a quarter of a second, and when that was clear [s].
+    t : float
+        When it changed, to a quarter of a second [s].
     size : Estimate
         By how much the quantities of the candidate changed, as far as it was known then; of those
         of which nothing was known the deviation is infinite.
@@ -88,7 +88,6 @@ class Change:
     candidate: ChangeCandidate
     rivals: tuple[ChangeCandidate, ...]
     t: float
-    detected: float
     size: Estimate
 
     @property

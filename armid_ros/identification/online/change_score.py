@@ -123,12 +123,8 @@ class ScoreStatistics:
     score: FloatArray
     strength: FloatArray
 
-    def ratio(self, some: slice) -> float:
-        """Return twice the logarithm of the likelihood ratio of some changes at once."""
-        return float(self.ratios(np.arange(some.start, some.stop)[np.newaxis])[0])
-
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
-        """Return the same for G sets of p changes, of indices of shape (G, p), shape (G,)."""
+        """Return twice the log of the likelihood ratio of G sets of p changes, (G, p): (G,)."""
         information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
         if sets.shape[1] == 1:  # a number is its own eigenvalue, and most changes are numbers
             size, squares = information[:, :, 0], self.score[sets] ** 2

@@ -25,7 +25,7 @@ from armid_ros.identification.online.change_score import (
     ScoreStatistics,
     weighing,
 )
-from armid_ros.identification.online.null_calibration import NullCalibration, Weighed
+from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -165,7 +165,7 @@ class ChangeSearch:
     def interrupt(self) -> None:
         """Begin a new stretch of blocks, which does not continue the one before."""
         self._blocks: deque[Projected] = deque(maxlen=_KEPT)
-        self._waiting: deque[dict[int, Weighed]] = deque()
+        self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
@@ -187,9 +187,9 @@ class ChangeSearch:
         for m in lengths:
             window = yield from self._window(len(self._blocks) - m, residual_scale)
             yield
-            weighed[m] = Weighed(self._ratios(window), window.strength)
+            weighed[m] = self._ratios(window), window.strength
             if self._chance > 0.0:
-                excess = self._usual[m].excess(weighed[m], self._chance)
+                excess = self._usual[m].excess(*weighed[m], self._chance)
                 positive = positive or bool(np.any(excess > 1.0))
             yield
         if positive:
@@ -201,7 +201,7 @@ class ChangeSearch:
         self._waiting.append(weighed)
         if len(self._waiting) > _LENGTHS[-1]:  # by now a change in it would have been named
             for m, values in self._waiting.popleft().items():
-                self._work.begin(self._usual[m].learning(values))
+                self._work.begin(self._usual[m].learning(*values))
         return None
 
     def size(
@@ -242,8 +242,18 @@ class ChangeSearch:
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
-        seen = self._seen(best, first)
-        if not (at[best] > self._least_likelihood() and seen >= _EARLIEST):
+        # the blocks from one on in which the torque of the candidate shows
+        some = self._slices[best]
+        directions = self._directions[:, some]
+        moved = [one.moved[:, some] for one in self._blocks]
+        strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
+        shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
+        seen = int(np.count_nonzero(shows[first:]))
+        # soon after a change, no mere correction of its size counts as another
+        t, before = self._fresh
+        soon = self._blocks[-1].block.end - t < _LEARNING
+        least = max(_CLEAR, _CORRECTION * before) if soon else _CLEAR
+        if not (at[best] > least and seen >= _EARLIEST):
             return None
         alike = [self._candidates[k] for k in np.flatnonzero(at > max(at[best] - _CLEAR, 0.0))]
         # the load where it explains the torques as well: arms pick things up all day
@@ -253,22 +263,6 @@ class ChangeSearch:
             return None
         blocks = tuple(projected.block for projected in self._blocks)
         return FoundChange(blocks, first, named, rivals, float(at[best]))
-
-    def _seen(self, number: int, first: int) -> int:
-        """Return the blocks from one on in which the torque of a candidate shows."""
-        some = self._slices[number]
-        directions = self._directions[:, some]
-        strength = np.array(
-            [np.einsum('pq,pq->q', directions, one.moved[:, some]) for one in self._blocks]
-        )
-        shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
-        return int(np.count_nonzero(shows[first:]))
-
-    def _least_likelihood(self) -> float:
-        """Return what counts as a change: soon after one, no mere correction of its size."""
-        t, likelihood = self._fresh
-        soon = self._blocks[-1].block.end - t < _LEARNING
-        return max(_CLEAR, _CORRECTION * likelihood) if soon else _CLEAR
 
     def _likelihood(self, ratios: FloatArray) -> FloatArray:
         """Return logarithms of likelihoods, each free parameter being charged for."""

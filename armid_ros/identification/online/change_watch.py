@@ -21,7 +21,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 
 from armid_ros.estimate import Estimate
-from armid_ros.identification.online.background import at_once, Background, Foreground, Job, Pieces
+from armid_ros.identification.online.background import at_once, Background, Job, Pieces
 from armid_ros.identification.online.change import Change, ChangeCandidate
 from armid_ros.identification.online.change_score import Block
 from armid_ros.identification.online.change_search import (
@@ -31,12 +31,12 @@ from armid_ros.identification.online.change_search import (
     FoundChange,
 )
 from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
+from armid_ros.identification.online.null_calibration import ResidualScale
 from armid_ros.identification.online.recursive import (
     Learned,
     RecursiveLeastSquares,
     WeightedSample,
 )
-from armid_ros.identification.online.residual_scale import ResidualScale
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -80,10 +80,10 @@ class ChangeWatch:
         Makes rows of what is learned for the tests alone.
     candidates : sequence of ChangeCandidate
         What may change.
-    settings : ChangeSettings, optional
+    settings : ChangeSettings
         How readily a change is believed.
-    work : Background, optional
-        Does what takes long; without it all is done at once.
+    work : Background
+        Does what takes long.
 
     Attributes
     ----------
@@ -97,15 +97,14 @@ class ChangeWatch:
         estimator: RecursiveLeastSquares,
         nuisance: NuisanceRows | None,
         candidates: Sequence[ChangeCandidate],
-        settings: ChangeSettings | None = None,
-        work: Background | None = None,
+        settings: ChangeSettings,
+        work: Background,
     ) -> None:
-        settings = settings or ChangeSettings()
         self._estimator = estimator
         self._nuisance = nuisance
         self._wider = estimator.with_more(() if nuisance is None else nuisance.parameters)
         self._asked = len(estimator.parameters)
-        self._work = work or Foreground()
+        self._work = work
         self._search = ChangeSearch(
             candidates,
             self._among_all(np.hstack([c.directions for c in candidates])),
@@ -179,9 +178,6 @@ class ChangeWatch:
             self._open.samples.append((sample, seed))
         return self._estimator.update(*sample)
 
-    def _for_estimator(self, sample: WeightedSample) -> WeightedSample:
-        return sample._replace(rows=sample.rows[:, : self._asked])
-
     def _among_all(self, directions: FloatArray) -> FloatArray:
         """Return directions in the parameters of the estimator in those of the wider one."""
         more = len(self._wider.parameters) - self._asked
@@ -232,23 +228,19 @@ class ChangeWatch:
             if narrow is not None:
                 waiting.append(narrow)
             if narrow is None or len(waiting) == _WIDENED or number == len(samples):
-                whole += self._with_nuisance(waiting)
+                seeds = [seed for _, seed in waiting if seed is not None]
+                own = [sample for sample, _ in waiting]
+                if self._nuisance is not None and seeds:
+                    narrow_rows = np.stack([sample.rows for sample in own])
+                    rows = np.concatenate([narrow_rows, self._nuisance.rows(seeds)], axis=2)
+                    pairs = zip(own, rows, strict=True)
+                    own = [sample._replace(rows=wide) for sample, wide in pairs]
+                whole += own
                 waiting = []
                 yield
             if narrow is None and self._nuisance is not None:
                 self._nuisance.reset()
         return whole
-
-    def _with_nuisance(self, samples: Sequence[Narrow]) -> list[WeightedSample]:
-        seeds = [seed for _, seed in samples if seed is not None]
-        if self._nuisance is None or not seeds:
-            return [sample for sample, _ in samples]
-        narrow = np.stack([sample.rows for sample, _ in samples])
-        rows = np.concatenate([narrow, self._nuisance.rows(seeds)], axis=2)
-        return [
-            WeightedSample(wide, sample.tau, sample.weights)
-            for wide, (sample, _) in zip(rows, samples, strict=True)
-        ]
 
     def _summed(
         self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
@@ -282,8 +274,7 @@ class ChangeWatch:
         values, covariance = yield from self._search.size(found, self._residual_scale_of_all)
         yield
         size = Estimate(found.best.parameters, values, covariance)
-        begin, detected = found.blocks[found.first].begin, found.blocks[-1].end
-        change = Change(found.best, found.rivals, begin, detected, size)
+        change = Change(found.best, found.rivals, found.blocks[found.first].begin, size)
         yield from self._learn_again(found, change.reopened)
         louder = yield from self._louder(found.blocks[found.after :], change.reopened.shape[1])
         self.changes.append(
@@ -316,15 +307,12 @@ class ChangeWatch:
 
     def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)
-        yield from self._learn(again, [self._for_estimator(sample) for sample in samples])
+        own = [sample._replace(rows=sample.rows[:, : self._asked]) for sample in samples]
+        yield from self._learn(again, own)
 
     def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:
-        """
-        Return how much larger squares of residuals are than usual, 1 at least.
-
-        A change shakes the arm, and its motion is none that the parameters were learned from.
-
-        """
+        """Return how much larger squares of residuals are than usual, 1 at least."""
+        # A change shakes the arm, and its motion is none that the parameters were learned from.
         squares = count = 0.0
         for block in blocks:
             rows, tau, weights = (np.stack(part) for part in zip(*block.samples, strict=True))

@@ -57,10 +57,7 @@ class StreamChecks:
         """Return what to mend before anything can be identified; empty when all is well."""
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
-        return self._position_problem()
-
-    def _position_problem(self) -> str:
-        """Return what is wrong with the range; it is asked for each row, and seldom grows."""
+        # the range is judged for each row, and seldom grows
         ranged = self._lowest[0].tobytes() + self._highest[0].tobytes()
         if self._judged is None or self._judged[0] != ranged:
             problem = position_problem(self._robot, self._lowest[0], self._highest[0])

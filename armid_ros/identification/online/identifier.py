@@ -16,15 +16,12 @@ from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.checks import MissingSamples, StreamChecks
-from armid_ros.identification.online.learner import Learner
+from armid_ros.identification.online.learner import Learner, OnlineSettings
 from armid_ros.identification.online.nuisance_rows import Seed
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
-from armid_ros.identification.online.settings import OnlineSettings
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import RowNoise
 from armid_ros.identification.samples.joint_gate import joint_gate
-from armid_ros.identification.samples.spikes import SpikeGate
-from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -35,6 +32,11 @@ __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 
 #: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
 _FORGOTTEN = 10.0
+#: A joint that is slower [rad/s or m/s] for longer than this [s], which is longer than a reversal
+#: takes, is at rest: where dry friction may hold it, its torque says nothing and is not used.
+_REST_VELOCITY, _REST_TIME = 0.01, 0.1
+#: Successive samples that may be damaged by chance; what lasts longer is real.
+_LONGEST_DAMAGE = 10
 #: Pieces of work in the background per second, at the least; one for a sample at 1 kHz.
 _PIECES = 400.0
 #: Samples between two rows of which one is for learning from the row alone; where there are fewer,
@@ -135,12 +137,18 @@ class OnlineIdentifier:
         self._filter = CausalFilter(
             robot.n_joints,
             settings.cutoff,
-            period=settings.period,
             max_gap=settings.max_gap,
             measured_velocity=settings.measured_velocity,
             prismatic=robot.prismatic,
         )
-        self._gate = _gate(arm, settings)
+        measured = 'qvt' if settings.measured_velocity else 'qt'
+        self._gate = joint_gate(
+            robot.prismatic,
+            measured,
+            torque_limit=robot.torque_limit,
+            max_gap=_LONGEST_DAMAGE,
+            false_alarm_time=(settings.changes or ChangeSettings()).false_alarm_time,
+        )
         self._checks = StreamChecks(robot)
         self._missing = MissingSamples()
         self.latest: tuple[OnlineSample, ...] = ()
@@ -166,8 +174,7 @@ class OnlineIdentifier:
         self._checks.reset()
         self._missing.reset()
         self.latest = ()
-        if self._gate is not None:
-            self._gate.reset()
+        self._gate.reset()
 
     def update(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
@@ -196,16 +203,11 @@ class OnlineIdentifier:
             self._missing.take(t, self._filter.period)
         if signal is None:
             self.latest = ()
-        elif self._gate is None:
-            self.latest = self._take(t, signal)
         else:
             good = self._gate.take(t, signal, self._without_consequence)
-            self.latest = tuple(one for sample in good for one in self._take_good(sample))
-        self._go_on(learned)
-        return self.latest[-1] if self.latest else None
-
-    def _go_on(self, learned: bool) -> None:
-        """Do some of what takes long, with a sample that does nothing else if there are such."""
+            found = [self._take(one.t, one.x, begins=one.begins) for one in good]
+            self.latest = tuple(one for brought in found for one in brought)
+        # some of what takes long, with a sample that does nothing else if there are such
         period = self._filter.period or 0.0
         if self.latest:
             busy = not self._crowded
@@ -215,6 +217,7 @@ class OnlineIdentifier:
             self._learner.settle()
             self._work.advance(max(1, round(_PIECES * period)))
         self._crowded = bool(self.latest)
+        return self.latest[-1] if self.latest else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Finish what is under way, for a job can be in one place only."""
@@ -222,21 +225,24 @@ class OnlineIdentifier:
         self._work.finish()
         return self.__dict__
 
-    def _take_good(self, sample: StreamSample) -> tuple[OnlineSample, ...]:
-        """Learn from a sample of the gate, which says where a stretch begins."""
-        if sample.begins:
-            self._filter.restart('position_step')
-        return self._take(sample.t, sample.x)
-
-    def _take(self, t: float, signal: FloatArray) -> tuple[OnlineSample, ...]:
-        """Learn from a good sample; return what it brought, if anything."""
+    def _take(
+        self, t: float, signal: FloatArray, *, begins: bool = False
+    ) -> tuple[OnlineSample, ...]:
+        """Learn from a good sample, which may begin a stretch; return what it brought."""
         n = self.arm.robot.n_joints
+        if begins:
+            self._filter.restart('position_step')
         self._checks.take(t, signal[:n], signal[-n:])
         motion = self._filter.advance(t, signal)
         if motion is None:
             return ()
         if self._filter.generation != self._generation:
-            self._begin()
+            # the row filter starts anew, together with the motion filter
+            self._row_filter.reset()
+            self._learner.interrupt()
+            self._generation = self._filter.generation
+            self._last_row = self._last_useless = self._noise = None
+            self._last_moving[:] = -np.inf
         useless = self._watch_rest(motion)
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
@@ -320,8 +326,7 @@ class OnlineIdentifier:
     @property
     def rejected(self) -> Mapping[str, int]:
         """Joint states left out, by reason; see CausalFilter and SpikeGate."""
-        damaged = Counter() if self._gate is None else self._gate.rejected
-        return Counter(self._filter.rejected) + damaged
+        return Counter(self._filter.rejected) + self._gate.rejected
 
     @property
     def error(self) -> str:
@@ -331,7 +336,6 @@ class OnlineIdentifier:
     @property
     def spikes(self) -> Mapping[tuple[str, str], int]:
         """Joint states left out as a signal jumped and came back, by joint and signal."""
-        counts = {} if self._gate is None else self._gate.spikes
         joints = self.arm.robot.joints
         names = (
             ('position', 'velocity', 'effort')
@@ -340,7 +344,7 @@ class OnlineIdentifier:
         )
         return {
             (joints[k % len(joints)], names[k // len(joints)]): count
-            for k, count in counts.items()
+            for k, count in self._gate.spikes.items()
         }
 
     @property
@@ -354,22 +358,12 @@ class OnlineIdentifier:
         pole = self._filter.pole
         return None if pole is None else 3.0 / pole + self._row_filter.delay
 
-    def _begin(self) -> None:
-        """Start the row filter anew, together with the motion filter."""
-        self._row_filter.reset()
-        self._learner.interrupt()
-        self._generation = self._filter.generation
-        self._last_row = None
-        self._last_moving[:] = -np.inf
-        self._last_useless = None
-        self._noise = None
-
     def _watch_rest(self, motion: CausalMotion) -> FloatArray:
         """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""
         if self._last_useless is None:
             self._last_useless = np.full(len(motion.q), motion.t)
-        self._last_moving[np.abs(motion.dq) >= self.settings.rest_velocity] = motion.t
-        resting = motion.t - self._last_moving > self.settings.rest_time
+        self._last_moving[np.abs(motion.dq) >= _REST_VELOCITY] = motion.t
+        resting = motion.t - self._last_moving > _REST_TIME
         self._last_useless[resting & self._held] = motion.t
         return self._last_useless
 
@@ -378,7 +372,13 @@ class OnlineIdentifier:
     ) -> OnlineSample:
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
-        stacked = np.column_stack([motion.tau, self._rows(one)])
+        robot = self.arm.robot
+        rigid = pin.computeJointTorqueRegressor(
+            robot.model, self._data, motion.q, motion.dq, motion.ddq
+        )
+        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
+        columns = np.concatenate([rigid, self.arm.effect_columns(one)[0]], axis=1)
+        stacked = np.column_stack([motion.tau, columns.take(self.base.independent, axis=1)])
         filtered = self._row_filter.update(step, stacked.reshape(-1))[2].reshape(stacked.shape)
         measured, rows = filtered[:, 0], filtered[:, 1:]
         noise = self._row_noise()
@@ -398,15 +398,6 @@ class OnlineIdentifier:
             np.multiply(self._learner.residual_deviation, self._row_noise().single, out=floor[-n:])
         return floor
 
-    def _rows(self, motion: Motion) -> FloatArray:
-        """Return the regressor of one sample in the independent columns, shape (n, r)."""
-        robot = self.arm.robot
-        q, dq, ddq = motion.q[0], motion.dq[0], motion.ddq[0]
-        rigid = pin.computeJointTorqueRegressor(robot.model, self._data, q, dq, ddq)
-        rigid = rigid.reshape(robot.n_joints, -1)  # of a single joint it is a vector
-        effects = self.arm.effect_columns(motion)[0]
-        return np.concatenate([rigid, effects], axis=1).take(self.base.independent, axis=1)
-
     def _row_noise(self) -> RowNoise:
         """Return the noise of the rows since the filters were started."""
         if self._noise is None:
@@ -414,17 +405,3 @@ class OnlineIdentifier:
             assert period is not None and pole is not None
             self._noise = RowNoise.of(period, pole, self._row_filter.pole)
         return self._noise
-
-
-def _gate(arm: ArmModel, settings: OnlineSettings) -> SpikeGate | None:
-    """Return what leaves damaged samples out, if that is wanted."""
-    if settings.longest_damage < 1:
-        return None
-    changes = settings.changes or ChangeSettings()
-    return joint_gate(
-        arm.robot.prismatic,
-        'qvt' if settings.measured_velocity else 'qt',
-        torque_limit=arm.robot.torque_limit,
-        max_gap=settings.longest_damage,
-        false_alarm_time=changes.false_alarm_time,
-    )

@@ -112,7 +112,13 @@ class LearningProgress:
             self._past.popleft()
         if self._past[0][0] > t - _WAIT:
             return ()
-        unknown = self._share(estimate) * estimate.std
+        # the torque that a joint usually takes is what moves the links of the description and what
+        # effects, friction above all, take: by how much they are larger than they are uncertain
+        known = np.maximum(np.abs(estimate.values) - _CERTAIN * estimate.std, 0.0)
+        effects = self._size * np.where(self._of_effects, known, 0.0)
+        usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
+        share = self._size / np.maximum(usual, 1e-3 * usual.max())[:, np.newaxis]
+        unknown = share.max(axis=0) * estimate.std
         learned = np.where(unknown > _NOTHING, _BEGUN, _LEARNED)
         stuck = (unknown > _KNOWN) & (estimate.std > learned * self._past[0][1])
         by_joint: dict[str, list[int]] = {}
@@ -122,20 +128,6 @@ class LearningProgress:
             Unlearned(joint, tuple(estimate.parameters[k] for k in some), float(unknown[some[0]]))
             for joint, some in by_joint.items()
         )
-
-    def _share(self, estimate: Estimate) -> FloatArray:
-        """
-        Return what a unit of each parameter makes of the torque that a joint usually takes, (r,).
-
-        It takes what moves the links of the description and what effects, friction above all, are
-        known to take: by how much they are larger than they are uncertain.
-
-        """
-        known = np.maximum(np.abs(estimate.values) - _CERTAIN * estimate.std, 0.0)
-        effects = self._size * np.where(self._of_effects, known, 0.0)
-        usual = np.sqrt(self._rigid**2 + np.sum(effects**2, axis=1))
-        share = self._size / np.maximum(usual, 1e-3 * usual.max())[:, np.newaxis]
-        return np.asarray(share.max(axis=0))
 
 
 def too_little_motion(unlearned: Sequence[Unlearned]) -> str:

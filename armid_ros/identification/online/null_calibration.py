@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Distribution of likelihood ratios while nothing changes, and the limit that it gives.
+Distribution of likelihood ratios and residuals while nothing changes, and the limit that it gives.
 
 Twice the logarithm is chi-square of p degrees only if noise is white and the model right. Noise
 that is coloured, and what the model lacks, make it larger, by a factor that is measured for every
@@ -13,13 +13,10 @@ distribution, its degrees of freedom counting how much was measured.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
-from armid_ros.identification.online.background import at_once, Job, Pieces
-from armid_ros.identification.online.history import History
+from armid_ros.identification.online.background import Job, Pieces
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 from scipy import special, stats
 
 #: Windows that are remembered: ten minutes of four a second.
@@ -45,24 +42,51 @@ _ROUNDS = 8
 _FEWEST = 12.0
 #: Numbers that are looked at in one piece of work.
 _AT_A_TIME = 4_000
+#: Blocks that are remembered: a minute of four a second.
+_BLOCKS = 240
+#: Blocks before the assumption is given up.
+_FEWEST_BLOCKS = 16
+#: Median of the square of a standard normal variable.
+_MEDIAN = float(stats.chi2(1).median())
 
 
-@dataclass(frozen=True, eq=False)
-class Weighed:
+class History:
     """
-    What a window says of C candidates with Q quantities in all.
+    Rows of numbers, of which the last ones are remembered.
 
-    Attributes
+    Parameters
     ----------
-    ratios : ndarray, shape (C,)
-        Twice the logarithms of the likelihood ratios; 0: no data.
-    strength : ndarray, shape (Q,)
-        Squares of the torques that a unit of each quantity would make.
+    width : int
+        Numbers in a row.
+    most : int
+        Rows that are remembered.
 
     """
 
-    ratios: FloatArray
-    strength: FloatArray
+    def __init__(self, width: int, most: int) -> None:
+        self._rows = np.empty((16, width))
+        self._most = most
+        self._end = 0
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return min(self._end, self._most)
+
+    def append(self, row: FloatArray) -> None:
+        """Take in a row."""
+        if self._end == len(self._rows):
+            kept = self.values
+            size = min(2 * len(self._rows), 2 * self._most)
+            self._rows = np.empty((size, self._rows.shape[1]))
+            self._rows[: len(kept)] = kept
+            self._end = len(kept)
+        self._rows[self._end] = row
+        self._end += 1
+
+    @property
+    def values(self) -> FloatArray:
+        """Return the rows, oldest first; they stay as they are when others come."""
+        return self._rows[self._end - len(self) : self._end]
 
 
 class NullCalibration:
@@ -110,16 +134,22 @@ class NullCalibration:
         self._freedom = np.zeros(len(sizes))
         self._limits: tuple[FloatArray, float, FloatArray] | None = None
 
-    def learn(self, window: Weighed) -> None:
-        """Take in a window in which nothing changed."""
-        at_once(self.learning(window))
+    def learning(self, ratios: FloatArray, strength: FloatArray) -> Job:
+        """
+        Take in a window in which nothing changed, piece by piece.
 
-    def learning(self, window: Weighed) -> Job:
-        """Take in a window in which nothing changed, piece by piece."""
-        if not np.any(window.ratios > 0.0):
+        Parameters
+        ----------
+        ratios : ndarray, shape (C,)
+            Twice the logarithms of the likelihood ratios; 0: no data.
+        strength : ndarray, shape (Q,)
+            Squares of the torques that a unit of each quantity would make.
+
+        """
+        if not np.any(ratios > 0.0):
             return
-        self._ratios.append(window.ratios)
-        self._strengths.append(window.strength)
+        self._ratios.append(ratios)
+        self._strengths.append(strength)
         self._fresh += 1
         if self._fresh < max(_EVERY, _SHARE * len(self._ratios)):
             return
@@ -144,28 +174,28 @@ class NullCalibration:
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
             some = np.arange(len(single))[columns][judged[columns]]
-            single[some] = np.log(self._fitted(later[:, some], counts[some], some))
+            # the factors with which the means of limited statistics are as expected
+            seen, most, mean = later[:, some], self._most[some], self._mean[some] * counts[some]
+            factor = np.sum(seen, axis=0) / (self._sizes[some] * counts[some])
+            for _ in range(_ROUNDS):
+                factor = factor * np.sum(np.minimum(seen / factor, most), axis=0) / mean
+            single[some] = np.log(factor)
             yield
-        value, left = _drawn_together(
-            single[judged], self._variance[judged] / independent[judged], self._sources
-        )
+        # shrunk towards their mean as far as they are uncertain
+        value, variance = single[judged], self._variance[judged] / independent[judged]
+        middle = float(np.average(value, weights=1.0 / variance))
+        apart = float(np.average((value - middle) ** 2 - variance, weights=1.0 / variance))
+        spread = max(apart, _LEAST_SPREAD**2)
+        middle = float(np.average(value, weights=1.0 / (variance + spread)))
+        drawn = variance / (variance + spread)
+        left = drawn * spread + drawn**2 * np.mean(variance + spread) / self._sources
         factors = np.full(len(self._sizes), np.nan)
-        factors[judged] = np.exp(value).clip(1.0)
+        factors[judged] = np.exp(value + drawn * (middle - value)).clip(1.0)
         yield
         tail = yield from self._tail_of(later[:, judged], (factors * self._rare)[judged])
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / left  # what a mean square of so many degrees varies by
-
-    def _fitted(
-        self, seen: FloatArray, counts: npt.NDArray[np.intp], some: npt.NDArray[np.intp]
-    ) -> FloatArray:
-        """Return the factors with which the means of limited statistics are as expected."""
-        most, mean = self._most[some], self._mean[some] * counts
-        factors = np.sum(seen, axis=0) / (self._sizes[some] * counts)
-        for _ in range(_ROUNDS):
-            factors = factors * np.sum(np.minimum(seen / factors, most), axis=0) / mean
-        return np.asarray(factors)
 
     @staticmethod
     def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
@@ -182,7 +212,7 @@ class NullCalibration:
         place = (1.0 - _RARE) * (count - 1) - (count - len(largest))
         return float(np.interp(place, np.arange(len(largest)), np.sort(largest)))
 
-    def excess(self, window: Weighed, chance: float) -> FloatArray:
+    def excess(self, ratios: FloatArray, strength: FloatArray, chance: float) -> FloatArray:
         """
         Return statistics over what they exceed with so small a chance; 0: too early to say.
 
@@ -191,8 +221,8 @@ class NullCalibration:
 
         Parameters
         ----------
-        window : Weighed
-            The statistics.
+        ratios, strength : ndarray
+            The statistics, as of `learning`.
         chance : float
             Of each to exceed its limit.
 
@@ -200,10 +230,10 @@ class NullCalibration:
         judged = self._freedom > 0.0
         result = np.zeros(len(self._sizes))
         stronger = np.maximum.reduceat(
-            window.strength / self._strength.clip(_SMALLEST), self._first
+            strength / self._strength.clip(_SMALLEST), self._first
         ).clip(1.0)
         usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
-        result[judged] = window.ratios[judged] / (usual * self._limits_at(chance)[judged])
+        result[judged] = ratios[judged] / (usual * self._limits_at(chance)[judged])
         return result
 
     def _limits_at(self, chance: float) -> FloatArray:
@@ -228,14 +258,48 @@ def _in_pieces(values: FloatArray) -> Iterator[slice]:
         yield slice(first, first + width)
 
 
-def _drawn_together(
-    values: FloatArray, variance: FloatArray, independent: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return values shrunk towards their mean as far as they are uncertain, and variances."""
-    mean = np.average(values, weights=1.0 / variance)
-    seen = float(np.average((values - mean) ** 2 - variance, weights=1.0 / variance))
-    spread = max(seen, _LEAST_SPREAD**2)
-    mean = np.average(values, weights=1.0 / (variance + spread))
-    share = variance / (variance + spread)
-    left = share * spread + share**2 * np.mean(variance + spread) / independent
-    return values + share * (mean - values), left
+class ResidualScale:
+    """
+    Standard deviation of residuals that last, per joint, relative to noise as assumed.
+
+    Sums of residuals over a block: what is quick cancels in them. By their median, which neither
+    the first blocks nor a change that is not yet noticed moves.
+
+    Parameters
+    ----------
+    least : float
+        What the factor is at least.
+
+    """
+
+    def __init__(self, least: float) -> None:
+        self._least = least
+        self._seen: History | None = None
+        self._value: FloatArray | None = None
+
+    @property
+    def value(self) -> FloatArray:
+        """Return the factor of every joint, shape (m,); 1 in the beginning."""
+        return np.ones(1) if self._value is None else self._value
+
+    def learn(self, residual: FloatArray, weights: FloatArray) -> None:
+        """Take in the residuals of a block, in units of the assumed noise, shape (k, m)."""
+        used = np.sum(weights > 0.0, axis=0)
+        if not used.any():
+            return  # an arm at rest must not forget what it is like in motion
+        squares = np.sum(residual, axis=0) ** 2
+        if self._seen is None:
+            self._seen = History(len(squares), _BLOCKS)
+        self._seen.append(np.where(used > 0, squares / np.maximum(used, 1), np.nan))
+        if len(self._seen) < _FEWEST_BLOCKS:
+            return
+        later = self._seen.values[len(self._seen) // 2 :]
+        known = np.any(later > 0.0, axis=0)
+        value = np.ones(later.shape[1]) if self._value is None else self._value.copy()
+        # the medians of the numbers in every column; numpy's nanmedian takes ten times it
+        values = later[:, known]
+        ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
+        columns = np.arange(values.shape[1])
+        medians = (ordered[(counts - 1) // 2, columns] + ordered[counts // 2, columns]) / 2.0
+        value[known] = np.sqrt(medians / _MEDIAN)
+        self._value = np.maximum(value, self._least)

@@ -27,7 +27,6 @@ from armid_ros.identification.online import square_root
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 #: A smaller forgetting factor forgets within ten samples, which is not identification.
 SMALLEST_FORGETTING = 0.9
@@ -90,11 +89,9 @@ class RecursiveLeastSquares:
     forgetting : float
         1 keeps everything. Below 1, a direction that is excited all the time is estimated from
         about the last 1 / (1 - forgetting) samples.
-    prior : Estimate, optional
-        What is known beforehand. Without it all values are those of `start` within PRIOR_STD,
-        which is a ridge too weak to be seen once a parameter is excited.
     start : array_like, shape (P,), optional
-        Values to begin with when there is no prior, zero by default.
+        Values to begin with, zero by default, within PRIOR_STD: a ridge too weak to be seen once a
+        parameter is excited.
     scale_covariance : bool, optional
         Whether the covariance is multiplied by ``variance_factor``; by default when the noise is
         not given. Right when the noise is known up to a factor.
@@ -102,7 +99,7 @@ class RecursiveLeastSquares:
     Raises
     ------
     IdentificationError
-        If the noise, the forgetting factor or the prior cannot be used.
+        If the noise, the forgetting factor or the start cannot be used.
 
     Attributes
     ----------
@@ -119,7 +116,6 @@ class RecursiveLeastSquares:
         noise: npt.ArrayLike | None = None,
         *,
         forgetting: float = 1.0,
-        prior: Estimate | None = None,
         start: npt.ArrayLike | None = None,
         scale_covariance: bool | None = None,
     ) -> None:
@@ -127,32 +123,37 @@ class RecursiveLeastSquares:
         self.parameters = parameters
         self.samples = 0
         self._forgetting = float(forgetting)
-        self._noise = None if noise is None else _checked_noise(noise)
+        self._noise = None if noise is None else np.array(noise, dtype=np.float64)
+        if self._noise is not None and (
+            self._noise.ndim != 1 or not np.all((self._noise > 0.0) & (self._noise < np.inf))
+        ):
+            raise IdentificationError(
+                f'noise {self._noise}: has to be one finite standard deviation > 0 for each joint'
+            )
         self._scale = noise is None if scale_covariance is None else scale_covariance
-        self._prior = square_root.prior_root(parameters, prior, start)
-        # without a prior the first P observations fit exactly and say nothing of the noise
-        self._initial_freedom = -float(len(parameters)) if prior is None else 0.0
+        count = len(parameters)
+        values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
+        if values.shape != (count,) or not np.all(np.isfinite(values)):
+            raise IdentificationError(f'start {values}: has to be {count} finite values')
+        self._start = values
         self.reset()
 
     def with_more(self, parameters: tuple[ParameterName, ...]) -> RecursiveLeastSquares:
         """Return an estimator in its beginning, of more parameters that nothing is known of."""
-        more, (root, right) = len(parameters), self._prior
         wider = copy(self)
         wider.parameters = self.parameters + parameters
-        wider._prior = (
-            scipy.linalg.block_diag(root, np.eye(more) / square_root.PRIOR_STD),
-            np.concatenate([right, np.zeros((more, 1))]),
-        )
-        wider._initial_freedom = self._initial_freedom - float(more)
+        wider._start = np.concatenate([self._start, np.zeros(len(parameters))])
         wider.reset()
         return wider
 
     def reset(self) -> None:
-        """Return to the prior."""
+        """Return to the beginning."""
         self.samples = 0
-        self._root, self._right = (np.array(part, order='F') for part in self._prior)
+        self._root = np.asfortranarray(np.eye(len(self._start)) / square_root.PRIOR_STD)
+        self._right = np.asfortranarray(self._start[:, np.newaxis] / square_root.PRIOR_STD)
         self._squares = 0.0
-        self._freedom = self._initial_freedom
+        # the first P observations fit exactly and say nothing of the noise
+        self._freedom = -float(len(self._start))
         self._values = square_root.solved(self._root, self._right)
 
     def update(
@@ -307,14 +308,14 @@ class RecursiveLeastSquares:
         """
         Variance of the weighted residuals: 1 when the noise is as given.
 
-        Without a prior, 1 as well until there are more observations than parameters.
+        It is 1 as well until there are more observations than parameters.
 
         """
         return self._squares / self._freedom if self._freedom >= 1.0 else 1.0
 
     @property
     def condition_number(self) -> float:
-        """Condition number of the weighted regressor so far, prior included."""
+        """Condition number of the weighted regressor so far."""
         singular = np.linalg.svd(self._root, compute_uv=False)
         return float(singular[0] / singular[-1])
 
@@ -354,12 +355,3 @@ def check_forgetting(factor: float) -> None:
         raise IdentificationError(
             f'forgetting factor {factor}: has to be from {SMALLEST_FORGETTING} to 1'
         )
-
-
-def _checked_noise(noise: npt.ArrayLike) -> FloatArray:
-    values = np.array(noise, dtype=np.float64)
-    if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
-        raise IdentificationError(
-            f'noise {values}: has to be one finite standard deviation > 0 for each joint'
-        )
-    return values

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from armid_ros.identification.fitting.least_squares import LEAST_LEFT
-from armid_ros.identification.online.background import Background, Foreground, Job, Pieces
+from armid_ros.identification.online.background import Background, Job, Pieces
 from armid_ros.identification.online.square_root import PRIOR_STD
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -44,20 +44,10 @@ _LEVEL = 0.975
 
 @dataclass(frozen=True, eq=False)
 class _Bands:
-    """
-    Products of rows and torques, joint by joint and band by band.
+    """Products of the transforms of rows and torques, joint by joint and band by band."""
 
-    Attributes
-    ----------
-    products : ndarray, shape (m, B, P + 1, P + 1)
-        Of the transforms of the columns, torques last.
-    counts : ndarray, shape (m, B)
-        Real numbers of every column that they are sums over.
-
-    """
-
-    products: FloatArray
-    counts: FloatArray
+    products: FloatArray  # (m, B, P + 1, P + 1), torques last
+    counts: FloatArray  # real numbers of every column that they are sums over, (m, B)
 
     @property
     def information(self) -> FloatArray:
@@ -75,17 +65,15 @@ class RobustCovariance:
         Rows in a window, which should last longer than errors do.
     forgetting : float
         Share of what was that is not forgotten with a row; no window takes more than it brings.
-    work : Background, optional
-        Sums windows up; without it a window is summed up at once.
+    work : Background
+        Sums windows up.
 
     """
 
-    def __init__(
-        self, window: int, forgetting: float = 1.0, work: Background | None = None
-    ) -> None:
+    def __init__(self, window: int, forgetting: float, work: Background) -> None:
         self._window = window
         self.forgetting = forgetting
-        self._work = work or Foreground()
+        self._work = work
         self.reset()
 
     def reset(self) -> None:
@@ -148,7 +136,13 @@ class RobustCovariance:
         if self._latest is not None:
             settled = self._settled or _nothing(window)
             yield from _add(settled, self._latest)
-            kept = max(self.forgetting**self._window, 1.0 - _brought(window, settled))
+            # the share of what is known with a window that it brings, mean of all directions
+            both = settled.information + window.information
+            size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
+            scale, ridge = np.outer(size, size), _RIDGE * np.eye(len(size))
+            share = np.linalg.solve(both / scale + ridge, window.information / scale)
+            brought = float(np.trace(share)) / len(size)
+            kept = max(self.forgetting**self._window, 1.0 - brought)
             yield
             if kept < 1.0:
                 for products in settled.products:
@@ -156,10 +150,10 @@ class RobustCovariance:
                     yield
                 settled.counts[:] *= kept
             self._settled = settled
-            both = _nothing(window)
-            yield from _add(both, settled)
-            yield from _add(both, window)
-            self._shape = yield from _shape(both, values)
+            whole = _nothing(window)
+            yield from _add(whole, settled)
+            yield from _add(whole, window)
+            self._shape = yield from _shape(whole, values)
         self._latest = window
 
     def _reopened(self, directions: FloatArray, values: FloatArray) -> Job:
@@ -216,15 +210,6 @@ def _add(some: _Bands, more: _Bands) -> Job:
     some.counts[:] += more.counts
 
 
-def _brought(window: _Bands, before: _Bands) -> float:
-    """Return the share of what is known with a window that it brings, mean of all directions."""
-    both = before.information + window.information
-    size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
-    scale = np.outer(size, size)
-    share = np.linalg.solve(both / scale + _RIDGE * np.eye(len(size)), window.information / scale)
-    return float(np.trace(share)) / len(size)
-
-
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:
     """Return the products of a window of rows [W, y] of shape (m, k, P + 1), in octaves."""
     joints, count, size = columns.shape
@@ -250,13 +235,9 @@ def _transformed(columns: FloatArray) -> Pieces[_Bands]:
 
 
 def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """
-    Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it.
-
-    The noise power in a band is that of the residuals, corrected for what the fit absorbed; the
-    covariance of every value is a sum over bands, and as certain as that (Satterthwaite 1946).
-
-    """
+    """Return a root of R_M^-T J R_M^-1, R_M that of M, and what widens deviations by it."""
+    # The noise power in a band is that of the residuals, corrected for what the fit absorbed; the
+    # covariance of every value is a sum over bands, and as certain as that (Satterthwaite 1946).
     information, scores = bands.information, bands.products[..., :-1, :-1]
     size = np.sqrt(np.diag(information).clip(PRIOR_STD**-2))
     ridge = _RIDGE * np.eye(len(size))
@@ -266,7 +247,13 @@ def _shape(bands: _Bands, values: FloatArray) -> Pieces[tuple[FloatArray, FloatA
     root = inverse / size[:, np.newaxis]
     covariance = root @ root.T
     yield
-    taken, power = yield from _each_joint(bands, covariance, np.append(values, -1.0))
+    # what a fit takes of the scores, and the squares of its residuals, each (m, B)
+    ends, parts = np.append(values, -1.0), []
+    for products in bands.products:
+        absorbed = np.tensordot(products[:, :-1, :-1], covariance, axes=2)
+        parts.append((absorbed, products @ ends @ ends))
+        yield
+    taken, power = (np.array(part) for part in zip(*parts, strict=True))
     counts = bands.counts.clip(_SMALLEST)
     freedom = counts * (1.0 - taken / counts).clip(LEAST_LEFT)
     noise = np.maximum(power, _LEAST_NOISE * bands.products[..., -1, -1]) / freedom
@@ -301,15 +288,3 @@ def _triangle(information: FloatArray) -> FloatArray:
         root = np.sqrt(sizes.clip(_RIDGE))[:, np.newaxis] * vectors.T
         triangle = np.linalg.qr(root, mode='r')
         return np.asarray(np.where(np.diag(triangle) < 0.0, -1.0, 1.0)[:, np.newaxis] * triangle)
-
-
-def _each_joint(
-    bands: _Bands, covariance: FloatArray, ends: FloatArray
-) -> Pieces[tuple[FloatArray, FloatArray]]:
-    """Return what a fit takes of the scores, and the squares of its residuals, each (m, B)."""
-    taken, power = [], []
-    for products in bands.products:
-        taken.append(np.tensordot(products[:, :-1, :-1], covariance, axes=2))
-        power.append(products @ ends @ ends)
-        yield
-    return np.array(taken), np.array(power)

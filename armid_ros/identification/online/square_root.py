@@ -9,12 +9,8 @@ Reflections take rows in and leave R^T R exactly what the rows make (Bierman 197
 
 from __future__ import annotations
 
-from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
-import scipy.linalg
 from scipy.linalg import lapack
 
 #: Standard deviation of every parameter before the first sample, in its SI unit. Robots have
@@ -27,31 +23,6 @@ _LOSS_RATIO = 2.0
 #: The most that one sample may take away from the old information in any direction.
 _LARGEST_LOSS = 0.5
 _BLOCK = 8  # columns of a Householder block; the fastest for 60 to 120 parameters
-
-
-def prior_root(
-    parameters: tuple[ParameterName, ...], prior: Estimate | None, start: npt.ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return the triangle R, shape (P, P), and R theta, shape (P, 1), of the prior."""
-    if prior is None:
-        count = len(parameters)
-        values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
-        if values.shape != (count,) or not np.all(np.isfinite(values)):
-            raise IdentificationError(f'start {values}: has to be {count} finite values')
-        return np.eye(count) / PRIOR_STD, values[:, np.newaxis] / PRIOR_STD
-    if prior.parameters != parameters:
-        unknown = [p for p in prior.parameters if p not in parameters] or 'the order'
-        raise IdentificationError(f'the prior is of other parameters; different: {unknown}')
-    try:
-        factor = np.linalg.cholesky(prior.covariance)
-    except np.linalg.LinAlgError:
-        raise IdentificationError(
-            'the covariance of the prior is not positive definite: it has to give every '
-            'parameter an uncertainty'
-        ) from None
-    inverse = scipy.linalg.solve_triangular(factor, np.eye(len(parameters)), lower=True)
-    root: FloatArray = np.linalg.qr(inverse).R
-    return root, root @ prior.values[:, np.newaxis]
 
 
 def solved(root: FloatArray, right: FloatArray) -> FloatArray:
@@ -104,7 +75,11 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     whitened, _ = lapack.dtrtrs(root, rows.T, trans=1)
     gains, directions = np.linalg.eigh(whitened.T @ whitened)
     budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
-    level = min(_level(np.maximum(gains, 0.0), budget), _LARGEST_LOSS)
+    # the level for which the gains cut off at it, ascending, add up to the budget
+    some = np.maximum(gains, 0.0)
+    levels = (budget - np.cumsum(some) + some) / np.arange(len(some), 0, -1)
+    above = some >= levels
+    level = min(float(levels[np.argmax(above)]), _LARGEST_LOSS) if above.any() else _LARGEST_LOSS
     kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))
     if np.any(kept > 0.0):
         root, *_ = lapack.dtpqrt(
@@ -140,12 +115,3 @@ def inverse_products(root: FloatArray) -> FloatArray:
     """Return R^-1 R^-T, the covariance for noise of variance 1, shape (P, P)."""
     inverse, _ = lapack.dtrtri(root)
     return np.asarray(inverse @ inverse.T)
-
-
-def _level(gains: FloatArray, budget: float) -> float:
-    """Return the level for which the gains cut off at it, ascending, add up to the budget."""
-    count = len(gains)
-    smaller = np.cumsum(gains) - gains
-    levels = (budget - smaller) / np.arange(count, 0, -1)
-    above = gains >= levels
-    return float(levels[np.argmax(above)]) if above.any() else np.inf

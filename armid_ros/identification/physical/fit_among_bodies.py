@@ -13,17 +13,20 @@ training data that are left out in turn.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate
+from armid_ros.identification.fitting.excited import bounds, excited
+from armid_ros.identification.fitting.least_squares import Method, solve
+from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
 from armid_ros.identification.physical.physical_certificate import (
     PhysicalCertificate,
     walls_reached,
 )
 from armid_ros.identification.physical.physical_program import Box, PhysicalProgram
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.regression import regressions, weighted_rows
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters
 from armid_ros.model.pseudo_inertia import (
     Consistency,
@@ -32,14 +35,19 @@ from armid_ros.model.pseudo_inertia import (
     pseudo_inertia,
 )
 from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
 import scipy.linalg
 
 #: A fit better than this share of the torque is taken as that good: there is always some noise.
 FINEST_FIT = 1e-4
+#: Linearisations of a fit among bodies, each with the search for the weight of the prior.
+_MOST_PASSES = 8
 #: A mass beyond so many times the described one is said.
 HEAVY = 3.0
+#: Blocks of the training data that are left out in turn to choose the weight of the prior.
+BLOCKS = 5
 #: Weights of the divergence that are tried. The fit is a mean of squares of about one.
 WEIGHTS = tuple(float(w) for w in 10.0 ** np.arange(-7.0, 0.5))
 #: The heaviest weight is taken whose held-out error is within this share of the least one.
@@ -65,18 +73,12 @@ class PhysicalSettings:
         Joint, and two corners [m] of a box in its frame that contains the link.
     mass_range : float or None
         Factor above 1 by which a link is lighter or heavier than described at most.
-    blocks : int
-        Blocks of the training data that are left out in turn to choose the weight of the prior.
-    weights : tuple of float
-        Weights that are tried.
 
     """
 
     total_mass: float | None = None
     boxes: Mapping[str, tuple[Sequence[float], Sequence[float]]] = field(default_factory=dict)
     mass_range: float | None = None
-    blocks: int = 5
-    weights: tuple[float, ...] = WEIGHTS
 
     def __post_init__(self) -> None:
         """Refuse what cannot be."""
@@ -92,55 +94,87 @@ class PhysicalSettings:
                     f"box of joint '{joint}': {tuple(lower)} has to be below {tuple(upper)} "
                     'along x, y and z'
                 )
-        if self.blocks < 2 or not self.weights or not min(self.weights) > 0.0:
-            raise IdentificationError('a prior is weighed by 2 blocks or more, and is positive')
 
 
-def fit_bodies(
+def fit_to_bodies(
     arm: ArmModel,
-    base: BaseParameters,
-    problem: Sequence[Regression],
-    weights: FloatArray,
-    unconstrained: Estimate,
+    free: FittedValues,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    method: Method,
     settings: PhysicalSettings,
-) -> tuple[FloatArray, PhysicalCertificate]:
+    rng: np.random.Generator,
+) -> tuple[FittedValues, PhysicalCertificate]:
     """
-    Fit the standard parameters of an arm to torques, all links being bodies.
+    Fit bodies where a free fit has been.
 
     Parameters
     ----------
     arm : ArmModel
-        Description: the prior of the links, bounds of the effects.
-    base : BaseParameters
-        Columns of the problem.
-    problem : sequence of Regression
-        Filtered columns and torques.
-    weights : ndarray, shape (N, n)
-        Weight of every row, as of the unconstrained fit.
-    unconstrained : Estimate
-        That fit.
+        Description: the prior of the links.
+    free : FittedValues
+        The fit without constraints.
+    recordings : sequence of Recording
+        Training data.
+    used : Conditioning
+        Filters.
+    method : {'ols', 'wls', 'irls'}
+        As of ``solve``.
     settings : PhysicalSettings
         What else is known.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
 
     Returns
     -------
-    theta : ndarray, shape (P,)
-        Standard parameters.
+    fit : FittedValues
+        With values that bodies have; its covariance is what the data alone say.
     certificate : PhysicalCertificate
         Why to believe it.
 
     """
+    fit, certificate = _bodies(arm, free, settings)
+    if free.passes == 1:
+        return fit, certificate
+    for passes in range(1, _MOST_PASSES):
+        promised = tuple(part.torque(fit.values) for part in fit.problem)
+        predicted = torques(fit.arm, recordings, used)
+        fit = replace(fit, predicted=predicted, passes=free.passes + passes)
+        settled = agree(fit.problem, fit.solution.weights, promised, predicted)
+        if settled:
+            return replace(fit, settled=free.settled), certificate
+        # linearise about the fit in the parameters that are identifiable there, and solve
+        theory = fit.arm.base_parameters(rng)
+        columns = regressions(fit.arm, theory.independent, recordings, used)
+        base, problem = excited(theory, columns)
+        values = base.values(fit.arm.theta)
+        problem = through(problem, fit.predicted, values)
+        solution = solve(problem, method, bounds(fit.arm, base))
+        fit = replace(fit, base=base, values=values, problem=problem, solution=solution)
+        fit, certificate = _bodies(arm, fit, settings)
+    predicted = torques(fit.arm, recordings, used)
+    return replace(fit, predicted=predicted, settled=False), certificate
+
+
+def _bodies(
+    arm: ArmModel, fit: FittedValues, settings: PhysicalSettings
+) -> tuple[FittedValues, PhysicalCertificate]:
+    """Fit the standard parameters of an arm to a linear problem, all links being bodies."""
+    base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
-    blocks = compress(problem, weights, settings.blocks)
+    # weighted rows, shrunk to one triangular factor per block of successive samples
+    ends = np.cumsum([len(part) for part in np.array_split(weights, BLOCKS)])[:-1]
+    rows = np.column_stack(weighted_rows(problem, weights))
+    blocks = [_triangle(part) for part in np.split(rows, ends * weights.shape[1])]
     whole = np.concatenate(blocks)
-    least = float(np.linalg.norm(_residual(whole, unconstrained.values)))
+    least = float(np.linalg.norm(_residual(whole, fit.solution.values)))
     least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
-    rows = np.array_split(np.count_nonzero(weights, axis=1), settings.blocks)
-    share = np.array([part.sum() for part in rows], dtype=float)
+    counted = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
+    share = np.array([part.sum() for part in counted], dtype=float)
     counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
 
-    tried = _held_out_errors(program, blocks, counts, settings.weights)
+    tried = _held_out_errors(program, blocks, counts)
     best = min(error for _, error in tried)
     weight = max(w for w, error in tried if error <= (1.0 + TOLERANCE) * best)
     theta = program.solve(_triangle(whole), float(counts.sum()), weight)
@@ -152,8 +186,12 @@ def fit_bodies(
     scale = 1e-6 * np.maximum(np.abs(effects).max(initial=0.0), 1e-9)
     held = (effects - lower <= scale) | (upper - effects <= scale)
     names = arm.parameters[len(theta) - len(lower) :]
-    misfit = float(np.linalg.norm(_residual(whole, base.values(theta))))
-    return theta, PhysicalCertificate(
+    values = base.values(theta)
+    misfit = float(np.linalg.norm(_residual(whole, values)))
+    factor = settings.mass_range or np.inf
+    off = np.abs(np.log(rigid[:, 0] / prior[: rigid.size : PER_LINK]))
+    off = off > (1.0 - _AT_MASS) * np.log(factor)
+    certificate = PhysicalCertificate(
         links=links,
         shares=np.array(
             [
@@ -170,21 +208,13 @@ def fit_bodies(
         total_mass=settings.total_mass,
         weight=weight,
         tried=tried,
-        unconstrained=unconstrained,
         misfit_ratio=max(misfit / least, 1.0),
         notes=(*notes, *_heavy(arm.robot, rigid)),
-        at_mass=_at_mass(arm.robot.links, rigid[:, 0], prior[: rigid.size : PER_LINK], settings),
+        at_mass=tuple(link for link, at in zip(arm.robot.links, off, strict=True) if at),
     )
-
-
-def _at_mass(
-    links: Sequence[str], masses: FloatArray, prior: FloatArray, settings: PhysicalSettings
-) -> tuple[str, ...]:
-    """Return the links that are as light or as heavy as they may be."""
-    if settings.mass_range is None:
-        return ()
-    off = np.abs(np.log(masses / prior)) > (1.0 - _AT_MASS) * np.log(settings.mass_range)
-    return tuple(link for link, at in zip(links, off, strict=True) if at)
+    found = arm.with_theta(theta)
+    predicted = tuple(part.torque(values) for part in problem)
+    return replace(fit, arm=found, values=values, predicted=predicted), certificate
 
 
 def _heavy(robot: Robot, rigid: FloatArray) -> tuple[str, ...]:
@@ -208,8 +238,8 @@ def physical_program(
 ) -> tuple[PhysicalProgram, tuple[str, ...]]:
     """Return what physics allows for the parameters of an arm, and what was assumed for it."""
     prior, notes = bodily_prior(arm)
-    bounds = [effect.bounds() for effect in arm.effects]
-    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in bounds)]) for k in (0, 1))
+    ends = [effect.bounds() for effect in arm.effects]
+    lower, upper = (np.concatenate([np.empty(0), *(b[k] for b in ends)]) for k in (0, 1))
     boxes: dict[int, Box] = {
         arm.robot.index(joint): (np.array(low, dtype=float), np.array(high, dtype=float))
         for joint, (low, high) in settings.boxes.items()
@@ -269,53 +299,21 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
     return theta, tuple(notes)
 
 
-def compress(
-    problem: Sequence[Regression], weights: FloatArray, blocks: int
-) -> tuple[FloatArray, ...]:
-    """
-    Shrink the weighted problem to one triangular factor per block of successive samples.
-
-    Parameters
-    ----------
-    problem : sequence of Regression
-        Stretches with the same r columns.
-    weights : ndarray, shape (N, n)
-        Weight of every row.
-    blocks : int
-        How many.
-
-    Returns
-    -------
-    tuple of ndarray, each of shape (k, r + 1), k <= r + 1
-        Factor of columns and torque: all that least squares needs of a block.
-
-    """
-    columns = np.concatenate([part.columns for part in problem])
-    tau = np.concatenate([part.target for part in problem])
-    factors = []
-    for rows in np.array_split(np.arange(len(tau)), blocks):
-        scaled = weights[rows, :, np.newaxis] * columns[rows]
-        stacked = np.concatenate([scaled, (weights * tau)[rows, :, np.newaxis]], axis=2)
-        factors.append(_triangle(stacked.reshape(-1, stacked.shape[2])))
-    return tuple(factors)
-
-
 def _held_out_errors(
     program: PhysicalProgram,
     blocks: Sequence[FloatArray],
     counts: FloatArray,
-    weights: Sequence[float],
 ) -> tuple[tuple[float, float], ...]:
     """Return the error on blocks left out, per weight, relative to unconstrained fits."""
     free = 0.0
-    squares = dict.fromkeys(weights, 0.0)
+    squares = dict.fromkeys(WEIGHTS, 0.0)
     for left_out, block in enumerate(blocks):
         others = [b for k, b in enumerate(blocks) if k != left_out]
         triangle = _triangle(np.concatenate(others))
         count = float(counts.sum() - counts[left_out])
         values = np.asarray(np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=1e-10)[0])
         free += float(np.sum(_residual(block, values) ** 2))
-        for weight in weights:
+        for weight in WEIGHTS:
             theta = program.solve(triangle, count, weight)
             squares[weight] += float(np.sum(_residual(block, program.base.values(theta)) ** 2))
     floor = max(free, FINEST_FIT**2 * float(sum(np.sum(b[:, -1] ** 2) for b in blocks)))

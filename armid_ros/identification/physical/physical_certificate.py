@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import ParameterName
 from armid_ros.identification.physical.physical_program import Box, box_conditions
 from armid_ros.model.pseudo_inertia import Consistency
 from armid_ros.motion import FloatArray
@@ -43,8 +43,6 @@ class PhysicalCertificate:
     tried : tuple of (float, float)
         Weights that were tried, and the error on the blocks left out, relative to that of
         unconstrained fits.
-    unconstrained : Estimate
-        The fit without constraints.
     misfit_ratio : float
         Weighted error on the training data, relative to the unconstrained fit's.
     notes : tuple of str
@@ -61,7 +59,6 @@ class PhysicalCertificate:
     total_mass: float | None
     weight: float
     tried: tuple[tuple[float, float], ...]
-    unconstrained: Estimate
     misfit_ratio: float
     notes: tuple[str, ...]
     at_mass: tuple[str, ...] = ()

@@ -110,7 +110,11 @@ class PhysicalProgram:
         rank, size, rigid = self.base.rank, len(self.prior), self._rigid
         columns = triangle[:, :rank] @ self.base.grouping / np.sqrt(count)
         lengths = np.linalg.norm(columns[:, rigid:], axis=0)
-        change = self._whitening(1.0 / np.where(lengths > 0.0, lengths, 1.0))
+        # from symmetric matrices, of which the identity is the prior, and effects to theta
+        change = np.diag(
+            np.concatenate([np.zeros(rigid), 1.0 / np.where(lengths > 0.0, lengths, 1.0)])
+        )
+        change[:rigid, :rigid] = self._whitened_links
         origin = np.concatenate([np.zeros(rigid), self.prior[rigid:]])
         a = columns @ change
         z = triangle[:, rank] / np.sqrt(count) - columns @ origin
@@ -119,9 +123,10 @@ class PhysicalProgram:
         hessian = np.zeros((variables, variables))
         hessian[:size, :size] = a.T @ a
         hessian[range(rigid, size), range(rigid, size)] += _RIDGE
+        identity = [float(i == j) for j in range(4) for i in range(j + 1)]
         gradient = np.zeros(variables)
         gradient[:size] = -a.T @ z
-        gradient[:rigid] += weight * np.tile(_svec(np.eye(4)), self.n_links)
+        gradient[:rigid] += weight * np.tile(identity, self.n_links)
         for link in range(self.n_links):
             gradient[self._first(link) + _TRIANGLE : self._first(link + 1)] = -weight
             mass = change[PER_LINK * link] / self.prior[PER_LINK * link]  # of the prior's
@@ -141,14 +146,6 @@ class PhysicalProgram:
         theta = origin + change @ np.array(solution.x[:size])
         theta[rigid:] = np.clip(theta[rigid:], self.lower, self.upper)
         return np.asarray(theta)
-
-    def _whitening(self, effect_scale: FloatArray) -> FloatArray:
-        """Map symmetric matrices, of which the identity is the prior, and effects, to theta."""
-        change = np.zeros((len(self.prior), len(self.prior)))
-        change[: self._rigid, : self._rigid] = self._whitened_links
-        effects = range(self._rigid, len(self.prior))
-        change[effects, effects] = effect_scale
-        return change
 
     @cached_property
     def _whitened_links(self) -> FloatArray:
@@ -205,13 +202,9 @@ class PhysicalProgram:
     def _add_log_determinant(
         self, link: int, blocks: list[Any], offsets: list[FloatArray], cones: list[Any]
     ) -> None:
-        """
-        Bound the logarithms u from above: sum u <= log det X, of the whitened X of a link.
-
-        X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
-        Nemirovski 2001, section 4.2).
-
-        """
+        """Bound the logarithms u from above: sum u <= log det X, of the whitened X of a link."""
+        # X >= Z diag(Z)^-1 Z' for a lower triangle Z, and u <= log of its diagonal (Ben-Tal and
+        # Nemirovski 2001, section 4.2).
         first, width = self._first(link), len(self.prior) + _LOG_DETERMINANT * self.n_links
         matrix = sparse.lil_matrix((36, width))
         for index in range(PER_LINK):
@@ -270,10 +263,3 @@ def _smat(vector: FloatArray) -> FloatArray:
             share = 1.0 if i == j else np.sqrt(0.5)
             matrix[i, j] = matrix[j, i] = share * vector[_packed(i, j)]
     return matrix
-
-
-def _svec(matrix: FloatArray) -> FloatArray:
-    """Return the stacked triangle of a symmetric 4x4 matrix; the inverse of `_smat`."""
-    return np.array(
-        [(1.0 if i == j else np.sqrt(2.0)) * matrix[i, j] for j in range(4) for i in range(j + 1)]
-    )

@@ -111,12 +111,8 @@ class TripleLag:
         return stages
 
     def _set_step(self, dt: float) -> None:
-        """
-        Learn what the stages become of themselves, of the signal before and of its move.
-
-        A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
-
-        """
+        """Learn what the stages become of themselves, of the signal before and of its move."""
+        # A ramp u is followed by stage i at u - i * slope / pole; the rest decays.
         x, step = self.pole * dt, self._step
         self._dt = dt
         step[0, 0] = step[1, 1] = step[2, 2] = decay = math.exp(-x)
@@ -133,23 +129,6 @@ class TripleLag:
 def pole_of(cutoff: float) -> float:
     """Return the pole [rad/s] of a triple lag with a cut-off frequency [Hz]."""
     return 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
-
-
-def _gain_of_curvature(pole: float) -> float:
-    """
-    Return what a triple lag makes of a constant second derivative that is 1.
-
-    Between samples the signal is a straight line, so all its curvature is at the samples, and the
-    filter sees sum(h(k)) in place of the integral of its impulse response p^3 t^2 / 2 exp(-p t).
-
-    Parameters
-    ----------
-    pole : float
-        p over the sampling rate [-].
-
-    """
-    decay = math.exp(-pole)
-    return 0.5 * pole**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
 
 
 class CausalMotion(NamedTuple):
@@ -273,11 +252,11 @@ class CausalFilter:
         """Pole of the motion filter [rad/s], None until the sampling period is known."""
         return None if self._lag is None else self._lag.pole
 
-    def update(
+    def signal(
         self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
-    ) -> CausalMotion | None:
+    ) -> FloatArray | None:
         """
-        Take in one joint state.
+        Stack what is filtered of one joint state, shape (2 n,) or (3 n,).
 
         Parameters
         ----------
@@ -288,17 +267,10 @@ class CausalFilter:
 
         Returns
         -------
-        CausalMotion or None
-            None while the filter settles and for a sample that is left out.
+        ndarray or None
+            None for a sample that is left out.
 
         """
-        signal = self.signal(t, q, dq, tau)
-        return None if signal is None else self.advance(t, signal)
-
-    def signal(
-        self, t: float, q: npt.ArrayLike, dq: npt.ArrayLike | None, tau: npt.ArrayLike
-    ) -> FloatArray | None:
-        """Stack what is filtered, shape (2 n,) or (3 n,); None for a sample to leave out."""
         parts = [q, dq, tau] if self._measured_velocity and dq is not None else [q, tau]
         if self._measured_velocity and dq is None:
             self._rejected['no_velocity'] += 1
@@ -317,7 +289,7 @@ class CausalFilter:
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
-        """Filter what `signal` has stacked; see `update`."""
+        """Filter what `signal` has stacked; None while the filter settles."""
         if not self._in_order(t):
             return None
         dt, self._last = 0.0 if self._last is None else t - self._last, t
@@ -326,7 +298,12 @@ class CausalFilter:
             return None
         if self._start is None:
             self._start = t
-        signal = self._unwrapped(signal)
+        position = signal[: self._n_joints]
+        if self._position is not None:
+            step = position - self._position
+            if float(np.abs(step).max()) > math.pi:  # a driver that keeps a joint within +-pi
+                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
+        self._position = position
         missing = self._missing(t, dt, signal)
         for value in (*missing, signal):
             stages = self._lag.update(dt / (len(missing) + 1), value)
@@ -350,14 +327,10 @@ class CausalFilter:
         return True
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
-        """
-        Return what stands for the samples missing before one.
-
-        A straight line would have no acceleration, so the rows would lack that of the whole gap.
-        They are on the cubic through the sample behind the gap and three before it, which are as
-        far apart as the gap is long, for then it has hardly more noise than they.
-
-        """
+        """Return what stands for the samples missing before one."""
+        # A straight line would have no acceleration, so the rows would lack that of the whole gap.
+        # They are on the cubic through the sample behind the gap and three before it, which are as
+        # far apart as the gap is long, for then it has hardly more noise than they.
         assert self._period is not None
         count = round(dt / self._period) if dt > _GAP * self._period else 1
         if count < 2 or not self._recent:
@@ -370,16 +343,6 @@ class CausalFilter:
         inside = np.arange(1, count) / count
         factors = np.linalg.solve(np.vander(place), values)
         return list(np.vander(inside, len(place)) @ factors)
-
-    def _unwrapped(self, signal: FloatArray) -> FloatArray:
-        """Undo the jump by a full turn with which some drivers keep a joint within +-pi."""
-        position = signal[: self._n_joints]
-        if self._position is not None:
-            step = position - self._position
-            if float(np.abs(step).max()) > math.pi:
-                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
-        self._position = position
-        return signal
 
     def _restart(self) -> None:
         self.generation += 1
@@ -404,7 +367,12 @@ class CausalFilter:
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
-        curvature = pole * pole / _gain_of_curvature(pole * period)
+        # what the lag makes of a second derivative of 1: between samples the signal is a straight
+        # line, all its curvature is at the samples, and the filter sees the sum of its impulse
+        # response p^3 t^2 / 2 exp(-p t) in place of the integral
+        decay, relative = math.exp(-pole * period), pole * period
+        gain = 0.5 * relative**3 * decay * (1.0 + decay) / (1.0 - decay) ** 3
+        curvature = pole * pole / gain
         slope = (0.0, pole, -pole)
         bend = slope if self._measured_velocity else (curvature, -2.0 * curvature, curvature)
         self._outputs = np.array([(0.0, 0.0, 1.0), slope, bend])

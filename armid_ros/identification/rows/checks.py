@@ -73,7 +73,7 @@ def check_motion(
     recordings : sequence of Recording
         What was recorded.
     used : Conditioning, optional
-        Filters behind which something has to be left, where ``check_length`` does not see to it.
+        Filters behind which something has to be left, where nothing else sees to it.
 
     Returns
     -------
@@ -110,17 +110,6 @@ def too_short_to_tell(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Say that recordings are short, all together."""
     duration = sum(recording.duration for recording in recordings)
     return (f'{duration:.2g} s is short; record 20 s or more',) if duration < _SHORT else ()
-
-
-def check_length(
-    recordings: Sequence[Recording], problem: Sequence[Regression], used: Conditioning
-) -> None:
-    """Refuse recordings that are too short for the filters, as a whole or between gaps."""
-    left = {part.source for part in problem}
-    for recording in recordings:
-        if recording.source not in left:
-            check_stamps([recording], used)
-            raise no_stretch(recording, used)
 
 
 def check_stamps(recordings: Sequence[Recording], used: Conditioning) -> None:
@@ -196,18 +185,17 @@ def check_torque(
             f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
             'effort has to be positive along the URDF joint axis: negate it'
         )
-    _refuse_what_drives(robot, source, problem)
+    driven = driven_by_friction(robot, motions, torques)
+    if driven:
+        raise IdentificationError(f'{source}: {wrong_sign(driven)}')
+    _refuse_laws(robot, problem)
     if silent:
         return (f'torque constant throughout: {", ".join(silent)}',)
     return ()
 
 
-def _refuse_what_drives(robot: Robot, source: str, problem: Sequence[Regression]) -> None:
-    """Refuse friction that drives, and torques that are a law of a controller."""
-    motions, torques = [part.motion for part in problem], [part.tau for part in problem]
-    driven = driven_by_friction(robot, motions, torques)
-    if driven:
-        raise IdentificationError(f'{source}: {wrong_sign(driven)}')
+def _refuse_laws(robot: Robot, problem: Sequence[Regression]) -> None:
+    """Refuse torques that are a law of a controller."""
     for part in problem:
         for law in laws_of_controllers(robot, part.motion, part.informative):
             raise IdentificationError(f'{part.source or "recording"}: {law}')
@@ -255,13 +243,9 @@ def driven_by_friction(
 
 
 def _gives_out_energy(problem: Sequence[Regression]) -> bool:
-    """
-    Whether an arm drives its motors, in all and in every joint, as only a wrong sign can show.
-
-    A short motion may give out energy too, that of weights that went down; friction is what is
-    left of the power where weight and inertia of the joint are taken out.
-
-    """
+    """Whether an arm drives its motors, in all and in every joint, as a wrong sign alone shows."""
+    # a short motion may give out energy too, that of weights that went down; friction is what is
+    # left of the power where weight and inertia of the joint are taken out
     power = sum(float(np.sum(part.tau * part.motion.dq)) for part in problem)
     activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
     if power >= -0.2 * activity:
@@ -304,7 +288,10 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
     if not excess[worst] > allowed[worst]:
         return ''
     reach = max(abs(lowest[worst]), abs(highest[worst]))
-    degrees = _in_degrees(robot, lowest, highest) & (excess > allowed)
+    # joints whose positions would be within the limits if they were in degrees
+    slack = _LIMIT_SLACK * (robot.upper - robot.lower)
+    degrees = np.deg2rad(lowest) > robot.lower - slack
+    degrees &= ~robot.prismatic & (np.deg2rad(highest) < robot.upper + slack) & (excess > allowed)
     hint = '' if robot.prismatic[worst] or degrees[worst] else ' (degrees?)'
     said = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
     if degrees[worst]:
@@ -315,13 +302,6 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
         f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '
         'description'
     )
-
-
-def _in_degrees(robot: Robot, lowest: FloatArray, highest: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return of which joints positions would be within the limits if they were in degrees."""
-    slack = _LIMIT_SLACK * (robot.upper - robot.lower)
-    above = np.deg2rad(lowest) > robot.lower - slack
-    return ~robot.prismatic & above & (np.deg2rad(highest) < robot.upper + slack)
 
 
 def effort_unit(robot: Robot, joint: int, unit: str) -> str:

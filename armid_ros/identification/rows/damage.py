@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.identification.rows.row_noise import NOISE_OF_TORQUE
 from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
@@ -21,38 +21,9 @@ import numpy.typing as npt
 _NAMED = 3
 
 
-@dataclass(frozen=True)
-class Repair:
-    """
-    Samples that were made up for.
-
-    Attributes
-    ----------
-    source : str
-        The recording.
-    samples : int
-        How many.
-    worst : tuple of str
-        What jumped and when, of the first few.
-
-    """
-
-    source: str
-    samples: int
-    worst: tuple[str, ...]
-
-    def __str__(self) -> str:
-        """Say what was found."""
-        what = '1 sample jumps and comes back; it was'
-        if self.samples > 1:
-            what = f'{self.samples} samples jump and come back; they were'
-        more = ', ...' if self.samples > len(self.worst) else ''
-        return f'{self.source}: {what} interpolated across: {", ".join(self.worst)}{more}'
-
-
 def without_damage(
     recordings: Sequence[Recording], settings: SignalSettings
-) -> tuple[list[Recording], tuple[Repair, ...]]:
+) -> tuple[list[Recording], tuple[str, ...]]:
     """
     Interpolate across damaged samples.
 
@@ -63,27 +34,31 @@ def without_damage(
     -------
     list of Recording
         Those without damage are the same objects.
-    tuple of Repair
-        What was found.
+    tuple of str
+        What was found: recording, number of samples, and the first of them.
 
     """
     used = conditioning(list(recordings), settings)
     repaired, found = [], []
     for recording in recordings:
-        one = None
+        one = ''
         if recording.tau is not None and len(recording) > 2:
             one, bad = _damage(recording, used)
-        if one is not None:
+        if one:
             found.append(one)
-            recording = _repaired(recording, bad)
+            t, good = recording.t, ~bad
+            q, dq, tau = (
+                x if x is None else np.column_stack([np.interp(t, t[good], c[good]) for c in x.T])
+                for x in (recording.q, recording.dq, recording.tau)
+            )
+            assert q is not None
+            recording = replace(recording, q=q, dq=dq, tau=tau)
         repaired.append(recording)
     return repaired, tuple(found)
 
 
-def _damage(
-    recording: Recording, used: Conditioning
-) -> tuple[Repair | None, npt.NDArray[np.bool_]]:
-    """Return the damage of a recording, None without, and which samples it is, shape (N,)."""
+def _damage(recording: Recording, used: Conditioning) -> tuple[str, npt.NDArray[np.bool_]]:
+    """Return the damage of a recording in words, and which samples it is, shape (N,)."""
     assert recording.tau is not None
     middle = np.median(recording.tau, axis=0)
     spread = 1.4826 * np.median(np.abs(recording.tau - middle), axis=0)
@@ -102,8 +77,12 @@ def _damage(
     damaged = [sample.t for one in excursions for sample in one.samples]
     bad = np.isin(recording.t, damaged)
     if not excursions or bad.all():
-        return None, bad
-    return Repair(recording.source, len(damaged), tuple(worst[:_NAMED])), bad
+        return '', bad
+    what = '1 sample jumps and comes back; it was'
+    if len(damaged) > 1:
+        what = f'{len(damaged)} samples jump and come back; they were'
+    named = ', '.join((*worst[:_NAMED], *(['...'] if len(damaged) > _NAMED else [])))
+    return f'{recording.source}: {what} interpolated across: {named}', bad
 
 
 def impossible_excursions(
@@ -152,17 +131,3 @@ def impossible_excursions(
         return found
     lowest, highest = np.min(x[good_ones], axis=0), np.max(x[good_ones], axis=0)
     return [one for one in found if not gate.possible(one, lowest, highest)]
-
-
-def _repaired(recording: Recording, bad: npt.NDArray[np.bool_]) -> Recording:
-    """Return a recording with straight lines across damaged samples."""
-
-    def across(values: FloatArray | None) -> FloatArray | None:
-        if values is None:
-            return None
-        t, good = recording.t, ~bad
-        return np.stack([np.interp(t, t[good], column[good]) for column in values.T], axis=1)
-
-    q = across(recording.q)
-    assert q is not None
-    return replace(recording, q=q, dq=across(recording.dq), tau=across(recording.tau))

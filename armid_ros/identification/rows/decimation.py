@@ -33,36 +33,33 @@ def check_decimation(recordings: Sequence[Recording], used: Conditioning, least:
         one.
 
     """
-    left = _samples(recordings, used)
-    largest = 0 if left >= least else _largest(recordings, used, least)
+
+    def left(decimation: int) -> int:
+        one = replace(used, decimation=decimation)
+        parts = (part for recording in recordings for part in segments(recording, one))
+        return sum(len(decimated_samples(len(part), one)) for part in parts)
+
+    count = left(used.decimation)
+    if count >= least:
+        return
+    # the largest decimation that leaves enough; zero where none does
+    largest, fails = 0, min(used.decimation, max(len(one) for one in recordings))
+    while fails - largest > 1:
+        middle = (largest + fails) // 2
+        if left(middle) >= least:
+            largest = middle
+        else:
+            fails = middle
     if largest and 'decimation' not in used.given:
         duration = sum(one.duration for one in recordings)
-        needed = duration + (least - left) * used.decimation / used.rate_hz
+        needed = duration + (least - count) * used.decimation / used.rate_hz
         raise IdentificationError(
-            f'{recordings[0].source}: {duration:.2f} s are too short, {left} samples are left '
+            f'{recordings[0].source}: {duration:.2f} s are too short, {count} samples are left '
             f'behind the filters and {least} or more are needed: record '
             f'{math.ceil(10 * needed) / 10:g} s or more, or ask for --decimation {largest}'
         )
     if largest:
         raise IdentificationError(
-            f'{recordings[0].source}: --decimation {used.decimation} leaves {left} samples, '
+            f'{recordings[0].source}: --decimation {used.decimation} leaves {count} samples, '
             f'{least} or more are needed: --decimation {largest} is the largest that works'
         )
-
-
-def _largest(recordings: Sequence[Recording], used: Conditioning, least: int) -> int:
-    """Return the largest decimation that leaves so many samples; zero where none does."""
-    works, fails = 0, min(used.decimation, max(len(one) for one in recordings))
-    while fails - works > 1:
-        middle = (works + fails) // 2
-        if _samples(recordings, replace(used, decimation=middle)) >= least:
-            works = middle
-        else:
-            fails = middle
-    return works
-
-
-def _samples(recordings: Sequence[Recording], used: Conditioning) -> int:
-    """Return how many samples are left of recordings behind the filters."""
-    parts = (part for one in recordings for part in segments(one, used))
-    return sum(len(decimated_samples(len(part), used)) for part in parts)

@@ -7,7 +7,6 @@ from __future__ import annotations
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 import numpy as np
-import numpy.typing as npt
 
 #: Positions of two periods agree within this share of the range of motion.
 _SAME = 0.02
@@ -111,7 +110,11 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
     best: tuple[int, int, int] | None = None
     for lag in range(shortest, int(0.7 * len(q))):
         same = np.all(np.abs(q[lag:] - q[:-lag]) < allowed[:-lag], axis=1)
-        start, stop = _longest(same)
+        padded = np.concatenate([[False], same, [False]]).astype(int)
+        runs = np.flatnonzero(np.diff(padded)).reshape(-1, 2)
+        if not len(runs):
+            continue
+        start, stop = (int(end) for end in runs[int(np.argmax(runs[:, 1] - runs[:, 0]))])
         length = int(np.sum(moving[start:stop]))
         if length <= 0.6 * lag or (best is not None and length <= 1.2 * (best[2] - best[1])):
             continue
@@ -129,13 +132,3 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
         errors.append(float(np.mean(gap**2)))
     lag = lags[int(np.argmin(errors))]
     return lag, slice(part.start, min(part.stop, len(motion) - lag))
-
-
-def _longest(flags: npt.NDArray[np.bool_]) -> tuple[int, int]:
-    """Return begin and end of the longest run of True."""
-    padded = np.concatenate([[False], flags, [False]]).astype(int)
-    edges = np.flatnonzero(np.diff(padded)).reshape(-1, 2)
-    if not len(edges):
-        return 0, 0
-    start, stop = edges[int(np.argmax(edges[:, 1] - edges[:, 0]))]
-    return int(start), int(stop)

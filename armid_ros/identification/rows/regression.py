@@ -13,9 +13,10 @@ filtered, which leaves their equation as true as it was without them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.rows.signals import (
@@ -149,39 +150,96 @@ def regressions(
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Fit:
     """
-    The torque of an arm along one unbroken stretch of motion, filtered like the measured one.
+    How a model predicts one unbroken stretch of a recording.
 
     Attributes
     ----------
-    motion : Motion
-        Decimated motion of M samples with the filtered measured torque.
-    torque : ndarray, shape (M, n)
-        Filtered torque of the arm [N m].
-    informative : ndarray of bool, shape (M, n)
-        False where a joint that dry friction may hold is at rest.
     source : str
-        The recording it comes from.
+        The recording.
+    motion : Motion
+        Filtered and decimated motion with measured torque, M samples.
+    predicted : ndarray, shape (M, n)
+        Torque of the model, filtered alike [N m].
+    informative : ndarray of bool, shape (M, n)
+        False where a joint is held at rest by friction, where any torque is right.
 
     """
 
-    motion: Motion
-    torque: FloatArray
-    informative: npt.NDArray[np.bool_]
     source: str
+    motion: Motion
+    predicted: FloatArray
+    informative: npt.NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        """Return what it is, and how far off, in a line."""
+        error = Score.of([self]).relative_error_percent
+        return f'Fit of {self.source}: {len(self.motion)} samples, {error:.2f} % relative error'
+
+    @property
+    def residual(self) -> FloatArray:
+        """Measured minus predicted torque, shape (M, n) [N m]."""
+        assert self.motion.tau is not None
+        return self.motion.tau - self.predicted
 
 
-def predictions(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning
-) -> list[Prediction]:
+@dataclass(frozen=True)
+class Score:
+    """
+    How well a model predicts recordings.
+
+    Attributes
+    ----------
+    relative_error_percent : float
+        100 |tau - tau_hat| / |tau| over all joints and samples.
+    joint_relative_error_percent : ndarray, shape (n,)
+        The same of each joint.
+    rms : ndarray, shape (n,)
+        Root mean square residual of each joint [N m].
+    torque_rms : ndarray, shape (n,)
+        Root mean square torque of each joint [N m].
+
+    """
+
+    relative_error_percent: float
+    joint_relative_error_percent: FloatArray
+    rms: FloatArray
+    torque_rms: FloatArray
+
+    @staticmethod
+    def of(fits: Sequence[Fit]) -> Score:
+        """Score one or more stretches together."""
+        used = np.concatenate([fit.informative for fit in fits])
+        residual = used * np.concatenate([fit.residual for fit in fits])
+        tau = used * np.concatenate([fit.motion.tau for fit in fits if fit.motion.tau is not None])
+        lengths, count = np.linalg.norm(tau, axis=0), np.maximum(used.sum(axis=0), 1)
+        return Score(
+            float(100.0 * np.linalg.norm(residual) / np.linalg.norm(tau)),
+            100.0 * np.linalg.norm(residual, axis=0) / np.where(lengths > 0.0, lengths, np.inf),
+            np.linalg.norm(residual, axis=0) / np.sqrt(count),
+            lengths / np.sqrt(count),
+        )
+
+
+def weighted_rows(
+    problem: Sequence[Regression], weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return weighted columns (N n, r) and targets (N n,) of all stretches; weights are (N, n)."""
+    columns = np.concatenate([part.columns for part in problem])
+    target = np.concatenate([part.target for part in problem])
+    rows = weights[:, :, np.newaxis] * columns
+    return rows.reshape(-1, columns.shape[2]), np.asarray((weights * target).ravel())
+
+
+def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:
     """Return what the torque of an arm is along recordings, one per unbroken stretch."""
     found = []
     for recording in recordings:
         for motion in segments(recording, used):
             rows, informative = _rows(arm, motion, used)
             torque = filtered_torque(arm, motion, used)
-            found.append(Prediction(rows, torque, informative, recording.source))
+            found.append(Fit(recording.source, rows, torque, informative))
     return found
 
 
@@ -199,9 +257,7 @@ def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatA
         return decimate(bridged(arm.torque(motion), unsure), used)
     margin = max(arm.neighbours(1.0 / used.rate_hz), _longest(unsure))
     blocks = []
-    for samples in _overlapping(len(motion), used):
-        around = slice(max(0, samples.start - margin), samples.stop + margin)
-        inside = slice(samples.start - around.start, samples.stop - around.start)
+    for _, around, inside in _overlapping(len(motion), used, margin):
         torque = bridged(arm.torque(motion.select(around)), unsure[around])
         blocks.append(decimate(torque[inside], used))
     return np.concatenate(blocks)
@@ -257,10 +313,8 @@ def filtered_columns(
     stride = used.smooth_stride if margin == 0 else 1
     margin = max(margin, _longest(unsure))
     first = 0
-    for samples in _overlapping(len(motion), used):
-        around = slice(max(0, samples.start - margin), samples.stop + margin)
+    for samples, around, inside in _overlapping(len(motion), used, margin):
         part = motion.select(around)
-        inside = slice(samples.start - around.start, samples.stop - around.start)
         count = len(decimated_samples(samples.stop - samples.start, used))
         for source in sources:
             if source.smooth and stride > 1:
@@ -277,43 +331,29 @@ def filtered_columns(
     return result
 
 
-@dataclass(frozen=True)
-class _Source:
-    """
-    Where some of the columns come from: the rigid body, or one effect.
-
-    Attributes
-    ----------
-    columns : callable Motion -> ndarray (N, n, P)
-        Its columns.
-    inner, outer : ndarray of int
-        Which of them are wanted, and where they go.
-    instantaneous : bool
-        Whether a part of the motion will do.
-    smooth : bool
-        Whether they have no steps, so that fewer samples will do.
-
-    """
+class _Source(NamedTuple):
+    """Where wanted columns come from: the rigid body, which is smooth, or an effect."""
 
     columns: Callable[[Motion], FloatArray]
-    inner: npt.NDArray[np.intp]
+    inner: npt.NDArray[np.intp]  # which of them are wanted, and where they go
     outer: npt.NDArray[np.intp]
-    instantaneous: bool
-    smooth: bool
+    instantaneous: bool  # a part of the motion will do
+    smooth: bool  # fewer samples will do
 
 
 def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
     """Return where the wanted columns come from, without what is not wanted at all."""
-    sizes = [len(arm.robot.rigid_parameters), *(len(values) for values in arm.values)]
-    functions: list[Callable[[Motion], FloatArray]] = [arm.rigid_columns]
-    functions.extend(partial(arm.columns_of, effect) for effect in arm.effects)
-    instantaneous = [True, *(effect.instantaneous for effect in arm.effects)]
+    parts = [(arm.rigid_columns, len(arm.robot.rigid_parameters), True)]
+    parts += [
+        (partial(arm.columns_of, effect), len(values), effect.instantaneous)
+        for effect, values in zip(arm.effects, arm.values, strict=True)
+    ]
     sources, start = [], 0
-    for size, function, local in zip(sizes, functions, instantaneous, strict=True):
+    for function, size, local in parts:
         outer = np.flatnonzero((columns >= start) & (columns < start + size))
         if len(outer):
-            rigid = start == 0
-            sources.append(_Source(function, columns[outer] - start, outer, local, rigid))
+            inner = columns[outer] - start
+            sources.append(_Source(function, inner, outer, local, smooth=start == 0))
         start += size
     return sources
 
@@ -384,9 +424,12 @@ def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
     return rest
 
 
-def _overlapping(n_samples: int, used: Conditioning) -> list[slice]:
-    """Cut samples into chunks that overlap by the filter, so that their outputs join."""
+def _overlapping(
+    n_samples: int, used: Conditioning, margin: int
+) -> Iterator[tuple[slice, slice, slice]]:
+    """Yield chunks that overlap by the filter, each with a margin, and where it is within that."""
     overlap = len(used.taps()) - 1
     step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
-    starts = range(0, max(1, n_samples - overlap), step)
-    return [slice(start, min(n_samples, start + step + overlap)) for start in starts]
+    for start in range(0, max(1, n_samples - overlap), step):
+        stop, first = min(n_samples, start + step + overlap), max(0, start - margin)
+        yield slice(start, stop), slice(first, stop + margin), slice(start - first, stop - first)

@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.senders import require_one_sender
 from armid_ros.identification.rows.spectrum import mean_spectrum
+from armid_ros.identification.rows.stamps import require_one_sender
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
-from armid_ros.recording import PartnerMotion, Recording
+from armid_ros.recording import Recording
 from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
@@ -155,10 +155,15 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     for recording in recordings:
         _require_rate(recording)
         require_one_sender(recording)
-    rate = float(np.median([sampling_rate(recording) for recording in recordings]))
+    rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
-        crossings = [_noise_crossing(recording) for recording in recordings]
+        # where the spectrum of each position meets its noise, which is white at the sensor
+        crossings = []
+        for recording in recordings:
+            frequency, power, floor = _position_spectrum(recording)
+            above = power > NOISE_MARGIN * floor
+            crossings.append(np.array([frequency[np.argmin(column)] for column in above.T]))
         parts = [
             (q, end)
             for recording, end in zip(recordings, crossings, strict=True)
@@ -175,11 +180,6 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     asked = {'cutoff': settings.cutoff_hz, 'decimation': settings.decimation}
     given = frozenset(name for name, value in asked.items() if value is not None)
     return Conditioning(rate, cutoff, decimation, given)
-
-
-def sampling_rate(recording: Recording) -> float:
-    """Return the rate of a recording, from the median time between samples [Hz]."""
-    return float(1.0 / np.median(np.diff(recording.t)))
 
 
 def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
@@ -204,7 +204,7 @@ def velocity_error(recording: Recording, used: Conditioning) -> FloatArray:
 
 def _require_rate(recording: Recording) -> None:
     """Raise an IdentificationError where samples are so far apart that stamps are no seconds."""
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     if rate >= SLOWEST:
         return
     units = (('milliseconds', 1e3), ('microseconds', 1e6), ('nanoseconds', 1e9))
@@ -335,7 +335,7 @@ def _even(t: FloatArray, period: float, *signals: FloatArray) -> tuple[FloatArra
 
 def even_positions(recording: Recording) -> list[FloatArray]:
     """Return the positions of every stretch without a gap at even times, each (K, n)."""
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     parts = [part for part in unbroken(recording, rate) if len(part) >= _LEAST_SAMPLES]
     return [_even(recording.t[part], 1.0 / rate, recording.q[part])[1] for part in parts]
 
@@ -354,21 +354,18 @@ def _differentiated(
     band = _CURVATURE_BANDS * _motion_band([(smooth[:, :n], used.cutoff_hz)], used.rate_hz)
     beside = None
     if recording.partner is not None:
-        beside = _points(recording.partner, smooth[inner, n:], dq[inner, n:])
+        # the other machine's ends of the ties along its positions and velocities
+        other, ties = recording.partner, recording.partner.ties
+        position, jacobian = points_motion(
+            other.robot,
+            [tie.other_joint for tie in ties],
+            np.array([tie.other_point for tie in ties]).reshape(-1, 3),
+            smooth[inner, n:],
+        )
+        velocity = np.einsum('nsxj,nj->nsx', jacobian, dq[inner, n:])
+        beside = MovingPoints(tuple(tie.name for tie in ties), position, velocity)
     parts = (part[inner] for part in (smooth[:, :n], dq[:, :n], ddq, tau))
     return Motion(recording.joints, t[inner], *parts, band_hz=band, partner=beside)
-
-
-def _points(beside: PartnerMotion, q: FloatArray, dq: FloatArray) -> MovingPoints:
-    """Follow the other machine's ends of the ties along its positions and velocities (N, m)."""
-    position, jacobian = points_motion(
-        beside.robot,
-        [tie.other_joint for tie in beside.ties],
-        np.array([tie.other_point for tie in beside.ties]).reshape(-1, 3),
-        q,
-    )
-    names = tuple(tie.name for tie in beside.ties)
-    return MovingPoints(names, position, np.einsum('nsxj,nj->nsx', jacobian, dq))
 
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
@@ -385,16 +382,18 @@ def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
 
 
 def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: float) -> float:
-    """
-    Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint.
-
-    Stretches are positions and the frequency up to which they, or those of each joint, are no
-    noise. What is above does not count: a joint that hardly moves has nothing but noise where
-    another is still moving. All stretches count together, for the same reason.
-
-    """
+    """Return the frequency below which 99 % of the velocities' power lies [Hz], fastest joint."""
+    # Stretches are positions and the frequency up to which they, or those of each joint, are no
+    # noise. What is above does not count: a joint that hardly moves has nothing but noise where
+    # another is still moving. All stretches count together, for the same reason.
     band = rate / max(len(q) for q, _ in stretches)
-    spectra = [(*_velocity_spectrum(q, rate), end) for q, end in stretches]
+    spectra = []
+    for q, end in stretches:  # the power of velocities
+        steps = np.diff(q, axis=0)
+        transformed = fft.rfft(steps - steps.mean(axis=0), axis=0)
+        power = np.abs(transformed) ** 2 / len(steps)
+        power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
+        spectra.append((fft.rfftfreq(len(steps), 1.0 / rate), power, end))
     for joint in range(stretches[0][0].shape[1]):
         kept = [
             (frequency[inside], power[inside, joint])
@@ -407,27 +406,6 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
         if share[-1] > 0.0:
             band = max(band, float(frequency[order[np.searchsorted(share, 0.99 * share[-1])]]))
     return band
-
-
-def _velocity_spectrum(q: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies (K,) [Hz] and the power of all velocities there, shape (K, n)."""
-    steps = np.diff(q, axis=0)
-    transformed = fft.rfft(steps - steps.mean(axis=0), axis=0)
-    power = np.abs(transformed) ** 2 / len(steps)
-    power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
-    return fft.rfftfreq(len(steps), 1.0 / rate), power
-
-
-def _noise_crossing(recording: Recording) -> FloatArray:
-    """
-    Return where the spectrum of each position meets its noise, shape (n,) [Hz].
-
-    The noise is white at the sensor; its level is the median of the upper two fifths.
-
-    """
-    frequency, power, floor = _position_spectrum(recording)
-    above = power > NOISE_MARGIN * floor
-    return np.array([frequency[np.argmin(column)] for column in above.T])
 
 
 def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -444,6 +422,6 @@ def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, Fl
         Its median in the upper two fifths.
 
     """
-    rate = sampling_rate(recording)
+    rate = 1.0 / recording.period
     frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
     return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)

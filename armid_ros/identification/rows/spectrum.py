@@ -19,6 +19,7 @@ def mean_spectrum(
     stretches: Sequence[FloatArray],
     rate: float,
     detrend: Literal['constant', 'linear'] = 'constant',
+    segment: float = _SEGMENT,
 ) -> tuple[FloatArray, FloatArray]:
     """
     Return the mean power spectrum of stretches that last as long as a segment (Welch 1967).
@@ -31,6 +32,8 @@ def mean_spectrum(
         Samples per second.
     detrend : {'constant', 'linear'}
         What is taken off every segment.
+    segment : float
+        Length of the segments [s].
 
     Returns
     -------
@@ -40,7 +43,7 @@ def mean_spectrum(
         Power per Hz.
 
     """
-    length = min(max(map(len, stretches)), int(_SEGMENT * rate))
+    length = min(max(map(len, stretches)), int(segment * rate))
     long_enough = [values for values in stretches if len(values) >= length]
     spectra = [
         signal.welch(

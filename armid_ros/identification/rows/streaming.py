@@ -33,31 +33,13 @@ import numpy.typing as npt
 _FORGET_PERIODS = 16.0
 
 
-class Cuts:
-    """
-    Where a recording is cut into pieces.
-
-    Parameters
-    ----------
-    used : Conditioning
-        The filters that have to fit between a row and the end of its piece.
-
-    Attributes
-    ----------
-    used : Conditioning
-        The filters.
-
-    """
+class _Cuts:
+    """Where a recording is cut into pieces, given the filters that reach beyond a row."""
 
     def __init__(self, used: Conditioning) -> None:
         self.used = used
         periods = (EDGE_PERIODS + _FORGET_PERIODS) * used.rate_hz / used.cutoff_hz
         self._margin = int(np.ceil(periods)) + len(used.taps())
-
-    @property
-    def overlap(self) -> int:
-        """Return the samples that two pieces share, at most."""
-        return 2 * self._margin + self.used.decimation
 
     def keep(self, piece: Recording) -> int:
         """Return the stamp of the sample that the next piece begins with [ns]."""
@@ -82,20 +64,6 @@ class Cuts:
     @staticmethod
     def _stamp(piece: Recording, sample: int) -> int:
         return piece.start_ns + round(1e9 * float(piece.t[sample]))
-
-
-def _owned(
-    piece: Recording, rows: Regression, start_ns: float, stop_ns: float
-) -> Regression | None:
-    """Return the rows between two times [ns]; None if there are none."""
-    t = 1e9 * rows.motion.t
-    inside = (t >= start_ns - piece.start_ns) & (t < stop_ns - piece.start_ns)
-    if inside.all():
-        return rows
-    which = np.flatnonzero(inside)
-    if not len(which):
-        return None
-    return rows.select(which)
 
 
 def streamed(
@@ -127,7 +95,7 @@ def streamed(
         As of ``read_recording``.
 
     """
-    cuts: list[Cuts] = []  # made with the first piece, before any cut
+    cuts: list[_Cuts] = []  # made with the first piece, before any cut
     start = -np.inf
     for piece, last in read_pieces(
         path,
@@ -138,11 +106,15 @@ def streamed(
         settings=settings,
     ):
         if not cuts:
-            cuts.append(Cuts(choose(piece)))
+            cuts.append(_Cuts(choose(piece)))
         used = cuts[0].used
         (repaired,), _ = without_damage([piece], SignalSettings(used.cutoff_hz, used.decimation))
         stop = np.inf if last else float(cuts[0].end(piece))
-        parts = regressions(arm, columns, [repaired], used)
-        owned = [_owned(piece, rows, start, stop) for rows in parts]
-        yield repaired, [rows for rows in owned if rows is not None]
+        owned = []
+        for rows in regressions(arm, columns, [repaired], used):
+            t = 1e9 * rows.motion.t
+            inside = (t >= start - piece.start_ns) & (t < stop - piece.start_ns)
+            if inside.any():
+                owned.append(rows if inside.all() else rows.select(np.flatnonzero(inside)))
+        yield repaired, owned
         start = stop

@@ -1,14 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One stream of joint states out of several, each of which has some of the joints."""
+"""Joints by name, and one stream of joint states out of several that have some joints each."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 import numpy as np
+import numpy.typing as npt
 
 #: Samples of one sender that wait for those of the others.
 _WAITING = 1000
@@ -105,26 +108,57 @@ class JointMerger:
         self._parts.setdefault(joints, _Part(joints)).take(t, values)
         if self.missing:
             return []
-        first, *others = self._needed()
-        complete = []
-        while first.samples and all(part.reaches(first.samples[0][0]) for part in others):
-            t, values = first.samples.popleft()
-            rest = [part.at(t) for part in others]
-            merged = np.empty((len(values), self._n_joints))
-            for part, found in zip((*others, first), (*rest, values), strict=True):
-                if found is None:
-                    break
-                merged[:, part.joints] = found
-            else:
-                complete.append((t, merged))
-        return complete
-
-    def _needed(self) -> list[_Part]:
-        """Return the senders that bring a joint which none before them has, in their order."""
+        # the senders that bring a joint which none before them has
         found: list[_Part] = []
         known: set[int] = set()
         for part in self._parts.values():
             if not known.issuperset(part.joints):
                 found.append(part)
                 known.update(part.joints)
-        return sorted(found, key=lambda part: min(part.joints))
+        first, *others = sorted(found, key=lambda part: min(part.joints))
+        complete = []
+        while first.samples and all(part.reaches(first.samples[0][0]) for part in others):
+            t, values = first.samples.popleft()
+            rest = [part.at(t) for part in others]
+            merged = np.empty((len(values), self._n_joints))
+            for part, own in zip((*others, first), (*rest, values), strict=True):
+                if own is None:
+                    break
+                merged[:, part.joints] = own
+            else:
+                complete.append((t, merged))
+        return complete
+
+
+def joint_places(joints: Sequence[str], names: Sequence[str]) -> npt.NDArray[np.intp]:
+    """
+    Return the positions of wanted joints among the names of a message; others are left out.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        The joints that are wanted, in the order that is wanted.
+    names : sequence of str
+        Joint names of the message, such as JointState.name.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        ``position[indices]`` is in the order that is wanted.
+
+    Raises
+    ------
+    RecordingError
+        If joints are missing or named twice; the message lists them.
+
+    """
+    missing = [joint for joint in joints if joint not in names]
+    if missing:
+        raise RecordingError(
+            f'joint states without {", ".join(missing)}; they name '
+            f'{", ".join(names) or "no joints"}'
+        )
+    twice = [joint for joint in joints if list(names).count(joint) > 1]
+    if twice:
+        raise RecordingError(f'joint states name {", ".join(twice)} twice')
+    return np.array([list(names).index(joint) for joint in joints], dtype=np.intp)

@@ -10,7 +10,8 @@ sample in a hundred completes one and must not take longer than a stream can wai
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from armid_ros.identification.samples.straight_line import (
     Missed,
@@ -66,19 +67,21 @@ class NoiseLevel:
         self._finest, self._onset = finest, onset
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((SEEN, count), np.inf), np.zeros(count)
-        self._windows = Loudest(count, _REMEMBERED)
+        self._sizes, self._shares = np.zeros((2, _REMEMBERED, count))
+        self._seen = 0
         self._errors, self._moves = np.empty((2, WINDOW + together, count))
         self._waiting = 0
 
     def set(self, usual: Usual) -> None:
         """Take it as known what is usual."""
-        self._windows.clear()
-        self._windows.append(usual.size, usual.noisy)
+        self.forget()
+        self._remember(usual.size, usual.noisy)
         self.usual = usual
 
     def forget(self) -> None:
         """Measure the noise anew with the next `begin`."""
-        self._windows.clear()
+        self._sizes[:] = 0.0
+        self._seen = 0
 
     def begin(self, missed: Sequence[Missed], moves: FloatArray, period: float) -> None:
         """
@@ -96,7 +99,7 @@ class NoiseLevel:
         """
         self.see_steps(moves)
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
-        if not self._windows:
+        if not self._seen:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
             size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._least(period))
             self.usual = Usual(period, size, share_of_noise(errors, size))
@@ -116,10 +119,16 @@ class NoiseLevel:
         self._waiting = 0
         self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
         size = robust_scale(errors, SHARE)
-        self._windows.append(size, share_of_noise(errors, size))
+        self._remember(size, share_of_noise(errors, size))
         self.see_steps(moves)
-        loudest = np.maximum(self._windows.size, self._least(period))
-        self.usual = Usual(period, loudest, self._windows.noisy.copy())
+        loudest = np.argmax(self._sizes, axis=0)[np.newaxis]
+        size, noisy = (np.take_along_axis(x, loudest, 0)[0] for x in (self._sizes, self._shares))
+        self.usual = Usual(period, np.maximum(size, self._least(period)), noisy)
+
+    def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
+        place = self._seen % _REMEMBERED
+        self._sizes[place], self._shares[place] = size, noisy
+        self._seen += 1
 
     def see_steps(self, moves: FloatArray) -> None:
         """Learn the resolution from moves of shape (k, m)."""
@@ -128,67 +137,139 @@ class NoiseLevel:
         self._steps = np.partition(steps, SEEN - 1, axis=0)[:SEEN]
 
     def _least(self, period: float) -> FloatArray:
-        """
-        Return the smallest step of every signal, at least the finest one and that of an onset.
-
-        A signal that moves fast makes no small steps; but by its resolution it leaves any line.
-
-        """
+        """Return the smallest step of every signal, at least the finest and that of an onset."""
+        # A signal that moves fast makes no small steps; but by its resolution it leaves any line.
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
         least = np.maximum(self._finest, self._onset * period**2)
         return np.maximum(np.minimum(self._most, step), least)
 
 
-class Loudest:
+@dataclass(frozen=True, eq=False)
+class LineErrors:
     """
-    How large errors were in the loudest of the last windows, and what they were like there.
-
-    A window is compared with the loudest one before it, not with all that are remembered; these
-    are looked through only when the loudest is forgotten.
-
-    Parameters
-    ----------
-    count : int
-        Signals m.
-    most : int
-        Windows that are remembered.
+    Errors of the straight lines through the two samples before each.
 
     Attributes
     ----------
-    size, noisy : ndarray, shape (m,)
-        Size of the errors, and share of noise in them, in the window where each is largest.
+    stretch : ndarray of int, shape (N,)
+        First sample of the stretch without a long gap that a sample is of.
+    error : ndarray, shape (N, m)
+        How far off each sample is, when a smooth signal bends on; 0 for the first of a stretch.
+    bent : ndarray, shape (N, m)
+        How far off the straight line it is, over a period.
+    noise, bend : ndarray, shape (N, 1)
+        How much more noise, and an acceleration, make a prediction over this time miss than one
+        over a period.
+    usual : Usual
+        What is usual of the loudest part of the whole.
+    quantile : float
+        Standard deviations that a prediction may miss by.
 
     """
 
-    def __init__(self, count: int, most: int) -> None:
-        self._most = most
-        self._sizes, self._shares = np.empty((2, most, count))
-        self.clear()
+    stretch: npt.NDArray[np.intp]
+    error: FloatArray
+    bent: FloatArray
+    noise: FloatArray
+    bend: FloatArray
+    usual: Usual
+    quantile: float
 
-    def clear(self) -> None:
-        """Forget everything."""
-        self._seen = 0
-        self._when = np.zeros(self._sizes.shape[1], dtype=np.intp)
-        self.size, self.noisy = np.full((2, self._sizes.shape[1]), -np.inf)
+    def off(self, floor: FloatArray) -> FloatArray:
+        """
+        Return how far off each sample is, over what is too far.
 
-    def __len__(self) -> int:
-        """Return how many windows are remembered."""
-        return min(self._seen, self._most)
+        Parameters
+        ----------
+        floor : ndarray, shape (m,)
+            What a sample may be off by without consequence.
 
-    def append(self, size: FloatArray, noisy: FloatArray) -> None:
-        """Take in a window, arrays of shape (m,)."""
-        forgotten = np.flatnonzero(self._when == self._seen - self._most)
-        place = self._seen % self._most
-        self._sizes[place], self._shares[place] = size, noisy
-        self._take(np.flatnonzero(size > self.size), place, self._seen)
-        self._seen += 1
-        for signal in forgotten:
-            oldest_first = np.roll(self._sizes[:, signal], -(place + 1))
-            age = int(np.argmax(oldest_first))
-            self._take(signal, (place + 1 + age) % self._most, self._seen - self._most + age)
+        Returns
+        -------
+        ndarray, shape (N, m)
 
-    def _take(self, signals: np.intp | npt.NDArray[np.intp], place: int, when: int) -> None:
-        """Let a window be the loudest of some signals."""
-        self.size[signals] = self._sizes[place, signals]
-        self.noisy[signals] = self._shares[place, signals]
-        self._when[signals] = when
+        """
+        limit = self.usual.limits(self.quantile, self.noise, self.bend)
+        limit = np.maximum(limit, floor)
+        return np.asarray(np.abs(self.error) / np.maximum(limit, np.finfo(float).tiny))
+
+
+def line_errors(
+    t: FloatArray,
+    x: FloatArray,
+    turn: FloatArray,
+    max_gap: int,
+    quantile: Callable[[float], float],
+) -> LineErrors:
+    """
+    Return what the straight lines through two samples miss the next ones by, all at once.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Stamps, at least 3, each after the one before [s].
+    x : ndarray, shape (N, m)
+        Signals.
+    turn : ndarray, shape (m,)
+        Jumps of a signal that are none, 0 without.
+    max_gap : int
+        Periods beyond which a gap ends a stretch.
+    quantile : callable
+        Returns the standard deviations that a prediction may miss by, given the period [s].
+
+    """
+    dt, moves = np.diff(t), np.diff(x, axis=0)
+    moves -= np.rint(moves / np.where(turn > 0.0, turn, np.inf)) * turn
+    period = float(np.median(dt))
+    gap = dt > max_gap * period
+    first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
+    ratio = dt[1:] / dt[:-1]
+    noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
+    bend = 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2
+    error = moves[1:] - ratio[:, np.newaxis] * moves[:-1]
+    error[gap[1:] | gap[:-1]] = 0.0
+    usual = _usual(period, error / np.maximum(noise, bend)[:, np.newaxis])
+    smallest = np.minimum(_smallest_steps(np.abs(moves)), np.abs(error).max(axis=0))
+    usual = replace(usual, size=np.maximum(usual.size, smallest))
+    bent = error / bend[:, np.newaxis]
+    error[1:] -= usual.smoothness * bent[:-1] * bend[1:, np.newaxis]
+    none = np.zeros((2, x.shape[1]))
+    return LineErrors(
+        np.maximum.accumulate(first),
+        np.concatenate([none, error]),
+        np.concatenate([none, bent]),
+        np.concatenate([[1.0, 1.0], noise])[:, np.newaxis],
+        np.concatenate([[1.0, 1.0], bend])[:, np.newaxis],
+        usual,
+        quantile(period),
+    )
+
+
+def _usual(period: float, errors: FloatArray) -> Usual:
+    """Return what is usual of the loudest of all windows of errors (N, m)."""
+    windows = max(1, len(errors) // WINDOW)
+    size, longer = divmod(len(errors), windows)
+    signals, cut = errors.shape[1], longer * (size + 1)
+    parts = [
+        errors[:cut].reshape(longer, size + 1, signals),
+        errors[cut:].reshape(windows - longer, size, signals),
+    ]
+    parts = [part.swapaxes(0, 1) for part in parts if len(part)]
+    sizes = [robust_scale(part, SHARE) for part in parts]
+    noisy = np.concatenate([share_of_noise(*both) for both in zip(parts, sizes, strict=True)])
+    every = np.concatenate(sizes)
+    loudest = np.argmax(every, axis=0)[np.newaxis]
+    return Usual(
+        period,
+        np.take_along_axis(every, loudest, 0)[0],
+        np.take_along_axis(noisy, loudest, 0)[0],
+    )
+
+
+def _smallest_steps(steps: FloatArray) -> FloatArray:
+    """Return the smallest step of every signal that is seen so often, 0 where none is."""
+    steps = np.where(steps > 0.0, steps, np.inf)
+    if len(steps) < SEEN:
+        return np.zeros(steps.shape[1])
+    smallest = np.partition(steps, SEEN - 1, axis=0)[SEEN - 1]
+    return np.where(np.isfinite(smallest), smallest, 0.0)

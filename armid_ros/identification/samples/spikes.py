@@ -35,8 +35,7 @@ from dataclasses import replace
 import math
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.samples.line_errors import line_errors, LineErrors
-from armid_ros.identification.samples.noise_level import NoiseLevel, SEEN, SHARE, WINDOW
+from armid_ros.identification.samples.noise_level import line_errors, LineErrors, NoiseLevel
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
     Excursion,
@@ -154,15 +153,12 @@ class SpikeGate:
                 self.rejected['out_of_order'] += 1
             else:
                 good = self._take(early, floor)
-        if self._leaps(t):
+        ahead = 0.0 if self._tail is None else t - self._tail.t
+        if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
+            # something seems to be lost before it
             self._early = StreamSample(t, x)
             return good
         return good + self._take(StreamSample(t, x), floor)
-
-    def _leaps(self, t: float) -> bool:
-        """Return whether something seems to be lost before a sample."""
-        ahead = 0.0 if self._tail is None else t - self._tail.t
-        return _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf
 
     def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
         """Take in a sample whose stamp is not contradicted by the next one."""
@@ -175,13 +171,6 @@ class SpikeGate:
             return self._judge(sample, floor)
         self._first.append(sample)
         return self._begin(floor) if len(self._first) == FIRST else []
-
-    def rest(self) -> list[StreamSample]:
-        """Return the samples that still wait, at the end of a stream."""
-        waiting = self._first if self._first is not None else self._held
-        waiting = waiting + ([self._early] if self._early is not None else [])
-        self._restart([])
-        return waiting
 
     def begin(
         self, usual: Usual, known: Sequence[StreamSample] = (), bent: FloatArray | float = 0.0
@@ -206,10 +195,7 @@ class SpikeGate:
 
     def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
         """Return how far off the samples of a whole recording are, as `take` would predict."""
-        lines = line_errors(
-            t, x, self._turn, max_gap=self._max_gap, window=WINDOW, share=SHARE, seen=SEEN
-        )
-        return replace(lines, quantile=self._quantile_of(lines.usual.period))
+        return line_errors(t, x, self._turn, self._max_gap, self._quantile_of)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
@@ -367,13 +353,9 @@ class SpikeGate:
         return False
 
     def _stepped(self, floor: FloatArray | float) -> bool:
-        """
-        Return whether a signal that never steps has stepped between what is known and held.
-
-        The lines before and behind a step do not meet in between; those of a turn, as in a
-        collision, do.
-
-        """
+        """Return whether a signal that never steps has stepped between what is known and held."""
+        # The lines before and behind a step do not meet in between; those of a turn, as in a
+        # collision, do.
         ahead = missed_by(self._known, self._held[0], self._period)
         back = missed_by((self._held[1], self._held[0]), self._known[1], self._period)
         far = np.minimum(self._off_by(ahead, floor), self._off_by(back, floor))
@@ -390,13 +372,10 @@ class SpikeGate:
         return np.asarray(np.abs(missed.error) / limit)
 
     def _surely_in_line(self, missed: Missed, floor: FloatArray | float) -> bool:
-        """
-        Return whether a sample is within less than its limits, which takes a third of the time.
-
-        Limits grow with both times over which the prediction is made, and as fast as they do where
-        both grow alike; so they are at least those over a period times the smaller of the two.
-
-        """
+        """Return whether a sample is within less than its limits, in a third of the time."""
+        # Limits grow with both times over which the prediction is made, and as fast as they do
+        # where both grow alike; so they are at least those over a period times the smaller of the
+        # two.
         least, usual = self._least, self._level.usual
         if least is None or least[0] is not usual or least[1] != self._quantile:
             over_a_period = usual.limits(self._quantile, 1.0, 1.0)

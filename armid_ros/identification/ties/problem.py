@@ -17,7 +17,6 @@ from armid_ros.identification.rows.signals import (
     decimated_samples,
 )
 from armid_ros.model import (
-    BaseParameters,
     group_columns,
     inverse_dynamics,
     inverse_dynamics_derivatives,
@@ -25,7 +24,6 @@ from armid_ros.model import (
     rigid_parameter_names,
 )
 from armid_ros.model.spring_ties import (
-    Tie,
     tie_columns_derivatives,
     tie_geometry,
     TiedMachines,
@@ -123,6 +121,19 @@ class InteractionProblem:
         variance = np.diag(self.motion_noise)
         return np.asarray(np.sqrt(variance[: len(variance) // 3]))
 
+    def with_springs(self, kept: npt.NDArray[np.intp]) -> InteractionProblem:
+        """Return the problem with some of its springs only."""
+        columns = [*kept.tolist(), *range(len(self.segments), self.columns.shape[2])]
+        return replace(
+            self,
+            columns=self.columns[:, :, columns],
+            columns_by_motion=self.columns_by_motion[:, :, columns],
+            described=self.described[columns],
+            precision=self.precision[np.ix_(columns, columns)],
+            segments=tuple(self.segments[k] for k in kept),
+            spring_joints=tuple(self.spring_joints[k] for k in kept),
+        )
+
     def residual(self, theta: FloatArray) -> FloatArray:
         """Return what is left of the torques, shape (N, n) [N m]."""
         return np.asarray(self.tau - self.known - self.columns @ theta)
@@ -206,13 +217,16 @@ def interaction_problem(
     slow, far = motion.select(kept), other_motion.select(kept)
     geometry = tie_geometry(robot, motion.q, other, other_motion.q, ties)
     springs = geometry.pulled(slack)
-    springs_by = _springs_by_motion(robot, slow, other, far, ties, slack)
+    by_both = tie_columns_derivatives(robot, slow.q, other, far.q, ties, slack)
+    by_angles = np.concatenate(by_both, axis=3)
+    springs_by = np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], 3)
     if not separate:
         springs, springs_by = (x.sum(axis=2, keepdims=True) for x in (springs, springs_by))
     names = tuple(tie.name for tie in ties) if separate else ('all',)
     count = springs_by.shape[3] // 3
     if inertias == 'known':
-        body = _known_body(robot, motion, slow, count)
+        by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
+        body = _Body(inverse_dynamics(robot, motion), _placed(by, count))
     else:
         body = _free_body(
             robot, motion, slow, springs, count, names if separate else ('the springs',)
@@ -222,7 +236,7 @@ def interaction_problem(
     passed, left = np.diag([1.0, 0.0, 0.0])[np.newaxis], np.ones(1)
     if used is not None:
         tau, known, columns = (decimate(values, used) for values in (tau, known, columns))
-        passed, left = _passed(used), _torque_passed(used)
+        passed, left = _passed(used)
     noise = noise or MachineNoise()
     deviation = np.broadcast_to(np.asarray(noise.position, dtype=float), (count,))
     return InteractionProblem(
@@ -268,12 +282,6 @@ class _Body:
         return columns, np.concatenate([springs_by, self.columns_by], axis=2)
 
 
-def _known_body(robot: Robot, motion: Motion, slow: Motion, count: int) -> _Body:
-    """Return the torque of a body as it is described."""
-    by = np.stack(inverse_dynamics_derivatives(robot, slow), axis=2)
-    return _Body(inverse_dynamics(robot, motion), _placed(by, count))
-
-
 def _free_body(
     robot: Robot,
     motion: Motion,
@@ -284,49 +292,6 @@ def _free_body(
 ) -> _Body:
     """Return the inertial columns that are identifiable with the springs, and the prior."""
     body = regressor(robot, motion)
-    base = _identifiable(robot, body, springs, names)
-    spread = base.grouping * described_spread(robot).ravel()
-    return _Body(
-        np.zeros_like(motion.q),
-        np.zeros((*slow.q.shape, 3 * count)),
-        body[:, :, base.independent],
-        _placed(_regressor_by_motion(robot, slow, base.independent), count),
-        base.parameters,
-        base.values(robot.rigid_parameters),
-        np.asarray(np.linalg.inv(spread @ spread.T)),
-    )
-
-
-def _passed(used: Conditioning) -> FloatArray:
-    """
-    Return the filtered covariance of white noise in position, velocity, acceleration.
-
-    Of a row with itself and with later ones, shape (1 + lags, 3, 3). Columns change slowly
-    compared with the filter of the decimation, so noise passes it as if it were alone.
-
-    """
-    w = np.linspace(0.0, np.pi, 8001)
-    sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
-    gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
-    gain = gain * np.abs(signal.freqz(used.taps(), worN=w)[1]) ** 2
-    result = np.empty((1 + _LAGS, 3, 3))
-    for lag, i, j in np.ndindex(result.shape):
-        turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
-        result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
-    return result
-
-
-def _torque_passed(used: Conditioning) -> FloatArray:
-    """Return the same of white noise of torques, shape (1 + lags,)."""
-    taps = used.taps()
-    ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
-    return np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
-
-
-def _identifiable(
-    robot: Robot, body: FloatArray, springs: FloatArray, names: Sequence[str]
-) -> BaseParameters:
-    """Return the base parameters that are identifiable together with the springs."""
     every = rigid_parameter_names(robot)
     base = group_columns(body.reshape(-1, body.shape[2]), every, _RANK_TOLERANCE)
     w = np.concatenate([body[:, :, base.independent], springs], axis=2)
@@ -339,21 +304,34 @@ def _identifiable(
             f'{names[int(np.argmin(left))]}: its stiffness cannot be distinguished from weight '
             'and inertia along this motion; keep the inertias known, or move more'
         )
-    return base
+    spread = base.grouping * described_spread(robot).ravel()
+    return _Body(
+        np.zeros_like(motion.q),
+        np.zeros((*slow.q.shape, 3 * count)),
+        body[:, :, base.independent],
+        _placed(_regressor_by_motion(robot, slow, base.independent), count),
+        base.parameters,
+        base.values(robot.rigid_parameters),
+        np.asarray(np.linalg.inv(spread @ spread.T)),
+    )
 
 
-def _springs_by_motion(
-    robot: Robot,
-    motion: Motion,
-    other: Robot,
-    other_motion: Motion,
-    ties: Sequence[Tie],
-    slack: float | FloatArray,
-) -> FloatArray:
-    """Return the derivatives of the spring columns, shape (N, n, S, 3 J)."""
-    by_q, by_far = tie_columns_derivatives(robot, motion.q, other, other_motion.q, ties, slack)
-    by_angles = np.concatenate([by_q, by_far], axis=3)
-    return np.concatenate([by_angles, np.zeros_like(by_angles), np.zeros_like(by_angles)], axis=3)
+def _passed(used: Conditioning) -> tuple[FloatArray, FloatArray]:
+    """Return what filters leave of white noise of positions and of torques, of rows and lags."""
+    # of position, velocity, acceleration of a row with itself and with later ones, shape
+    # (1 + lags, 3, 3), and of torques, (1 + lags,). Columns change slowly compared with the filter
+    # of the decimation, so noise passes it as if it were alone
+    w = np.linspace(0.0, np.pi, 8001)
+    sections = signal.butter(4, used.cutoff_hz, fs=used.rate_hz, output='sos')
+    gain = np.abs(signal.sosfreqz(sections, w)[1]) ** 4
+    gain = gain * np.abs(signal.freqz(used.taps(), worN=w)[1]) ** 2
+    result = np.empty((1 + _LAGS, 3, 3))
+    for lag, i, j in np.ndindex(result.shape):
+        turned = np.cos(w * lag * used.decimation + (i + j) * np.pi / 2.0)
+        result[lag, i, j] = (-1) ** i * np.mean(gain * (used.rate_hz * w) ** (i + j) * turned)
+    taps = used.taps()
+    ends = [len(taps) - lag * used.decimation for lag in range(1 + _LAGS)]
+    return result, np.array([taps[:end] @ taps[-end:] if end > 0 else 0.0 for end in ends])
 
 
 def _regressor_by_motion(robot: Robot, motion: Motion, kept: npt.NDArray[np.intp]) -> FloatArray:

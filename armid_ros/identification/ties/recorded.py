@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import comb
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects.tied import Tied, TiedSlack
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.signals import (
     Conditioning,
@@ -15,6 +18,7 @@ from armid_ros.identification.rows.signals import (
     segments,
     SignalSettings,
 )
+from armid_ros.identification.rows.spectrum import mean_spectrum
 from armid_ros.identification.ties.problem import (
     Inertias,
     interaction_problem,
@@ -27,7 +31,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import recorded_together, Recording
 from armid_ros.robots import Robot
 import numpy as np
-from scipy import signal
 
 #: Order of the differences that noise is measured by.
 _ORDER = 6
@@ -131,11 +134,12 @@ def together_interaction_problem(
     for stretch, own in zip(segments(both, used), segments(recording, used), strict=True):
         assert own.tau is not None
         tau = own.tau if rest is None else own.tau - rest(own)
+        far = (np.array(x[:, n:]) for x in (stretch.q, stretch.dq, stretch.ddq))
         problems.append(
             interaction_problem(
                 machines,
                 own.with_torque(tau),
-                _joints(stretch, slice(n, None), both.joints[n:]),
+                Motion(both.joints[n:], stretch.t, *far),
                 noise=noise,
                 used=used,
                 inertias=inertias,
@@ -181,12 +185,6 @@ def _one_machine(recording: Recording) -> Recording:
     )
 
 
-def _joints(motion: Motion, columns: slice, joints: tuple[str, ...]) -> Motion:
-    assert motion.tau is not None
-    parts = (motion.q, motion.dq, motion.ddq, motion.tau)
-    return Motion(joints, motion.t, *(np.array(part[:, columns]) for part in parts))
-
-
 def band_of_motion(
     recordings: Sequence[Recording],
     used: Conditioning,
@@ -220,25 +218,62 @@ def band_of_motion(
 
 def _crossing(recording: Recording, rate: float) -> float:
     """Return where the motion of the fastest angle sinks into its noise [Hz]."""
-    frequency, power = signal.welch(
-        recording.q,
-        fs=rate,
-        window='blackmanharris',
-        nperseg=min(len(recording.t), int(_SPECTRUM * rate)),
-        detrend='linear',
-        axis=0,
-    )
+    frequency, power = mean_spectrum([recording.q], rate, 'linear', _SPECTRUM)
     above = power > _ABOVE * 2.0 * _white(recording.q) ** 2 / rate
     above[-1] = False
     return max(float(frequency[2:][np.argmin(column)]) for column in above[2:].T)
 
 
 def _white(signals: FloatArray) -> FloatArray:
-    """
-    Return the standard deviation of white noise in signals of shape (N, n).
-
-    Differences of high order leave nothing of a motion that is sampled densely.
-
-    """
+    """Return the standard deviation of white noise in signals of shape (N, n)."""
+    # Differences of high order leave nothing of a motion that is sampled densely.
     differences = np.diff(signals, _ORDER, axis=0)
     return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * _ORDER, _ORDER)))
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """
+    What white noise of the sensors does to the torques of an arm beside another machine.
+
+    Beside springs the noise of angles is most of what there is, and it is known from their spectra
+    far better than from what two periods of some seconds differ by.
+
+    Attributes
+    ----------
+    robot : Robot
+        The arm as described.
+    recording : Recording
+        Of it, with what was beside it.
+    used : Conditioning
+        Filters.
+
+    """
+
+    robot: Robot
+    recording: Recording
+    used: Conditioning
+
+    def floor(self, arm: ArmModel) -> FloatArray:
+        """Return the standard deviation of a row beside an arm with its ties, (n,) [N m]."""
+        problem = self._taut
+        stiffness = dict.fromkeys(problem.spring_joints, 0.0)
+        slack = dict.fromkeys(problem.spring_joints, 0.0)
+        for effect, values in zip(arm.effects, arm.values, strict=True):
+            if isinstance(effect, Tied):
+                each = len(values) // len(effect.joints)
+                stiffness.update(zip(effect.joints, values[::each].tolist(), strict=True))
+            if isinstance(effect, TiedSlack):
+                slack.update(zip(effect.joints, effect.slacks.tolist(), strict=True))
+        if any(slack.values()):
+            problem = self._problem(np.array(list(slack.values())))
+        return problem.deviation(np.array(list(stiffness.values())))
+
+    @cached_property
+    def _taut(self) -> InteractionProblem:
+        return self._problem(0.0)
+
+    def _problem(self, slack: float | FloatArray) -> InteractionProblem:
+        return together_interaction_problem(
+            self.robot, self.recording, self.used, separate=True, slack=slack
+        )

@@ -25,20 +25,16 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 from scipy.optimize import minimize
 
-#: Steps of Gauss and Newton, and of the quasi-Newton method where they do not lead to the end.
-_ITERATIONS = 30, 300
+#: Steps of the quasi-Newton method.
+_ITERATIONS = 300
 #: Solutions of linear equations that lead to where the iteration begins.
 _LINEAR = 4
-#: Iterations that take the torques' noise as the residuals have it.
-_FREE = 5
-#: Iterations after which it stays as it is.
-_SETTLED = 25
-#: Steps below this share of a standard deviation end the iteration.
+#: Gradients below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
-#: A step that overshoots is halved so many times, one that is too short doubled so many.
-_HALVINGS, _DOUBLINGS = 10, 4
-#: Of the residuals' mean square at least this share is the torques' own noise.
+#: Share of the residuals' mean square that is noise of torques where none was measured.
 _LEAST_SHARE = 0.01
+#: A stiffness so many standard deviations above zero is there: a chance of 3e-5 for each.
+LEAST_Z = 4.0
 #: Torque per stiffness below which a spring is not drawn out, root mean square [m^2].
 _DRAWN_OUT = 1e-9
 
@@ -106,8 +102,8 @@ def identify_interaction(
     problem : InteractionProblem
         Torques, columns and their derivatives: see ``interaction_problem``.
     torque_noise : float or ndarray, shape (n,), optional
-        Standard deviation of the torques [N m]; by default as it was measured in a recording, or
-        from the residuals. What residuals have beyond it widens the intervals.
+        Standard deviation of the torques [N m]; by default as it was measured in a recording.
+        What residuals have beyond it widens the intervals.
 
     Raises
     ------
@@ -122,22 +118,12 @@ def identify_interaction(
     columns = np.concatenate([together, problem.columns[:, :, count:]], axis=2)
     theta = _least_squares(problem, columns)
     theta = np.concatenate([np.full(count, theta[0]), theta[1:]])
-    given = _given(problem, torque_noise)
-    used = _torque_variance(problem, theta) if given is None else given
+    noise = problem.torque_noise if torque_noise is None else np.asarray(torque_noise)
+    least = _LEAST_SHARE * np.mean(problem.residual(theta) ** 2, axis=0) + 1e-18
+    used = np.where(noise > 0.0, noise**2, least)
     for _ in range(_LINEAR):
         theta = _compensated(problem, theta, used)
-        used = _torque_variance(problem, theta) if given is None else given
-    for iteration in range(_ITERATIONS[0]):
-        if given is None and iteration < _SETTLED:  # or the two chase each other
-            share = 1.0 / max(1, iteration - _FREE)
-            used = (1.0 - share) * used + share * _torque_variance(problem, theta)
-        step, information, _, _ = _gauss_newton(problem, theta, used)
-        step = _scaled(problem, theta, step, used)
-        theta = theta + step
-        if step @ information @ step < _CONVERGED**2 * len(step):
-            break
-    else:
-        theta = _along_the_valley(problem, theta, used)
+    theta = _most_likely(problem, theta, used)
     freedom = max(1, problem.tau.size - len(theta))
     misfit = _misfit(problem, theta, used)
     excess = max(1.0, misfit / freedom)
@@ -158,12 +144,8 @@ def identify_interaction(
 def _compensated(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """
-    Solve the normal equations less what noise adds to them on average.
-
-    Linear, so that it leads from anywhere to near the solution; weights are those at theta.
-
-    """
+    """Solve the normal equations less what noise adds to them on average."""
+    # Linear, so that it leads from anywhere to near the solution; weights are those at theta.
     weight = np.linalg.inv(_noise(problem, problem.sensitivity(theta), variance))
     weighted = np.einsum('nij,njp->nip', weight, problem.columns)
     each = np.einsum('nij,njpx->nipx', weight, problem.columns_by_motion @ problem.motion_noise)
@@ -177,44 +159,13 @@ def _compensated(
     return np.asarray(np.linalg.solve(matrix / np.outer(size, size), aim / size) / size)
 
 
-def _scaled(
-    problem: InteractionProblem, theta: FloatArray, step: FloatArray, variance: FloatArray
-) -> FloatArray:
-    """
-    Return a step, by powers of two as long as the weighted residuals become smaller.
-
-    Where noise makes most of a column, as of accelerations that are small, the information is too
-    large and steps are too short, ten times and more; others overshoot. Nothing if none is good.
-
-    """
-    before = _loss(problem, theta, variance)
-    reached = _loss(problem, theta + step, variance)
-    for _ in range(_HALVINGS):
-        if reached <= before:
-            break
-        step = step / 2.0
-        reached = _loss(problem, theta + step, variance)
-    else:
-        return np.zeros_like(step)
-    for _ in range(_DOUBLINGS):
-        further = _loss(problem, theta + 2.0 * step, variance)
-        if further >= reached:
-            break
-        step, reached = 2.0 * step, further
-    return step
-
-
-def _along_the_valley(
+def _most_likely(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> FloatArray:
-    """
-    Return the solution, from a theta near it, by a quasi-Newton method (BFGS).
-
-    Where noise makes most of a column the loss is a valley much flatter than the information says,
-    in which steps of Gauss and Newton go to and fro. The curvature is learned from the gradients,
-    beginning with the information.
-
-    """
+    """Return the solution, from a theta near it, by a quasi-Newton method (BFGS)."""
+    # where noise makes most of a column the loss is a valley much flatter than the information
+    # says, in which steps of Gauss and Newton go to and fro; the curvature is learned from the
+    # gradients, beginning with the information
     _, information, _, _ = _gauss_newton(problem, theta, variance)
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
@@ -222,15 +173,17 @@ def _along_the_valley(
 
     def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
         here = theta + unit @ z
-        step, information, _, _ = _gauss_newton(problem, here, variance)
-        return 0.5 * _loss(problem, here, variance), -unit.T @ information @ step
+        gradient, _, _, _ = _gauss_newton(problem, here, variance)
+        away = here - problem.described
+        loss = _misfit(problem, here, variance) + float(away @ problem.precision @ away)
+        return 0.5 * loss, -unit.T @ gradient
 
     found = minimize(
         half_loss,
         np.zeros(len(theta)),
         jac=True,
         method='BFGS',
-        options={'gtol': _CONVERGED, 'maxiter': _ITERATIONS[1]},
+        options={'gtol': _CONVERGED, 'maxiter': _ITERATIONS},
     )
     if not np.max(np.abs(found.jac)) < 10.0 * _CONVERGED:
         raise IdentificationError(
@@ -238,11 +191,6 @@ def _along_the_valley(
             f'{1e3 * problem.typical_way:.2g} mm; filter them, or move more'
         )
     return np.asarray(theta + unit @ found.x)
-
-
-def _loss(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
-    away = theta - problem.described
-    return _misfit(problem, theta, variance) + float(away @ problem.precision @ away)
 
 
 def _misfit(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
@@ -263,35 +211,12 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
 
-def _given(problem: InteractionProblem, noise: FloatArray | float | None) -> FloatArray | None:
-    """Return the torques' variance as asked for or as measured in them, if it was."""
-    if noise is None and np.all(problem.torque_noise > 0.0):
-        noise = problem.torque_noise
-    if noise is None:
-        return None
-    return np.broadcast_to(np.asarray(noise, dtype=float) ** 2, problem.tau.shape[1:]).copy()
-
-
-def _torque_variance(problem: InteractionProblem, theta: FloatArray) -> FloatArray:
-    """Return what of the residuals' variance the angles do not explain, shape (n,)."""
-    residual = problem.residual(theta)
-    by_motion = problem.sensitivity(theta)
-    explained = np.mean(np.sum(by_motion @ problem.motion_noise * by_motion, axis=2), axis=0)
-    total = np.mean(residual**2, axis=0)
-    least = np.maximum(problem.torque_noise**2, _LEAST_SHARE * total + 1e-18)
-    return np.asarray(np.maximum(total - explained, least))
-
-
 def _gauss_newton(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """
-    Return the step of the parameters and their information, and what both are made of.
-
-    These are the columns at the motion that the residuals make likely, shape (N, n, P), and the
-    residuals over their covariance, shape (N, n).
-
-    """
+    """Return minus the gradient of half the loss, the information, and what both are made of."""
+    # These are the columns at the motion that the residuals make likely, shape (N, n, P), and the
+    # residuals over their covariance, shape (N, n).
     by_motion = problem.sensitivity(theta)
     covariance = _noise(problem, by_motion, variance)
     pull = np.linalg.solve(covariance, problem.residual(theta)[..., np.newaxis])[..., 0]
@@ -301,9 +226,7 @@ def _gauss_newton(
     information += problem.precision
     gradient = np.einsum('nip,ni->p', columns, pull)
     gradient += problem.precision @ (problem.described - theta)
-    size = np.sqrt(np.diag(information))
-    step = np.linalg.solve(information / np.outer(size, size), gradient / size) / size
-    return np.asarray(step), np.asarray(information), np.asarray(columns), np.asarray(pull)
+    return np.asarray(gradient), np.asarray(information), np.asarray(columns), np.asarray(pull)
 
 
 def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatArray) -> FloatArray:
@@ -315,14 +238,10 @@ def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatAr
 def _covariance(
     problem: InteractionProblem, theta: FloatArray, variance: FloatArray, excess: float
 ) -> FloatArray:
-    """
-    Return the covariance of the parameters at the solution, H^-1 B H^-1.
-
-    B is that of the scores. Filters make neighbours alike, by how much is known; where the scores
-    add up to more, as of noise that was not white before, deviations are widened (Newey and West
-    1987). Poses are independent, and B is H.
-
-    """
+    """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
+    # B is that of the scores. Filters make neighbours alike, by how much is known; where the
+    # scores add up to more, as of noise that was not white before, deviations are widened (Newey
+    # and West 1987). Poses are independent, and B is H.
     _, information, columns, pull = _gauss_newton(problem, theta, variance)
     size = np.sqrt(np.diag(information))
     scaled = np.linalg.inv(information / np.outer(size, size))

@@ -9,8 +9,7 @@ import math
 from typing import NamedTuple
 
 from armid_ros.errors import RecordingError
-from armid_ros.identification.samples.joint_merge import JointMerger
-from armid_ros.identification.samples.joint_order import JointOrder
+from armid_ros.identification.samples.joint_merge import joint_places, JointMerger
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
 from armid_ros.recording.joint_state.message import (
@@ -83,7 +82,7 @@ class JointStateReader:
     """
 
     def __init__(self, joints: tuple[str, ...], complaints: Complaints, clock: Clock) -> None:
-        self._joints = JointOrder(joints)
+        self._joints = joints
         self._complaints = complaints
         self._clock = clock
         self._messages = JointStateMessages()
@@ -139,15 +138,15 @@ class JointStateReader:
     def _match(self, names: Sequence[str]) -> None:
         """Learn where the joints are in messages with these names."""
         self._names = None
-        some = tuple(k for k, joint in enumerate(self._joints.joints) if joint in names)
-        whole = len(some) == len(self._joints.joints)
+        some = tuple(k for k, joint in enumerate(self._joints) if joint in names)
+        whole = len(some) == len(self._joints)
         if whole or not some or self._whole:
-            self._order = self._joints.map(names)
+            self._order = joint_places(self._joints, names)
             self._merger, self._whole = None, True
         else:
-            wanted = JointOrder(tuple(self._joints.joints[k] for k in some))
-            self._order, self._some = wanted.map(names), some
-            self._merger = self._merger or JointMerger(len(self._joints.joints))
+            self._order = joint_places([self._joints[k] for k in some], names)
+            self._some = some
+            self._merger = self._merger or JointMerger(len(self._joints))
 
     def _merged(
         self, stamp: float, q: FloatArray, dq: FloatArray | None, tau: FloatArray
@@ -161,7 +160,7 @@ class JointStateReader:
         ]
         self._alone = 0 if found else self._alone + 1
         if self._alone > _PATIENCE:
-            missing = [self._joints.joints[k] for k in self._merger.missing]
+            missing = [self._joints[k] for k in self._merger.missing]
             self._complaints.say(
                 'joint_states',
                 f'joint states without {", ".join(missing)}; they name {", ".join(self._names)}'
@@ -189,7 +188,7 @@ class JointStateReader:
     @property
     def _wanted(self) -> tuple[str, ...]:
         """Joints of the last message, in their order."""
-        joints = self._joints.joints
+        joints = self._joints
         return joints if self._merger is None else tuple(joints[k] for k in self._some)
 
     def _ordered(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:

@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import design, DesignSettings, Excitation, Limits, random_feasible
-from armid_ros.identification.identify import Fit, Identification, identify
+from armid_ros.identification.identify import Identification, identify
+from armid_ros.identification.rows.regression import Fit
 from armid_ros.model import gravity_composites, inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.lunar.paper import PaperTable, TABLES

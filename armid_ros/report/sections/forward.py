@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.identification.assess.forward import ForwardScore
-from armid_ros.identification.assess.verification import ForwardValidation
+from armid_ros.identification.assess.verification import ForwardScore, ForwardValidation
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.charts import Chart, Role, Series, thinned
 from armid_ros.report.notation import digits, torque_unit

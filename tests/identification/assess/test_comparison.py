@@ -5,7 +5,7 @@ import json
 
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.assess.comparison import compare
+from armid_ros.identification.assess.compare import compare
 from armid_ros.identification.parameters_file import ParameterFile, read_parameters
 from armid_ros.report.compare_report import tell
 import numpy as np

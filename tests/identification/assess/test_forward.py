@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.assess.forward import forward_validation
+from armid_ros.identification.assess.verification import forward_validation
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
 import pytest

@@ -8,8 +8,8 @@ import re
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identification_document, identify, Score
+from armid_ros.identification.assess.grade import beyond_noise, torque_noise
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.joint_errors import beyond_noise, torque_noise
 from armid_ros.recording import read_recording, ReadReport
 from armid_ros.robots import load_robot
 import numpy as np

@@ -8,15 +8,12 @@ import re
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification.assess import mistakes
-from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.hypotheses import (
+    delayed,
     hypotheses,
-    InDegrees,
-    InUnit,
+    in_unit,
     known_gravity,
-    LateTorque,
-    OtherGravity,
-    OtherUnit,
+    other_gravity,
 )
 from armid_ros.identification.assess.mistakes import (
     faulty_samples,
@@ -257,7 +254,7 @@ def test_a_centre_of_a_wrist_a_few_millimetres_off_is_no_wrong_zero(robot):
     ],
 )
 def test_weight_half_as_much_again_is_of_masses_and_not_of_gravity(robot, vector, believed):
-    assert OtherGravity(vector).material(robot, LIMITS) is believed
+    assert other_gravity(robot, np.array(vector)).material is believed
 
 
 @pytest.mark.parametrize('pair', [(0, 1), (1, 2), (2, 3), (0, 3)])
@@ -308,7 +305,7 @@ def test_a_unit_of_all_torques_is_no_gravity_and_no_current(robot, factor, unit,
     wrong = replace(recording, tau=factor * recording.tau)
     used = conditioning([wrong], SignalSettings())
     found = find_mistake(robot, wrong, used)
-    assert [type(one) for one in found.hypotheses] == [OtherUnit]
+    assert [one.kind for one in found.hypotheses] == ['scale']
     assert f'the efforts of all joints seem to be in {unit}' in found.sentence(robot)
     assert not found.hypotheses[0].disputable
 
@@ -352,9 +349,9 @@ def test_positions_within_a_turn_are_not_in_degrees(robot, sound):
     rest = np.zeros_like(sound.q)
     motion = Motion(sound.joints, sound.t, sound.q, rest, rest, sound.tau)
     turned = replace(motion, q=with_column(sound.q, 2, np.rad2deg))
-    for joint in range(robot.n_joints):
-        assert not InDegrees(joint).possible([motion])
-        assert InDegrees(joint).possible([motion, turned]) == (joint == 2)
+    for motions, expected in (([motion], []), ([motion, turned], [(None,), (2,)])):
+        found = [one.where for one in hypotheses(robot, motions) if one.kind == 'degrees']
+        assert found == expected
 
 
 def test_gravity_of_the_earth_on_a_recording_from_the_moon(robot):
@@ -393,7 +390,7 @@ def test_a_slide_jumps_by_metres_and_pushes_in_newtons():
     q = np.array(recording.q)
     q[700:720, 0] += 40.0
     assert 'lift jumps by 40 m at 7.000 s' in mistake_in(lift, replace(recording, q=q))
-    said = InUnit(0, 'N mm').sentence(lift)
+    said = in_unit(lift, 0, 'N mm').text
     assert said == 'the torque of lift seems to be in mN instead of N: convert it'
 
 
@@ -412,11 +409,11 @@ def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, soun
     assert 'the arm as fitted' in said
 
 
-def test_every_hypothesis_has_a_sentence_with_its_joints(robot):
-    for one in (LateTorque(0.02, 0.004), *hypotheses(robot)):
-        said = one.settled(np.ones(3)).sentence(robot)
-        places = (getattr(one, name, None) for name in ('joint', 'first', 'second'))
-        named = [robot.joints[place] for place in places if place is not None]
+def test_every_hypothesis_has_a_sentence_with_its_joints(robot, sound):
+    turned = Motion(sound.joints, sound.t, *np.tile(np.rad2deg(sound.q), (4, 1, 1)))
+    for one in (delayed(0.02, 0.004), *hypotheses(robot, [turned])):
+        said = one.settled(9.0 * np.ones(3)).text if one.settled else one.text
+        named = [robot.joints[place] for place in one.where if isinstance(place, int)]
         assert 'seem' in said and all(name in said for name in named)
 
 

@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from armid_ros.identification.fitting.cutoff import cutoff_of_torques
+from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 from scipy import signal

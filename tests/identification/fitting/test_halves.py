@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each half of the data predicts the other, as far as it tells what is asked."""
 
-from armid_ros.identification.fitting.halves import halves_error
+from armid_ros.identification.fitting.held_out import halves_error
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import Motion
 import numpy as np

@@ -7,9 +7,9 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
-from armid_ros.identification.fitting.held import base_spread
+from armid_ros.identification.fitting.excited import base_spread
 from armid_ros.identification.fitting.identifiability import NOT_SHOWN
-from armid_ros.identification.identify import Score
+from armid_ros.identification.rows.regression import Score
 import numpy as np
 import pytest
 

@@ -7,7 +7,7 @@ What values vary by from recording to recording is their variance, whatever make
 
 """
 
-from armid_ros.identification.fitting.jackknife import jackknife, scatter
+from armid_ros.identification.fitting.normal_equations import jackknife, scatter
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import Motion
 import numpy as np

@@ -116,7 +116,7 @@ def test_pairs_too(robot, pair):
 @pytest.mark.long
 @pytest.mark.parametrize('name', ['load_dependent_friction', 'torque_gain'])
 def test_bodies_are_fitted_to_what_the_torque_is(robot, name):
-    _, recording, result = fitted(robot, [name], physical=PhysicalSettings(weights=(1e-5, 1e-3)))
+    _, recording, result = fitted(robot, [name], physical=PhysicalSettings())
     training = error(result.training)
     assert error(result.predict([recording])) == pytest.approx(training, rel=1e-3)
     np.testing.assert_allclose(

@@ -9,13 +9,15 @@ import copy
 import time
 
 from armid_ros.identification.online import identifier as online_identifier
-from armid_ros.identification.online.background import at_once, Background, Foreground
+from armid_ros.identification.online.background import at_once, Background
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.running.steady import steady
 import numpy as np
 import pytest
 
 from benchmarks import changes
+
+from ..conftest import Foreground
 
 #: Of the samples [Hz], and when the arm picks something up [s].
 RATE, BEFORE = 200.0, 25.0

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 from armid_ros.errors import IdentificationError
-from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 from armid_ros.identification.online.square_root import PRIOR_STD
@@ -105,15 +105,6 @@ def test_weights_count_as_repeated_observations_and_zero_leaves_a_row_out():
     assert estimator.samples == np.sum(weights.any(axis=1))
 
 
-def test_prior_counts_as_earlier_data():
-    rows, tau, _ = linear_data(np.random.default_rng(3))
-    first = feed(RecursiveLeastSquares(names(8), NOISE), rows[:100], tau[:100]).estimate
-    second = feed(RecursiveLeastSquares(names(8), NOISE, prior=first), rows[100:], tau[100:])
-    whole = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau)
-    np.testing.assert_allclose(second.values, whole.values, rtol=1e-8)
-    np.testing.assert_allclose(second.covariance, whole.covariance, rtol=1e-8, atol=1e-12)
-
-
 def test_covariance_is_the_scatter_of_the_estimates():
     """The squared errors, measured by the covariance, are chi-square over 60 noises."""
     total = 0.0
@@ -189,8 +180,9 @@ def test_forgetting_keeps_the_window_it_promises():
 
 def test_information_never_falls():
     rng = np.random.default_rng(9)
-    prior = Estimate(names(5), np.zeros(5), 1e4 * np.eye(5))
-    estimator = RecursiveLeastSquares(names(5), NOISE, forgetting=0.95, prior=prior)
+    estimator = RecursiveLeastSquares(names(5), NOISE, forgetting=0.95)
+    for known in np.split(1e-2 * np.eye(6, 5), 2):
+        estimator.update(known, known @ np.ones(5))
     before = estimator.covariance
     for _ in range(500):
         rows = rng.normal(size=(3, 5)) * 10.0 ** rng.uniform(-4, 2)
@@ -247,7 +239,7 @@ def test_bad_update_is_refused_and_changes_nothing(rows, tau, weights, message):
     np.testing.assert_array_equal(estimator.covariance, before.covariance)
 
 
-def test_reset_returns_to_the_prior():
+def test_reset_returns_to_the_beginning():
     rows, tau, _ = linear_data(np.random.default_rng(12))
     estimator = feed(RecursiveLeastSquares(names(8), NOISE), rows, tau)
     once = estimator.estimate
@@ -264,10 +256,6 @@ def test_bad_settings_are_refused():
         RecursiveLeastSquares(names(2), forgetting=1.1)
     with pytest.raises(IdentificationError, match='standard deviation'):
         RecursiveLeastSquares(names(2), [1.0, 0.0])
-    with pytest.raises(IdentificationError, match='other parameters'):
-        RecursiveLeastSquares(names(2), prior=Estimate(names(1), np.zeros(1), np.eye(1)))
-    with pytest.raises(IdentificationError, match='positive definite'):
-        RecursiveLeastSquares(names(2), prior=Estimate(names(2), np.zeros(2), np.zeros((2, 2))))
     with pytest.raises(IdentificationError, match='start'):
         RecursiveLeastSquares(names(2), start=[1.0, 2.0, 3.0])
 

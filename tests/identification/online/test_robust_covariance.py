@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from tests.identification.conftest import FRICTION, multisine
+from tests.identification.conftest import Foreground, FRICTION, multisine
 
 
 def coloured(shape, keep, rng):
@@ -28,7 +28,7 @@ def test_the_deviation_of_a_mean_is_that_of_theory(keep):
     count = 40_000
     noise = coloured((count, 1), keep, np.random.default_rng(1))
     mean = noise.mean(axis=0)
-    scores = RobustCovariance(400)
+    scores = RobustCovariance(400, 1.0, Foreground())
     for value in noise:
         scores.add(np.ones((1, 1)), value, mean)
     covariance = scores.covariance(np.array([[np.sqrt(count)]]))
@@ -44,7 +44,7 @@ def test_residuals_are_those_of_the_latest_estimate():
     root = np.linalg.qr(rows.reshape(-1, 3), mode='r')
     covariances = []
     for first in (np.zeros(3), truth):
-        scores = RobustCovariance(400)
+        scores = RobustCovariance(400, 1.0, Foreground())
         for k, (row, error) in enumerate(zip(rows, noise, strict=True)):
             scores.add(row, row @ truth + error, truth if k > 3000 else first)
         covariances.append(scores.covariance(root))
@@ -57,7 +57,7 @@ def test_changes_of_what_is_hardly_excited_leave_a_covariance(seed):
     """What rounding takes of the information when values are reopened is restored."""
     rng = np.random.default_rng(seed)
     size, rank = 12, rng.integers(2, 8)
-    scores = RobustCovariance(16, 0.99)
+    scores = RobustCovariance(16, 0.99, Foreground())
     basis, scale = rng.normal(size=(rank, size)), 10.0 ** rng.uniform(-3, 3, size)
     for k in range(400):
         rows = rng.normal(size=(2, rank)) @ basis * scale
@@ -74,7 +74,7 @@ def test_after_a_change_the_noise_is_still_known():
     rng = np.random.default_rng(3)
     rows, noise = rng.normal(size=(4000, 1, 3)), rng.normal(size=(4000, 1))
     before, after = np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, -4.0])
-    scores, direction = RobustCovariance(400), np.array([[0.0], [0.0], [1.0]])
+    scores, direction = RobustCovariance(400, 1.0, Foreground()), np.array([[0.0], [0.0], [1.0]])
     for row, error in zip(rows[:3900], noise[:3900], strict=True):
         scores.add(row, row @ before + error, before)
     scores.reopen(direction, after)

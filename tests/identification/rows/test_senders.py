@@ -5,8 +5,8 @@
 from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.rows.senders import two_senders
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.identification.rows.stamps import two_senders
 from armid_ros.recording import Recording
 import numpy as np
 import pytest

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The noise of predictions and the resolution of signals are measured as they are."""
 
-from armid_ros.identification.samples.noise_level import Loudest, NoiseLevel, WINDOW
+from armid_ros.identification.samples.noise_level import NoiseLevel, WINDOW
 from armid_ros.identification.samples.straight_line import Missed, robust_scale
 import numpy as np
 import pytest
@@ -38,31 +38,6 @@ def test_a_signal_at_rest_is_held_to_its_resolution():
     errors[:5] = 0.003
     moves = np.where(errors > 0.0, 0.003, 0.0)
     assert learned(NoiseLevel(1), errors, moves).size == pytest.approx(0.003)
-
-
-@pytest.mark.parametrize('most', [1, 2, 7, 50])
-def test_the_loudest_is_the_loudest_of_all_that_are_remembered(most):
-    """Also when it is forgotten, and where two are alike the older one is meant."""
-    rng = np.random.default_rng(0)
-    sizes = rng.integers(0, 12, (300, 3)).astype(float)
-    shares = rng.random((300, 3))
-    loudest = Loudest(3, most)
-    for k, (size, share) in enumerate(zip(sizes, shares, strict=True)):
-        loudest.append(size, share)
-        kept = slice(max(0, k + 1 - most), k + 1)
-        oldest = np.argmax(sizes[kept], axis=0)
-        assert len(loudest) == len(sizes[kept])
-        np.testing.assert_array_equal(loudest.size, sizes[kept].max(axis=0))
-        np.testing.assert_array_equal(loudest.noisy, shares[kept][oldest, np.arange(3)])
-
-
-def test_the_loudest_begins_anew():
-    loudest = Loudest(1, 5)
-    loudest.append(np.array([9.0]), np.array([0.1]))
-    loudest.clear()
-    assert not len(loudest)
-    loudest.append(np.array([1.0]), np.array([0.7]))
-    assert (loudest.size, loudest.noisy) == (1.0, 0.7)
 
 
 def test_the_robust_scale_is_the_quantile_of_numpy():

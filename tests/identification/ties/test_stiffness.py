@@ -13,10 +13,8 @@ from armid_ros.identification.ties.problem import (
     MachineNoise,
 )
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
-from armid_ros.identification.ties.search import find_interaction
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import Motion
-from armid_ros.papers.exo.identification.poses import choose_poses, stiffness_bound
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping, TiedPair
 from armid_ros.recording import Recording
@@ -25,6 +23,7 @@ import pytest
 from scipy.stats import chi2
 
 from benchmarks.exo_noise import find_springs, measured, recorded, TORQUE_NOISE, with_torques
+from benchmarks.exo_poses import choose_poses, stiffness_bound
 
 STATE = ('q', 'dq', 'ddq')
 STIFFNESS = 1.0e4
@@ -143,26 +142,6 @@ def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
     motions = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 4.0, 1e-3)))
     own, other = measured(motions, 0.05, np.random.default_rng(seed))
     return recorded(own), recorded(other)
-
-
-def test_hidden_springs_are_found_where_they_are(pair) -> None:
-    real = leg_pair(3e3, ('swing_thigh', 'stance_shank'))
-    found = find_interaction(
-        pair.robot, pair.other, pair.ties, two_sides(real, 0), two_sides(real, 1)
-    )
-    assert set(found.segments) == {'swing_thigh', 'stance_shank'}
-    assert found.interaction is not None
-    np.testing.assert_allclose(found.interaction.stiffness, 3e3, rtol=0.1)
-    assert found.closed_fraction > 0.5
-
-
-def test_no_springs_no_name(pair) -> None:
-    loose = pair.with_stiffness(0.0)
-    found = find_interaction(
-        pair.robot, pair.other, pair.ties, two_sides(loose, 2), two_sides(loose, 3)
-    )
-    assert found.segments == ()
-    assert found.interaction is None
 
 
 @pytest.mark.slow

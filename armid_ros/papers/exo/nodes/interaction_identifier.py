@@ -12,7 +12,7 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.identification.rows.causal import LARGEST
 from armid_ros.identification.samples.joint_gate import joint_gate
-from armid_ros.identification.samples.joint_order import JointOrder
+from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
@@ -81,7 +81,7 @@ class InteractionIdentifierNode(ArmidNode):
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         core = self.identifier
-        self._orders = JointOrder(core.robot.joints), JointOrder(core.other.joints)
+        self._joints = core.robot.joints, core.other.joints
         self._gates = tuple(
             joint_gate(robot.prismatic, signals, torque_limit=robot.torque_limit)
             for robot, signals in ((core.robot, 'qt'), (core.other, 'q'))
@@ -178,7 +178,7 @@ class InteractionIdentifierNode(ArmidNode):
         """Return samples of what a machine sends, without those that are damaged."""
         topic, gate = _TOPICS[machine], self._gates[machine]
         try:
-            order = self._orders[machine].map(message.name)
+            order = joint_places(self._joints[machine], message.name)
             parts = [np.array(getattr(message, name)) for name in fields]
             for name, part in zip(fields, parts, strict=True):
                 if len(part) != len(message.name):

@@ -1,7 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The cut-off of positions that the torques ask for.
+How well parts of the data predict others: what a fit to its own data does not show.
+
+Where motion is too short or too poor, parameters are what the noise makes them; either half then
+gives others, and predicts the other half badly.
 
 Where the spectrum of a position stands out of white noise it may still be no motion that a torque
 makes: stamps that jitter, steps of an encoder and slack in a gear look like motion and are
@@ -13,7 +16,8 @@ cut-off is the one with which torques are predicted best that were not fitted.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -25,6 +29,9 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
+#: Rows that are enough to compare halves and cut-offs: some fifty for every parameter of seven
+#: joints, and some hundred.
+_OF_HALVES, _OF_CUTOFFS = 4000, 6000
 #: A cut-off is compared with one lower by this factor.
 _STEP = 0.5
 #: A cut-off that loses more of the rows at the ends of stretches is too low for them.
@@ -34,8 +41,102 @@ _STRETCHES = 16
 #: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
 #: more on every machine that was tried.
 _NEAR = 0.1
-#: Rows that are enough to compare cut-offs, some hundred for every parameter of seven joints.
-_ROWS = 6000
+
+
+class _Rows(NamedTuple):
+    """Some rows of all stretches: columns (N, n, r), torque, target and which tell, (N, n)."""
+
+    columns: FloatArray
+    tau: FloatArray
+    target: FloatArray
+    told: npt.NDArray[np.bool_]
+    step: int
+
+    @classmethod
+    def of(cls, problem: Sequence[Regression], most: int) -> _Rows:
+        """Return about so many rows."""
+        step = max(1, sum(len(part.tau) for part in problem) // most)
+        return cls(
+            np.concatenate([part.columns for part in problem])[::step],
+            np.concatenate([part.tau for part in problem])[::step],
+            np.concatenate([part.target for part in problem])[::step],
+            np.concatenate([part.informative for part in problem])[::step],
+            step,
+        )
+
+
+@dataclass(frozen=True)
+class HalvesError:
+    """
+    Relative torque error when either half of the data predicts the other.
+
+    Attributes
+    ----------
+    whole : float
+        Of all joints together [%].
+    joints : ndarray, shape (n,)
+        Of each joint, as a share of its own torque [%].
+
+    """
+
+    whole: float
+    joints: FloatArray
+
+
+def halves_error(
+    problem: Sequence[Regression],
+    weights: FloatArray,
+    described: FloatArray,
+    spread: FloatArray | None = None,
+) -> HalvesError:
+    """
+    Fit the first half and predict the second, and the other way round.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        N rows of r columns, in the order of time.
+    weights : ndarray, shape (N, n)
+        What the fit multiplied the rows of every joint by: the inverse of their residual.
+    described : ndarray, shape (r,)
+        Values of the description, where those stay that a half does not tell.
+    spread : ndarray, shape (r,), optional
+        What they may be off by; as much as the torque there is if nothing is said.
+
+    Returns
+    -------
+    HalvesError
+        Of the predicted torque.
+
+    """
+    columns, tau, target, told, step = _Rows.of(problem, _OF_HALVES)
+    rest, weight = target - columns @ described, weights[::step]
+    most = np.full(len(described), np.inf) if spread is None else spread
+    middle = len(tau) // 2
+    halves = slice(0, middle), slice(middle, None)
+    left = np.zeros_like(tau)
+    for fitted, predicted in (halves, halves[::-1]):
+        # a Bayesian estimate in units of the residual, of changes as large as the description may
+        # be off by, or as the torque there is; without it, what a half does not tell at all would
+        # be any number. Where next to nothing is left, the residual is no unit, and what a half
+        # does not tell stays as it is described
+        own = weight[fitted]
+        stacked = (columns[fitted] * own[:, :, np.newaxis]).reshape(-1, columns.shape[2])
+        size = np.sqrt(np.mean(stacked**2, axis=0))
+        size = np.where(size > 0.0, size, 1.0)
+        torque = np.sqrt(np.mean((tau[fitted] * own) ** 2))
+        stacked = stacked / size
+        normal = stacked.T @ stacked
+        normal[np.diag_indices_from(normal)] += 1.0 / max(torque, 1.0) ** 2 + (most * size) ** -2.0
+        aim = stacked.T @ (rest[fitted] * own).ravel()
+        change = informative_solution(normal, aim) / size
+        left[predicted] = rest[predicted] - columns[predicted] @ change
+    error, length = (np.linalg.norm(told * rows, axis=0) for rows in (left, tau))
+    whole = float(np.linalg.norm(length))
+    return HalvesError(
+        float(100.0 * np.linalg.norm(error) / whole) if whole > 0.0 else 0.0,
+        100.0 * np.divide(error, length, out=np.zeros_like(error), where=length > 0.0),
+    )
 
 
 def cutoff_of_torques(
@@ -95,12 +196,8 @@ def cutoff_of_torques(
 def _shared(
     problem: Sequence[Sequence[Regression]], shorter: Sequence[Sequence[Regression]]
 ) -> list[Regression]:
-    """
-    Return the rows of each recording that a lower cut-off has as well.
-
-    It cuts more off the ends, where arms start and stop: other rows have other losses.
-
-    """
+    """Return the rows of each recording that a lower cut-off has as well."""
+    # It cuts more off the ends, where arms start and stop: other rows have other losses.
     result = []
     for parts, others in zip(problem, shorter, strict=True):
         for part in parts:
@@ -120,22 +217,11 @@ def _as_good(losses: FloatArray, best: FloatArray) -> bool:
 
 
 def _losses(problem: Sequence[Regression]) -> FloatArray:
-    """
-    Predict every second stretch from the others, and those from it.
-
-    Every joint counts by the ratio of its errors: a light one whose torque is mostly noise gains
-    by a low cut-off, and must not hide that a heavy one loses.
-
-    Returns
-    -------
-    ndarray, shape (S,)
-        Logarithm of the root mean square of the residual, mean of the joints, of each stretch.
-
-    """
-    step = max(1, sum(len(part.tau) for part in problem) // _ROWS)
-    x = np.concatenate([part.columns for part in problem])[::step]
-    y = np.concatenate([part.target for part in problem])[::step]
-    told = np.concatenate([part.informative for part in problem])[::step]
+    """Return the log of the rms that others leave of each stretch, mean of joints, shape (S,)."""
+    # every second stretch is predicted from the others, and those from it; every joint counts by
+    # the ratio of its errors: a light one whose torque is mostly noise gains by a low cut-off, and
+    # must not hide that a heavy one loses
+    x, _, y, told, _ = _Rows.of(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)
     whole = _fit(x, y, told, np.ones(y.shape[1]))
