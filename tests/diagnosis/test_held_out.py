@@ -213,14 +213,3 @@ def test_two_blocks_that_are_alike_are_no_more_sure_than_white_noise(bench):
     square[:2], cross[:2] = (7.0, 6.0), (7.1, 5.9)
     alike = replace(trial, square=square, cross=cross)
     assert alike.z == pytest.approx(13.0 / np.sqrt(13.0))
-
-
-def test_without_candidates_all_products_are_those_of_the_nuisance_columns(bench):
-    problem = make_problem(np.random.default_rng(5))
-    free = problem.x[:, :, OWN:]
-    known = products(problem, range(OWN, OWN + FREE), ())
-    again = with_candidate(known, problem, free, free[:, :, :0])
-    assert again.border.shape == (len(known.power), FREE, 0)
-    np.testing.assert_allclose(known.free.sum(axis=0), np.einsum('rnp,rnq->pq', free, free))
-    none = products(replace(problem, x=problem.x[:, :, :0]), (), ())
-    np.testing.assert_allclose(none.power, known.power)

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.next_run import plan
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Named
@@ -186,21 +185,6 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
         measured = np.sqrt(max(squares(pair.rival) - own, 0.0))
         assert measured == pytest.approx(pair.z, rel=0.5)
     assert chosen.expected_z > 5.0
-
-
-def test_a_motion_is_designed_only_where_no_template_is_enough(doubtful, monkeypatch):
-    designed = []
-
-    def design(*arguments, **options):
-        designed.append(arguments)
-        raise TrajectoryError('asked')
-
-    monkeypatch.setattr(plan, 'design', design)
-    assert plan.next_run(doubtful, np.random.default_rng(1)).expected_z > 5.0
-    assert not designed
-    monkeypatch.setattr(plan, '_SURE', np.inf)
-    plan.next_run(doubtful, np.random.default_rng(1))
-    assert designed
 
 
 def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen):

@@ -62,16 +62,6 @@ def test_a_value_is_as_unsure_as_what_the_rest_has_along_any_cause(bench):
     assert wide.estimate.std[0] == pytest.approx(10.0 * white, rel=0.2)
 
 
-def test_nothing_named_is_nothing_to_widen(bench):
-    recordings = bench.recordings()
-    used = conditioning(recordings, SignalSettings())
-    data = tuple(trajectories(recordings, used, bench.arm))
-    sigma = tuple(np.full(2, 0.03) for _ in data)
-    evidence = Evidence.over_noise(data, sigma)
-    fitted = fit(bench.arm, (), evidence, None)
-    assert widened(fitted, evidence, None, 9.0) is fitted
-
-
 def with_body(fitted, evidence, rng):
     """Return a fit with a body of one parameter beside the value, and a baseline of 40 rows."""
     body = [rng.normal(size=own.shape) for own in fitted.columns]
@@ -112,10 +102,3 @@ def test_a_value_that_no_data_tell_stays_untold_where_others_are_changes(bench):
     untold = replace(fitted, estimate=replace(fitted.estimate, covariance=np.array([[np.inf]])))
     wider, prior, baseline, _ = with_body(untold, evidence, np.random.default_rng(3))
     assert as_change(wider, evidence, prior, baseline).estimate.std[0] == np.inf
-
-
-def test_where_nothing_is_named_nothing_has_changed(bench):
-    _, evidence = coulomb_of(bench, lambda m, tau: on_elbow(0.0 * tau[:, 1]))
-    none = fit(bench.arm, (), evidence, None)
-    prior = Prior((), (np.ones((4, 1, 1)),), (np.zeros((4, 1)),), np.eye(1))
-    assert as_change(none, evidence, prior, None) is none
