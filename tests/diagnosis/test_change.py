@@ -37,19 +37,6 @@ def test_what_was_there_already_is_not_named(bench):
 
 
 @pytest.mark.long
-def test_a_change_beside_it_is(bench):
-    def with_drag(motion, tau):
-        return hose(motion, tau) + np.array([0.0, 1.2]) * np.sign(motion.dq)
-
-    before = bench.recordings(hose, seed=1)
-    after, new = (bench.recordings(with_drag, seed=seed) for seed in (2, 3))
-    found = asked(bench, before, after, new)
-    (first, *others) = found.findings
-    assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
-    assert first.values[0] == pytest.approx(1.2, abs=4.0 * first.std[0])
-
-
-@pytest.mark.long
 def test_the_gap_is_where_the_cause_is_and_not_where_a_motion_shows_more_of_the_misfit(bench):
     """The hose is stretched more in the recordings that were not used."""
 

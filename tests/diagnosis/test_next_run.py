@@ -135,29 +135,6 @@ def test_every_motion_to_choose_from_keeps_clear_where_careless_ones_do_not(benc
         assert list(still) == ([True, False] if template.joints else [False, False])
 
 
-def test_the_worth_of_a_motion_is_what_the_rival_leaves(bench, doubtful):
-    trajectory = FourierTrajectory(
-        bench.robot.joints, 10.0, np.array([0.2, 0.7]), np.full((2, 1), 0.5), np.full((2, 1), 0.3)
-    )
-    (own,) = doubtful.explanation.fitted.named
-    zero = CATALOGUE['encoder_offset'].on(bench.robot, ('elbow',))
-    assert not doubtful.refitted
-    power = Separation.of(doubtful, Doubt(own, zero), trajectory).power
-    motion = trajectory.motion(np.arange(1000) / 50.0)
-    speed = np.abs(motion.dq)
-    used = doubtful.data[0].used
-    unit = doubtful.explanation.evidence.sigma
-    sigma = np.sqrt(np.mean(np.square(unit), axis=0))
-    rows = used.rate_hz / used.decimation / 50.0
-    weight = np.where(speed > 0.02 * speed.max(axis=0), np.sqrt(rows) / sigma, 0.0)
-    (value,) = doubtful.arm.values_of(own.effect)
-    target = (weight * [0.0, value]).ravel()
-    slope = (weight * doubtful.arm.columns_of(zero, motion)[:, :, 0]).ravel()
-    left = target @ target - (target @ slope) ** 2 / (slope @ slope)
-    assert left > 10.0
-    assert power == pytest.approx(left, rel=1e-6)
-
-
 def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen):
     motion = chosen.excitation.motion(200.0)
     rng = np.random.default_rng(3)
