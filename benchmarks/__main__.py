@@ -22,7 +22,7 @@ LIBRARY = {
     'two_days',
 }
 #: Run only when they are asked for: they take an hour.
-LONG = {'ablation', 'endurance'}
+LONG = {'endurance'}
 
 
 def main() -> int:

@@ -3,32 +3,27 @@
 """
 What is lost over half an hour at 1 kHz, and what kills at random moments leave.
 
-    python -m benchmarks.endurance [--kills 100] [--commands 200] [--minutes 30] [--seed 0]
+    python -m benchmarks.endurance [--kills 100] [--minutes 30] [--seed 0]
 
 A part of 0 is left out. Kills: a recorder of 3,000 messages/s is killed with SIGKILL; what was
-published and is not in its bag is lost. Commands: `armid` is killed with SIGKILL, and every file
-that it leaves in its output has to be whole. Minutes: a player publishes a bag of 7 joints at
-1 kHz and a recorder records it; both as processes. Losses are to be measured on an otherwise idle
-machine; the load is printed.
+published and is not in its bag is lost. Minutes: a player publishes a bag of 7 joints at 1 kHz and
+a recorder records it; both as processes. Losses are to be measured on an otherwise idle machine;
+the load is printed. What a killed command leaves: tests/files/test_staging.py.
 
 """
 
 from __future__ import annotations
 
 import argparse
-from collections import Counter
-import json
 import os
 from pathlib import Path
 import re
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 
 from armid_ros.errors import ArmidError
-from armid_ros.files import load_yaml
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import make_executor
 from armid_ros.recording import read_recording, Recording, write_recording
@@ -44,8 +39,6 @@ RATE, TOPICS = 1000, 3
 MOST_LOST, FLAT = 0.2, 0.05
 #: How long memory is left to settle, and how often it is looked at [s].
 WARM_UP, LOOK = 60.0, 5.0
-#: Files whose names begin so are not results yet.
-UNFINISHED = '.'
 
 
 def verdict(reached: bool) -> str:
@@ -113,133 +106,6 @@ def kills(folder: Path, count: int, rng: np.random.Generator) -> bool:
     reached = not unread and bool(most <= MOST_LOST)
     print(f'  all read, at most {MOST_LOST} s lost: {verdict(reached)}')
     return reached
-
-
-# --- kills of armid -------------------------------------------------------------------------
-
-
-def prepared(folder: Path) -> dict[str, list[str]]:
-    """Return commands, each with {out} for what it writes."""
-    run, other = folder / 'run', folder / 'other'
-    robot = ['--robot', 'humanoid_arm']
-    for bag, seed in ((run, '0'), (other, '1')):
-        armid('simulate', *robot, '--rate', '250', '--seed', seed, '--out', str(bag))
-    armid('identify', str(run), *robot, '--out', str(folder / 'result'))
-    crashed = folder / 'crashed.mcap'
-    content = next(run.glob('*.mcap')).read_bytes()
-    crashed.write_bytes(content[: 2 * len(content) // 3])
-    return {
-        'identify': ['identify', str(run), *robot, '--validate', str(other), '--out', '{out}'],
-        'simulate': ['simulate', *robot, '--rate', '250', '--out', '{out}'],
-        'recover': ['recover', str(crashed), '--out', '{out}'],
-        'excite': ['excite', *robot, '--kind', 'multisine', '--duration', '8', '--out', '{out}'],
-        'inspect': ['inspect', str(run), *robot, '--out', '{out}'],
-        'compare': ['compare', str(folder / 'result'), str(folder / 'result'), '--out', '{out}'],
-    }
-
-
-def armid(*arguments: str) -> None:
-    """Run a command to its end."""
-    command = [sys.executable, '-m', 'armid_ros.cli', *arguments]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-
-
-def how_long(command: list[str], out: Path) -> tuple[float, float]:
-    """Return when a command begins to write, and when it ends [s]."""
-    begin = time.perf_counter()
-    running = start(command, out)
-    first = None
-    while running.poll() is None:
-        if first is None and any(out.parent.iterdir()):
-            first = time.perf_counter() - begin
-        time.sleep(0.002)
-    if running.returncode:
-        raise SystemExit(f'{" ".join(command)}: ended with {running.returncode}')
-    end = time.perf_counter() - begin
-    return (end if first is None else first), end
-
-
-def start(command: list[str], out: Path) -> subprocess.Popen[bytes]:
-    """Start a command that writes somewhere."""
-    line = [part.format(out=out) for part in command]
-    return subprocess.Popen(
-        [sys.executable, '-m', 'armid_ros.cli', *line],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-
-
-def broken(out: Path) -> list[str]:
-    """Return what is not whole in an output."""
-    if not out.exists():
-        return []
-    found = []
-    for path in sorted(p for p in out.rglob('*') if p.is_file()):
-        if any(part.startswith(UNFINISHED) for part in path.relative_to(out).parts):
-            continue
-        try:
-            whole = is_whole(path)
-        except (ArmidError, ValueError, OSError) as error:
-            whole, path = False, Path(f'{path}: {error}')
-        if not whole:
-            found.append(str(path))
-    return found
-
-
-def is_whole(path: Path) -> bool:
-    """Return whether a file is as its writer left it at its end."""
-    if path.suffix == '.mcap':
-        described = (path.parent / 'metadata.yaml').is_file()
-        return described and path.read_bytes()[-8:] == b'\x89MCAP0\r\n'
-    text = path.read_text()
-    if path.suffix == '.json':
-        return bool(json.loads(text))
-    if path.suffix == '.yaml':
-        return bool(load_yaml(text)) and text.endswith('\n')
-    if path.suffix == '.html':
-        return text.rstrip().endswith('</html>')
-    return text.endswith('\n')
-
-
-def commands(folder: Path, count: int, rng: np.random.Generator) -> bool:
-    """Kill commands at random moments; print what they left."""
-    left: dict[str, Counter[str]] = {}
-    damage = []
-    ready = prepared(folder)
-    spans = {}
-    for name, command in ready.items():
-        (folder / f'whole_{name}').mkdir()
-        spans[name] = how_long(command, folder / f'whole_{name}' / 'out')
-    for number in range(count):
-        name = list(ready)[number % len(ready)]
-        begins, ends = spans[name]
-        # one in four at any moment, the others while something is written
-        low = 0.0 if rng.random() < 0.25 else max(0.0, begins - 0.1)
-        moment = float(rng.uniform(low, 1.05 * ends))
-        where = folder / f'command_{number}'
-        where.mkdir()
-        running = start(ready[name], where / 'out')
-        try:
-            running.wait(timeout=moment)
-        except subprocess.TimeoutExpired:
-            running.kill()
-            running.wait()
-        bad = broken(where / 'out')
-        damage += [f'{name} killed after {moment:.2f} s: {path}' for path in bad]
-        state = 'absent' if not (where / 'out').exists() else 'some or all files'
-        state = 'broken' if bad else state
-        left.setdefault(name, Counter())[state] += 1
-        left[name]['ended before'] += running.returncode == 0
-    print(f'\n{count} kills of armid, load {load()}')
-    columns = ('absent', 'some or all files', 'broken', 'ended before')
-    print(f'  {"command":10} {"writes":>14}' + ''.join(f'{name:>19}' for name in columns))
-    for name, counts in left.items():
-        span = '{:.1f} to {:.1f} s'.format(*spans[name])
-        print(f'  {name:10} {span:>14}' + ''.join(f'{counts[column]:19}' for column in columns))
-    for line in damage:
-        print(f'  {line}')
-    print(f'  every output whole or absent: {verdict(not damage)}')
-    return not damage
 
 
 # --- half an hour ---------------------------------------------------------------------------
@@ -311,17 +177,15 @@ def main() -> int:
     """Measure and print; 1 if a bound does not hold."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--kills', type=int, default=100, help='of a recorder')
-    parser.add_argument('--commands', type=int, default=200, help='kills of armid')
     parser.add_argument('--minutes', type=float, default=30.0, help='of playing and recording')
     parser.add_argument('--seed', type=int, default=0)
     arguments = parser.parse_args()
     reached = []
     with tempfile.TemporaryDirectory(prefix='armid-endurance-') as name:
         folder, rng = Path(name), np.random.default_rng(arguments.seed)
-        for part, size in ((kills, arguments.kills), (commands, arguments.commands)):
-            if size:
-                reached.append(part(folder, size, rng))
-                sys.stdout.flush()
+        if arguments.kills:
+            reached.append(kills(folder, arguments.kills, rng))
+            sys.stdout.flush()
         if arguments.minutes:
             reached.append(half_an_hour(folder, arguments.minutes))
     return 0 if all(reached) else 1

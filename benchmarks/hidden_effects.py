@@ -9,7 +9,7 @@ laboratory asks for everything that is there: the sizes that are hidden are mult
 and so nothing is too small to matter (a share of the torque of zero is material).
 
     python -m benchmarks.hidden_effects [SET] [--slice] [--only TEXT]
-        [--baseline] [--single] [--out DIR]
+        [--single] [--out FOLDER]
 
 """
 
@@ -32,21 +32,15 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import DiagnosisSettings
 from armid_ros.diagnosis.verdict.finding import Overlay
 from armid_ros.effects import CATALOGUE
-from armid_ros.motion import FloatArray
 import numpy as np
 
-from benchmarks.bic_selection import bic_selection
 from benchmarks.looks import look, results_of
 from tests.hidden.cases import Case, make_case, VISIBLE
-from tests.hidden.catalogue import HIDDEN
-from tests.hidden.scoring import confusion, Finding, Judged, Metric, Outcome, score, Truth
+from tests.hidden.scoring import Finding, Judged, Metric, Outcome, score, Truth
 from tests.hidden.specification import case_list, CaseSpec, SETS
 
 #: Every so many cases of a kind are in the slice.
 SLICE = {'single': 9, 'free': 20, 'pair': 8, 'outside': 5, 'removed': 10}
-
-#: What a baseline that only names effects can be compared in.
-BASELINE_METRICS = ('false alarms', 'wrong names', 'top-1 name right', 'pairs exact')
 
 
 def nominal_arm(case: Case) -> ArmModel:
@@ -123,7 +117,6 @@ def share_closed(case: Case, overlays: Sequence[Overlay]) -> float:
 
 def outcome_of(document: dict[str, Any], closed: float, seconds: float) -> Outcome:
     """Read an outcome from a document of the schema armid/diagnosis/1."""
-    gap = document.get('gap', {})
     return Outcome(
         verdict=document['verdict'],
         findings=tuple(
@@ -140,9 +133,6 @@ def outcome_of(document: dict[str, Any], closed: float, seconds: float) -> Outco
             for effect in document['effects']
         ),
         closed=closed,
-        before=_rms(gap.get('before')),
-        after=_rms(gap.get('after')),
-        floor=_rms(gap.get('noise_floor')),
         seconds=seconds,
     )
 
@@ -164,28 +154,6 @@ def judge_single(spec: CaseSpec) -> Judged:
     end = int(np.searchsorted(fastest.recording.t, fastest.periods[0][1]))
     alone = replace(fastest, recording=fastest.recording.select(slice(0, end)))
     outcome = run_diagnosis(replace(case, bags=(alone,), validation=()))
-    return Judged(Truth.of(case), outcome)
-
-
-def judge_baseline(spec: CaseSpec) -> Judged:
-    """Make a case and let textbook model selection name what is hidden."""
-    case = make_case(spec)
-    library = tuple(name for name in CATALOGUE if name not in case.removed)
-    begin = time.process_time()
-    groups = bic_selection(
-        nominal_arm(case),
-        [bag.recording for bag in case.bags],
-        DiagnosisSettings(library=library),
-        np.random.default_rng(0),
-    )
-    joints: dict[str, list[str]] = {}
-    for group in groups:
-        joints.setdefault(group.effect.name, []).extend(group.effect.joints)
-    outcome = Outcome(
-        verdict='named' if groups else 'consistent',
-        findings=tuple(Finding(name, tuple(dict.fromkeys(own))) for name, own in joints.items()),
-        seconds=time.process_time() - begin,
-    )
     return Judged(Truth.of(case), outcome)
 
 
@@ -240,74 +208,14 @@ def table(metrics: Iterable[Metric]) -> str:
     return '\n'.join(rows)
 
 
-def compare(judged: Sequence[Judged], baseline: Sequence[Judged]) -> None:
-    """
-    Print the rates that both have, beside each other.
-
-    The baseline fits the rigid body anew: what only the model as described shows is left out.
-
-    """
-    seen = [j.truth.key for j in judged if not any(HIDDEN[name].rigid for name in j.truth.names)]
-    tables = [
-        {m.name: m for m in score([j for j in one if j.truth.key in seen])}
-        for one in (judged, baseline)
-    ]
-    print(
-        f'\n{"without wrong values of the rigid body":40s} {"diagnosis":>20s} {"pooled BIC":>20s}'
-    )
-    for name in BASELINE_METRICS:
-        pair = [table[name] for table in tables]
-        shown = [f'{m.value:.3f} ({m.low:.2f} - {m.high:.2f})' for m in pair]
-        print(f'{name:30s} {pair[0].count:9d} {shown[0]:>20s} {shown[1]:>20s}')
-    counts = [
-        [len(j.findings) for j in one if j.truth.kind == 'free'] for one in (judged, baseline)
-    ]
-    means = ' '.join(f'{np.mean(c) if c else np.nan:20.2f}' for c in counts)
-    print(f'{"names where nothing is hidden":30s} {len(counts[0]):9d} {means}')
-
-
-def write(judged: Sequence[Judged], folder: Path) -> None:
-    """Write all outcomes as JSON, and the confusion matrix as a figure."""
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = [{'truth': asdict(j.truth), 'outcome': asdict(j.outcome)} for j in judged]
-    table = [asdict(metric) for metric in score(judged)]
-    document = {'metrics': table, 'cases': rows}
-    (folder / 'outcomes.json').write_text(json.dumps(document, indent=1, default=float))
-    draw_confusion(judged, folder / 'confusion.svg')
-
-
-def draw_confusion(judged: Sequence[Judged], path: Path) -> None:
-    """Draw which hidden effects are named what: rows hidden, columns named first."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    import matplotlib.pyplot as plt
-
-    rows, columns, counts = confusion(judged)
-    share = counts / counts.sum(axis=1, keepdims=True)
-    size = 0.28 * len(columns) + 3.0, 0.24 * len(rows) + 2.6
-    figure, axes = plt.subplots(figsize=size, layout='constrained')
-    axes.imshow(share, cmap='Blues', vmin=0.0, vmax=1.0, aspect='auto')
-    for i, k in zip(*np.nonzero(counts), strict=True):
-        colour = 'white' if share[i, k] > 0.6 else 'black'
-        axes.text(k, i, counts[i, k], ha='center', va='center', fontsize=7, color=colour)
-    axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=7)
-    axes.set_yticks(range(len(rows)), rows, fontsize=7)
-    axes.set_xlabel('named first, or verdict without a name')
-    axes.set_ylabel('hidden')
-    figure.savefig(path)
-    plt.close(figure)
-
-
 def main() -> None:
     """Run a set of cases, print the table and write what is asked for."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.hidden_effects')
     parser.add_argument('set', nargs='?', choices=SETS)
     parser.add_argument('--slice', action='store_true', help='a few cases of every kind')
     parser.add_argument('--only', nargs='+', default=[], metavar='TEXT', help='keys that have it')
-    parser.add_argument('--baseline', action='store_true', help='pooled BIC on the same cases')
     parser.add_argument('--single', action='store_true', help='one period of one recording each')
-    parser.add_argument('--out', type=Path, help='folder for outcomes.json and confusion.svg')
+    parser.add_argument('--out', type=Path, help='folder for outcomes.json')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
     for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
@@ -320,10 +228,11 @@ def main() -> None:
         print(f'\n{report(judged)}')
         if record is not None:
             record['results'] = results_of(score(judged))
-    if options.baseline:
-        compare(judged, run(specs, options.processes, judge_baseline))
     if options.out:
-        write(judged, options.out)
+        rows = [{'truth': asdict(j.truth), 'outcome': asdict(j.outcome)} for j in judged]
+        options.out.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(rows, indent=1, default=float)
+        (options.out / 'outcomes.json').write_text(text, encoding='utf-8')
 
 
 def _part(options: argparse.Namespace) -> str:
@@ -337,11 +246,6 @@ def _part(options: argparse.Namespace) -> str:
 
 def _number(value: Any) -> float:
     return float('nan') if value is None else float(value)
-
-
-def _rms(joints: dict[str, float] | None) -> float:
-    values: FloatArray = np.array(list((joints or {}).values()), dtype=float)
-    return float(np.sqrt(np.mean(values**2))) if len(values) else float('nan')
 
 
 if __name__ == '__main__':

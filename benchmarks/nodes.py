@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The nodes at speed: what is lost at 1 kHz and by a kill, update times, lock step.
+The nodes at speed: what is lost at 1 kHz, update times, lock step; kills: benchmarks.endurance.
 
 ``python -m benchmarks.nodes [--seconds 60]``; the identifier runs in this process, the arm and the
 recorder in theirs. Losses are to be measured on an otherwise idle machine.
@@ -199,43 +199,6 @@ def in_lock_step(rate, folder):
     )
 
 
-def killed(folder, number):
-    """Kill a recorder of three topics at 1 kHz each; return what was lost [s]."""
-    with private_context() as context:
-        executor = make_executor('events', context)
-        node = Node('source', context=context, use_global_arguments=False)
-        executor.add_node(node)
-        publishers = [
-            node.create_publisher(JointState, f'arm{k}/joint_states', 10) for k in range(3)
-        ]
-        message = JointState(name=[f'joint{k}' for k in range(7)])
-        message.position = message.velocity = message.effort = [0.1] * 7
-
-        def publish():
-            now = time.time_ns()
-            message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, 10**9)
-            for publisher in publishers:
-                publisher.publish(message)
-
-        node.create_timer(0.001, publish)
-        bag = folder / f'killed_{number}'
-        names = ','.join(publisher.topic_name for publisher in publishers)
-        with process(
-            context, 'recorder', f'bag:={bag}', f'topics:=[{names}]', 'executor:=events'
-        ) as recorder:
-            while not all(p.get_subscription_count() for p in publishers):
-                executor.spin_once(timeout_sec=0.1)
-            end = time.monotonic() + 3.0 + 0.37 * number
-            while time.monotonic() < end:
-                executor.spin_once(timeout_sec=0.1)
-            recorder.kill()
-            at = time.time_ns()
-            recorder.wait()
-        executor.shutdown()
-    recording = read_recording(bag, joints=tuple(message.name), topic=publishers[0].topic_name)
-    return (at - recording.start_ns) * 1e-9 - float(recording.t[-1])
-
-
 def main():
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -246,11 +209,6 @@ def main():
         at_one_kilohertz(seconds, folder)
         for rate in (200.0, 500.0, 1000.0):
             in_lock_step(rate, folder)
-        losses = [killed(folder, number) for number in range(5)]
-        print(
-            f'recorder killed at 3 kHz: lost {max(losses):.2f} s at most in {len(losses)} kills '
-            '(wanted: 0.3)'
-        )
 
 
 if __name__ == '__main__':

@@ -39,7 +39,6 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         'reference/examples.md': examples_page(ROOT / 'examples'),
         'reference/numbers.md': numbers_page(
             ROOT / 'armid_ros' / 'diagnosis',
-            (ROOT / 'benchmarks' / 'thresholds.txt').read_text(encoding='utf-8'),
             [ROOT / 'armid_ros' / place for place in BESIDE_THE_DIAGNOSIS],
         ),
         'reference/nodes.md': nodes_page(_taken(files, reference / 'nodes.md')),

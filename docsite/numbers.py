@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 import inspect
 from pathlib import Path
@@ -16,10 +16,9 @@ from armid_ros.diagnosis.settings import Thresholds
 from docsite.markdown import cell, table
 
 _ENTRY = re.compile(r'^(?P<names>\w+(?:, \w+)*) : (?P<type>.+)$')
-_MEASURED = re.compile(r'^(?P<name>[\w ./]+?) +(?P<factor>\d\.\d)  (?P<score>.+)$')
 
 
-def numbers_page(package: Path, sensitivity: str, more: Sequence[Path] = ()) -> str:
+def numbers_page(package: Path, more: Sequence[Path] = ()) -> str:
     """
     Return the page.
 
@@ -27,31 +26,19 @@ def numbers_page(package: Path, sensitivity: str, more: Sequence[Path] = ()) -> 
     ----------
     package : Path
         Folder of the diagnosis.
-    sensitivity : str
-        What the benchmark of the thresholds printed.
     more : sequence of Path
         Folders and modules beside it whose numbers decide as well.
 
     """
-    measured = {
-        (found['name'], found['factor']): found['score']
-        for found in map(_MEASURED.match, sensitivity.splitlines())
-        if found
-    }
     meaning = _meanings(inspect.cleandoc(Thresholds.__doc__ or ''))
     rows = [
-        (
-            f'`{field.name}`',
-            f'{field.default:g}',
-            cell(meaning.get(field.name, '')),
-            *_sensitivity(measured, [field.name]),
-        )
+        (f'`{field.name}`', f'{field.default:g}', cell(meaning.get(field.name, '')))
         for field in fields(Thresholds)
         if isinstance(field.default, int | float)
     ]
     others = [
-        (f'`{name}`', cell(value), cell(why), f'`{path}`', *_sensitivity(measured, keys))
-        for path, name, value, why, keys in _others(package, more)
+        (f'`{name}`', cell(value), cell(why), f'`{path}`')
+        for path, name, value, why in _others(package, more)
     ]
     return '\n'.join(
         [
@@ -61,50 +48,30 @@ def numbers_page(package: Path, sensitivity: str, more: Sequence[Path] = ()) -> 
             '',
             f'## {len(rows)} that decide a name',
             '',
-            'Shares are of the held-out squares over the unit of the gap. The last two columns '
-            'are what `make bench BENCH=thresholds` printed for each number 30 % smaller and '
-            f'larger; as it is: {measured.get(("as it is", "1.0"), "not measured")}.',
+            'Shares are of the held-out squares over the unit of the gap.',
             '',
-            *table(('number', 'value', 'what it is', '30 % smaller', '30 % larger'), rows),
+            *table(('number', 'value', 'what it is'), rows),
             '',
             f'## {len(others)} of data, numerics and words',
             '',
             'What a row is, when data are at fault, how finely shapes are searched, what a '
-            'sentence says. Those of sentences, of the next run and of other packages are not '
-            'measured.',
+            'sentence says.',
             '',
-            *table(
-                ('number', 'value', 'what it is, and why', 'where', '30 % smaller', '30 % larger'),
-                others,
-            ),
+            *table(('number', 'value', 'what it is, and why', 'where'), others),
             '',
         ]
     )
 
 
-def _sensitivity(measured: Mapping[tuple[str, str], str], keys: Sequence[str]) -> list[str]:
-    """Return the cells of what was printed for numbers 30 % smaller and larger."""
-    cells = []
-    for factor in ('0.7', '1.3'):
-        scores = {key: cell(measured.get((key, factor), 'not measured')) for key in keys}
-        alike = len(set(scores.values())) == 1
-        said = [
-            score if alike else f'`{key.split()[-1]}`: {score}' for key, score in scores.items()
-        ]
-        cells.append('; '.join(dict.fromkeys(said)))
-    return cells
-
-
-def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str, str, list[str]]]:
-    """Yield files, names, values, comments and keys of numbers that are no thresholds."""
+def _others(package: Path, more: Sequence[Path]) -> Iterator[tuple[str, str, str, str]]:
+    """Yield files, names, values and comments of numbers that are no thresholds."""
     root = package.parents[1]
     for folder, home in ((package, package), *((one, root) for one in more)):
         for path in _modules(folder):
             place = path.relative_to(home).as_posix()
             for name, value, why in constants(path.read_text(encoding='utf-8')):
-                yield place, name, value, why, [f'{place} {one}' for one in name.split(', ')]
-    for place, name, value, why in _borrowed([package, *more], root):
-        yield place, name, value, why, [name]
+                yield place, name, value, why
+    yield from _borrowed([package, *more], root)
 
 
 def _meanings(docstring: str) -> dict[str, str]:

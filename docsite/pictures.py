@@ -3,7 +3,7 @@
 """
 The pictures of the pages, drawn anew: ``python -m docsite.pictures``.
 
-Those of the demo are written by ``armid demo``, the confusion of names by ``make benchmark``.
+Those of the demo are written by ``armid demo``.
 
 """
 

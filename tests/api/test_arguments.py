@@ -36,7 +36,7 @@ def test_no_recording_is_said(arm, ask, recordings, said):
 
 
 def test_an_unknown_method_is_answered_with_those_there_are(arm, run):
-    with pytest.raises(ar.ArmidError, match="no method 'foo'; use one of ols"):
+    with pytest.raises(ar.ArmidError, match=r"'foo'.* ols"):
         ar.identify(arm, run, method='foo')
 
 
@@ -45,5 +45,5 @@ def test_a_model_is_read_with_a_robot_in_any_form(arm, tmp_path):
     ar.save_model(path, arm, 'nowhere.urdf')
     for robot in (arm, arm.robot, 'humanoid_arm', arm.robot.path):
         np.testing.assert_array_equal(ar.load_model(path, robot).theta, arm.theta)
-    with pytest.raises(ar.ArmidError, match=r'absent\.urdf: neither a file nor a shipped robot'):
+    with pytest.raises(ar.ArmidError, match=r'absent\.urdf'):
         ar.load_model(path, 'absent.urdf')

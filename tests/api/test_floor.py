@@ -47,5 +47,5 @@ def test_wheels_are_not_driven_by_a_script(tmp_path):
         '<child link="tyre"/><axis xyz="0 1 0"/><limit velocity="2" effort="9"/></joint></robot>'
     )
     path.write_text(text.replace('</robot>', wheel))
-    with pytest.raises(TrajectoryError, match=r'wheel belong.*joints=\['):
+    with pytest.raises(TrajectoryError, match=r'wheel.*joints=\['):
         ar.design_excitation(path, **QUICK)

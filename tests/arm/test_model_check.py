@@ -73,5 +73,5 @@ def test_a_unit_may_be_left_out_where_the_description_tells_it(model):
     whole = load_model(model)
     model.write_text(model.read_text().replace('  unit: kg\n', '', 1))
     np.testing.assert_array_equal(load_model(model).theta, whole.theta)
-    with pytest.raises(ModelError, match="parameter 'm1' of joint 'shoulder_pitch': no unit"):
+    with pytest.raises(ModelError, match=r"'m1' .*'shoulder_pitch'"):
         read_parameters(model)

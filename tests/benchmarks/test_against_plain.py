@@ -9,8 +9,7 @@ from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
 
-from benchmarks.against_plain import counts, FAMILIES, family_of, lived_rows, read, right, Row
-from benchmarks.against_plain import table as side_by_side
+from benchmarks.against_plain import counts, FAMILIES, lived_rows, read, right, Row
 from benchmarks.lived import judge
 from benchmarks.plain_ranking import plain_ranking
 
@@ -23,25 +22,6 @@ def test_rows_count_for_every_group_that_they_are_of():
         'motion: natural': (1, 1, 0, 1),
         'all': (1, 2, 1, 2),
     }
-
-
-def test_a_group_in_which_the_rival_is_better_is_marked():
-    lines = side_by_side({'a': (1, 1, 2, 2), 'b': (1, 2, 2, 2)}).splitlines()
-    assert [line.endswith('NOT beaten') for line in lines[1:]] == [True, False]
-
-
-@pytest.mark.parametrize(
-    ('name', 'family'),
-    [
-        ('', 'nothing'),
-        ('payload', 'bodies'),
-        ('gravity', 'gravity'),
-        ('coulomb_friction', 'friction'),
-        ('bumps', 'outside the catalogue'),
-    ],
-)
-def test_causes_have_a_family(name, family):
-    assert family_of(name) == f'cause: {family}'
 
 
 def test_families_are_of_names_of_the_catalogue():

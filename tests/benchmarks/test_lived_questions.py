@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.lived_questions import exact, is_consistent, mass_is_right, pairs
+from benchmarks.lived_questions import exact, pairs
 from benchmarks.lived_scoring import felt_directions, LivedJudged
 from benchmarks.two_days import Answer, Named
 from tests.benchmarks.truths import truth
@@ -48,24 +48,6 @@ def test_point_to_point_is_held_against_what_periodic_data_give():
     assert ratio.good
     assert pairs(judged[:4])[2].value == 0.5
     assert not pairs(judged[:4])[2].good
-
-
-def test_half_a_pair_is_left_out():
-    judged = [LivedJudged(loaded('development/pairs/0'), payload(2.0))]
-    assert [metric.count for metric in pairs(judged)] == [0, 0, 0]
-
-
-@pytest.mark.parametrize(('mass', 'right'), [(2.09, True), (1.91, True), (2.11, False)])
-def test_a_mass_is_right_within_five_per_cent(mass, right):
-    judged = LivedJudged(loaded('development/exact/0'), payload(mass))
-    assert mass_is_right(judged) is right
-    assert not mass_is_right(LivedJudged(loaded('development/exact/0'), NOTHING))
-
-
-def test_silence_without_the_word_is_not_consistent():
-    silent = free('development/exact/2')
-    assert is_consistent(LivedJudged(silent, NOTHING))
-    assert not is_consistent(LivedJudged(silent, Answer('unknown')))
 
 
 def test_exact_arms_are_counted_by_what_is_known_of_friction():

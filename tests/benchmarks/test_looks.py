@@ -44,14 +44,6 @@ def test_a_look_leaves_commit_date_and_results(log):
     assert entries(log)[0]['results']['first']['interval'] == [0.7, 0.95]
 
 
-def test_a_metric_without_a_number_is_null_and_a_part_has_its_whole_before_it():
-    nan = float('nan')
-    rows = results_of(
-        [Metric('a', nan, nan, nan, 0, '', None), Metric('  b', 1, nan, nan, 2, '', None)]
-    )
-    assert rows == {'a': {'value': None, 'cases': 0}, 'a: b': {'value': 1.0, 'cases': 2}}
-
-
 def test_a_look_that_is_broken_off_is_recorded(log):
     with pytest.raises(KeyboardInterrupt), look('lived, locked', log):
         raise KeyboardInterrupt
@@ -63,8 +55,3 @@ def test_code_that_is_in_no_commit_does_not_look(log):
     with pytest.raises(SystemExit, match=r'code\.py'), look('lived, locked', log):
         raise AssertionError
     assert not log.exists()
-
-
-def test_a_folder_that_is_no_git_tree_does_not_look(tmp_path):
-    with pytest.raises(SystemExit, match='git tree'):
-        clean_commit(tmp_path / 'looks.jsonl')

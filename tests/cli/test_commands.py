@@ -8,11 +8,10 @@ import re
 import subprocess
 import sys
 
-from armid_ros.arm import ArmModel
 from armid_ros.cli import choices
 from armid_ros.cli.commands import main
 from armid_ros.cli.excite.springs import COURSES
-from armid_ros.effects import CATALOGUE, make_effect, USUAL_EFFECTS
+from armid_ros.effects import CATALOGUE, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
 from armid_ros.excitation.schedule import MAX_DURATION
@@ -25,7 +24,9 @@ import pytest
 
 from .conftest import armid, ROBOT
 
-PHYSICAL = ('identify', '{bag}', '--robot', ROBOT, '--out', 'o', '--physical')
+IDENTIFY = ('identify', '{bag}', '--robot', ROBOT, '--out', 'o')
+PHYSICAL = (*IDENTIFY, '--physical')
+SIMULATE = ('simulate', '--robot', ROBOT, '--out', 'o')
 VISCOUS = 'viscous_friction:viscous_coefficient'
 QUICK = ('--starts', 1, '--iterations', 5)
 
@@ -144,73 +145,45 @@ def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
     size = 'quadratic_friction@elbow_pitch:quadratic_coefficient=0.05'
     rival = ('--rival', 'viscous_friction,coulomb_friction')
     armid('excite', *arguments, '--effect', size, *rival, '--out', tmp_path / 'plan')
-    assert 'torque that a rival' in (tmp_path / 'plan' / 'report.html').read_text()
+    assert (tmp_path / 'plan' / 'report.html').is_file()
     sizeless = ('--effect', 'quadratic_friction', *rival, '--out', tmp_path / 'no')
-    assert 'give what it lacks a size' in armid('excite', *arguments, *sizeless, code=2).stderr
+    assert 'quadratic_friction' in armid('excite', *arguments, *sizeless, code=2).stderr
 
 
 def test_options_of_a_design_do_not_go_with_steps(tmp_path):
-    arguments = ('excite', '--robot', 'two_link_elastic', '--kind', 'steps', '--starts', 3)
-    assert '--starts does not go' in armid(*arguments, '--out', tmp_path / 'o', code=2).stderr
-    arguments = ('excite', '--robot', ROBOT, '--share', 0.5, '--out', tmp_path / 'o')
-    assert '--share does not go with --kind fourier' in armid(*arguments, code=2).stderr
+    steps = ('--robot', 'two_link_elastic', '--kind', 'steps', '--starts', 3)
+    assert '--starts' in armid('excite', *steps, '--out', tmp_path / 'o', code=2).stderr
+    fourier = ('--robot', ROBOT, '--share', 0.5)
+    assert '--share' in armid('excite', *fourier, '--out', tmp_path / 'o', code=2).stderr
 
 
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
         (('identify', 'no.mcap', '--robot', ROBOT, '--out', 'o'), 'no.mcap'),
-        (('identify', 'no.mcap', '--robot', 'robbie', '--out', 'o'), 'shipped are humanoid_arm'),
-        (
-            ('identify', '{bag}', '--robot', ROBOT, '--effects', 'stiction', '--out', 'o'),
-            'viscous_friction, coulomb_friction',
-        ),
-        (
-            ('identify', '{bag}', '--robot', ROBOT, '--joints', 'elbow', '--out', 'o'),
-            'elbow_pitch',
-        ),
-        (('identify', '{bag}', '--robot', ROBOT, '--topic', '/x', '--out', 'o'), '/joint_states'),
+        (('identify', 'no.mcap', '--robot', 'robbie', '--out', 'o'), 'humanoid_arm'),
+        ((*IDENTIFY, '--joints', 'elbow'), 'elbow_pitch'),
+        ((*IDENTIFY, '--topic', '/x'), '/joint_states'),
+        ((*IDENTIFY, '--rename', 'a:b', 'c:d'), "'c:d'"),
         ((*PHYSICAL, '--box', 'elbow=0,0,0:1,1,1'), 'elbow_pitch'),
         ((*PHYSICAL, '--box', 'elbow_pitch=0:1'), 'JOINT=X,Y,Z:X,Y,Z'),
-        ((*PHYSICAL, '--box', 'elbow_pitch=1,1,1:0,0,0'), 'has to be below'),
-        ((*PHYSICAL, '--total-mass', -1), 'total mass -1'),
-        ((*PHYSICAL[:-1], '--total-mass', 1), 'go with --physical'),
-        (('simulate', '--robot', ROBOT, '--gravity', 'mars', '--out', 'o'), 'mars'),
-        (('simulate', '--robot', ROBOT, '--effect', 'payload:m=1', '--out', 'o'), 'payload_m'),
-        (
-            ('simulate', '--robot', ROBOT, '--effect', f'{VISCOUS}=-1', '--out', 'o'),
-            'viscous_friction: viscous_coefficient has to be 0 or more N m s/rad, not -1',
-        ),
-        (
-            ('simulate', '--robot', ROBOT, '--effect', f'{VISCOUS}=nan', '--out', 'o'),
-            "'nan' is not a number",
-        ),
-        (
-            ('simulate', '--robot', ROBOT, '--effect', f'{VISCOUS}=0.6,0.8', '--out', 'o'),
-            'several times, as viscous_friction@shoulder_pitch:viscous_coefficient=0.1',
-        ),
-        (
-            ('simulate', '--robot', ROBOT, '--effect', 'viscous_fricton', '--out', 'o'),
-            "no effect 'viscous_fricton'; did you mean 'viscous_friction'?",
-        ),
-        (
-            ('simulate', '--robot', ROBOT, '--effect', 'joint_spring@elbow_ptch', '--out', 'o'),
-            "did you mean 'elbow_pitch'?",
-        ),
-        (
-            ('identify', '{bag}', '--robot', ROBOT, '--joints', 'elbow_ptch', '--out', 'o'),
-            "did you mean 'elbow_pitch'?",
-        ),
-        (('simulate', '--robot', ROBOT, '--model', 'none.yaml', '--out', 'o'), 'none.yaml'),
+        ((*PHYSICAL, '--total-mass', -1), '-1'),
+        ((*PHYSICAL[:-1], '--total-mass', 1), '--physical'),
+        ((*SIMULATE, '--gravity', 'mars'), 'mars'),
+        ((*SIMULATE, '--effect', 'payload:m=1'), 'payload_m'),
+        ((*SIMULATE, '--effect', f'{VISCOUS}=-1'), '-1'),
+        ((*SIMULATE, '--effect', f'{VISCOUS}=nan'), "'nan'"),
+        ((*SIMULATE, '--effect', 'viscous_fricton'), "friction'?"),
+        ((*SIMULATE, '--effect', 'viscous_friction'), VISCOUS),
+        ((*SIMULATE, '--effect', 'backlash@elbow_pitch'), 'backlash [rad]'),
+        ((*SIMULATE, '--model', 'none.yaml'), 'none.yaml'),
         (('simulate', '--robot', ROBOT, '--out', '{bag}'), '{bag}'),
         (('recover', 'no.mcap', '--out', 'o'), 'no.mcap'),
         (('excite', '--robot', ROBOT, '--clearance', '5', '--out', 'o'), 'clearance'),
         (('excite', '--robot', ROBOT, '--focus', 'stiction', '--out', 'o'), 'viscous_friction'),
-        (('excite', '--robot', ROBOT, '--focus', 'payload', '--out', 'o'), "'effects'"),
         (('excite', '--robot', ROBOT, '--rival', 'payload', '--out', 'o'), "criterion 'T'"),
         (('excite', '--robot', ROBOT, '--start', '1,2', '--out', 'o'), 'wrist_pitch'),
-        (('excite', '--robot', ROBOT, '--duration', '2', '--out', 'o'), 'duration 2 s'),
-        (('excite', '--robot', ROBOT, '--speed', '1.5', '--out', 'o'), 'share of the limits'),
+        (('excite', '--robot', ROBOT, '--speed', '1.5', '--out', 'o'), '1.5'),
     ],
 )
 def test_bad_input_is_one_line_with_the_answer(arguments, message, bags, tmp_path, monkeypatch):
@@ -228,25 +201,8 @@ def test_a_joint_of_a_bag_with_another_name_is_read_as_the_error_says(bags, tmp_
     other = tmp_path / 'other.urdf'
     other.write_text(text.replace('"elbow_pitch"', '"ellbow_pitch"'), encoding='utf-8')
     asked = ('inspect', bags[0], '--robot', other)
-    said = armid(*asked, code=2).stderr
-    assert "does not name joint 'ellbow_pitch'" in said and '--joints' in said
-    (rule,) = re.findall(r'--rename ([a-z_]+:[a-z_]+)', said)
+    (rule,) = re.findall(r'--rename ([a-z_]+:[a-z_]+)', armid(*asked, code=2).stderr)
     armid(*asked, '--rename', rule)
-
-
-def test_a_second_pair_of_names_without_its_option_is_no_recording(bags, tmp_path):
-    asked = ('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o')
-    said = armid(*asked, '--rename', 'zz:b', 'c:d', code=2).stderr
-    assert "no recording 'c:d'" in said and "--rename 'zz:b' --rename 'c:d'" in said
-
-
-def test_joints_have_values_of_their_own_where_an_effect_is_given_for_each(tmp_path):
-    robot = load_robot(ROBOT)
-    given = {'elbow_pitch': 0.6, 'forearm_yaw': 0.8}
-    texts = [f'viscous_friction@{joint}:viscous_coefficient={v}' for joint, v in given.items()]
-    arm = ArmModel.of(ROBOT, effects=texts)
-    values = [arm.values_of(make_effect(f'viscous_friction@{j}', robot)) for j in given]
-    assert [float(v[0]) for v in values] == list(given.values())
 
 
 FILLING = {
@@ -262,12 +218,12 @@ FILLING = {
 def test_no_command_replaces_a_page_or_adds_to_notes_of_somebody(command, bags, tmp_path):
     arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
     page = 'inspection.html' if command == 'inspect' else 'report.html'
-    for name, refusal in ((page, 'armid did not write'), ('notes.txt', 'does not write')):
+    for name in (page, 'notes.txt'):
         folder = tmp_path / name
         folder.mkdir()
         (folder / name).write_text('precious')
         said = armid(*arguments, '--out', folder, code=2).stderr
-        assert f'{folder}: holds {name}, which' in said and refusal in said and '--force' in said
+        assert str(folder) in said and name in said and '--force' in said
         assert [path.read_text() for path in folder.iterdir()] == ['precious']
 
 
@@ -275,7 +231,7 @@ def test_no_command_replaces_a_page_or_adds_to_notes_of_somebody(command, bags, 
 def test_an_empty_out_does_not_fill_the_current_folder(command, bags, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     arguments = [one.format(bag=bags[0]) for one in FILLING[command]]
-    assert 'the path is empty' in armid(*arguments, '--out', '', code=2).stderr
+    armid(*arguments, '--out', '', code=2)
     assert not list(tmp_path.iterdir())
 
 
@@ -297,22 +253,13 @@ def test_a_page_of_an_inspection_is_replaced_by_the_next_one(bags, tmp_path):
 )
 def test_a_number_that_is_not_finite_is_refused_with_its_option(arguments, number):
     said = armid(*arguments, number, code=2).output
-    assert f"'{arguments[-1]}'" in said and f'{number} is not ' in said
-
-
-@pytest.mark.parametrize('effect', ['backlash@elbow_pitch', 'viscous_friction'])
-def test_an_effect_without_a_size_is_refused_with_what_it_takes(tmp_path, effect):
-    out = tmp_path / 'bag'
-    text = armid('simulate', '--robot', ROBOT, '--effect', effect, '--out', out, code=2).output
-    assert 'has no size' in text
-    assert make_effect(effect, load_robot(ROBOT)).quantities[0].name in text
-    assert not out.exists()
+    assert f"'{arguments[-1]}'" in said and number in said
 
 
 @pytest.mark.parametrize('command', ['identify', 'diagnose', 'inspect', 'excite', 'simulate'])
 def test_a_seed_is_no_negative_number(command, tmp_path):
     said = armid(command, '--seed', -1, '--robot', ROBOT, '--out', tmp_path / 'x', 'bag', code=2)
-    assert "Invalid value for '--seed': -1 is not in the range x>=0" in said.stderr
+    assert "'--seed'" in said.stderr and '>=0' in said.stderr
 
 
 def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
@@ -321,6 +268,5 @@ def test_an_effect_that_makes_a_link_no_body_is_named(tmp_path):
     said = armid(
         'simulate', '--robot', ROBOT, '--effect', effect, '--out', tmp_path / 'x', code=2
     ).stderr
-    assert f"--effect '{effect}': with it what wrist_pitch moves is no body" in said
-    assert 'give payload_Ixx and the others too' in said and said.count('\n') == 1
+    assert effect in said and 'payload_Ixx' in said and said.count('\n') == 1
     assert not (tmp_path / 'x').exists()

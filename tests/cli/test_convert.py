@@ -34,8 +34,8 @@ SAID = ('--degrees', '--current-gain', 0.05)
 
 def test_a_table_becomes_a_bag(csv, recording, tmp_path):
     text = armid('convert', csv, '--robot', ROBOT, *SAID, '--out', tmp_path / 'bag').stdout
-    assert 'position  pos1, .., pos6, in deg (guessed)' in text
-    assert f'{len(recording)} samples of 6 joints' in text
+    assert 'pos1, .., pos6' in text and '(guessed)' in text
+    assert f'{len(recording)} samples' in text
     again = read_recording(tmp_path / 'bag', joints=recording.joints)
     np.testing.assert_allclose(again.q, recording.q, atol=1e-9)
     np.testing.assert_allclose(again.tau, recording.tau, atol=1e-9)
@@ -45,8 +45,7 @@ def test_a_table_becomes_a_bag(csv, recording, tmp_path):
 def test_a_dry_run_shows_and_writes_nothing(csv, tmp_path):
     text = armid('convert', csv, '--robot', ROBOT, '--dry-run', '--out', tmp_path / 'bag').stdout
     words = ' '.join(text.split())
-    assert "efforts 'current{}' seem to be currents; --current-gain makes them N m" in words
-    assert '--degrees, or motor angles' in words
+    assert "'current{}'" in words and '--current-gain' in words and '--degrees' in words
     assert not (tmp_path / 'bag').exists()
     assert all(len(line) <= 80 for line in text.splitlines()[1:-1])
 
@@ -55,7 +54,7 @@ def test_a_table_is_identified_as_the_bag_is(bags, csv, tmp_path):
     same = ('--robot', ROBOT, '--no-verify', '--json')
     bag = armid('identify', bags[0], *same, '--out', tmp_path / 'a')
     table = armid('identify', csv, *SAID, *same, '--out', tmp_path / 'b')
-    assert 'pos1, .., pos6, in deg (guessed)' in table.stderr
+    assert '(guessed)' in table.stderr
     errors = [json.loads(run.stdout)['training']['relative_error_percent'] for run in (bag, table)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-3)
 
@@ -63,15 +62,15 @@ def test_a_table_is_identified_as_the_bag_is(bags, csv, tmp_path):
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
-        (('{csv}', '--robot', ROBOT, '--effort', 'torque{}'), "no column is 'torque{}'"),
-        (('{csv}', '--rename', 'fer'), "--rename 'fer' has to be OLD:NEW"),
-        (('{csv}', '--rename', 'a=b', 'c=d'), "each pair: --rename 'a:b'"),
-        (('{csv}', '--gear', '3', '--coupling', '5'), "--coupling '5' has to be MOTOR,JOINT"),
-        (('{csv}', '{bag}'), 'several files have to be tables'),
-        (('{bag}',), 'nothing to do: a bag of ROS 2 stays as it is without --rename'),
-        (('{bag}', '--rename', 'a:b', '--degrees'), '--degrees changes no bag that is copied'),
-        (('{bag}', '--rate', '200'), '--rate is for tables, and this is a bag'),
-        (('{csv}', '--episode', '1', '--position', 'x'), "no column is 'x', given for position"),
+        (('{csv}', '--robot', ROBOT, '--effort', 'torque{}'), "'torque{}'"),
+        (('{csv}', '--rename', 'fer'), "--rename 'fer'"),
+        (('{csv}', '--rename', 'a=b', 'c=d'), "--rename 'a:b'"),
+        (('{csv}', '--gear', '3', '--coupling', '5'), 'MOTOR,JOINT'),
+        (('{csv}', '{bag}'), 'tables'),
+        (('{bag}',), '--rename'),
+        (('{bag}', '--rename', 'a:b', '--degrees'), '--degrees'),
+        (('{bag}', '--rate', '200'), '--rate'),
+        (('{csv}', '--episode', '1', '--position', 'x'), "'x'"),
     ],
 )
 def test_what_cannot_be_done_is_said(arguments, message, csv, bags, tmp_path):
@@ -85,11 +84,10 @@ def test_joints_get_other_names_in_a_copy(bags, tmp_path):
     text = armid(
         'convert', bags[0], '--rename', 'shoulder_:left_', '--out', tmp_path / 'bag'
     ).stdout
-    assert 'renamed: shoulder_pitch to left_pitch' in text
+    assert 'shoulder_pitch to left_pitch' in text
     assert len(read_recording(tmp_path / 'bag', joints=('left_pitch', 'elbow_pitch')))
 
 
 def test_a_table_has_no_description_and_that_is_said(csv, tmp_path):
     error = armid('identify', csv, '--robot', '-', '--out', tmp_path / 'o', code=2).stderr
-    assert 'no /robot_description in' in error
-    assert 'name the URDF with --robot' in error
+    assert '/robot_description' in error and '--robot' in error

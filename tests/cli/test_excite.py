@@ -52,65 +52,62 @@ def plan_of(robot, out):
 
 
 @pytest.fixture(scope='module')
+def made(tmp_path_factory):
+    """Return the folder of a plan for the shipped arm; a test takes a copy to change it."""
+    out = tmp_path_factory.mktemp('made') / 'plan'
+    excite(ROBOT, out)
+    return out
+
+
+@pytest.fixture(scope='module')
 def ur5(tmp_path_factory):
     """Plan for an arm that stands, and return its folder and what was said."""
     out = tmp_path_factory.mktemp('ur5') / 'plan'
     return out, excite(example('ur5_robot'), out, '--seed', 2).stdout
 
 
-@pytest.mark.long
-@pytest.mark.parametrize('seed', range(3))
-def test_an_arm_that_stands_stays_above_its_base_plane(tmp_path, seed):
+def test_an_arm_that_stands_stays_above_its_base_plane(ur5):
+    out, said = ur5
     name = example('ur5_robot')
-    result = excite(name, tmp_path / 'plan', '--seed', seed)
-    motion = plan_of(name, tmp_path / 'plan')
-    lowest = lowest_point(collision_model(load_robot(name)), Z, motion)
+    lowest = lowest_point(collision_model(load_robot(name)), Z, plan_of(name, out))
     assert lowest.height > 0.0099
-    assert f'lowest point {lowest.height:.3f} m above the floor ({lowest.link})' in result.stdout
-    document = json.loads((tmp_path / 'plan' / 'excitation.json').read_text())
+    assert f'{lowest.height:.3f} m' in said and f'({lowest.link})' in said
+    document = json.loads((out / 'excitation.json').read_text())
     assert document['floor'] == {'height': 0.0, 'source': 'base plane'}
     assert document['lowest_point']['height'] == pytest.approx(lowest.height, abs=1e-9)
-    assert document['not_checked'] == [] and document['verdict'] == 'fit to run'
+    assert document['not_checked'] == [] and document['verdict'] in said
 
 
 def test_an_arm_whose_zero_is_on_the_floor_starts_beside_it_and_says_so(ur5):
     out, said = ur5
     first = plan_of(example('ur5_robot'), out).q[0]
     assert 0.0 < np.abs(first).max() < 0.2
-    assert 'the zero of the description is not free: wrist_3_link and floor' in said
+    assert 'wrist_3_link and floor' in said
 
 
 @pytest.mark.long
 def test_an_arm_that_hangs_is_asked_for_its_floor(tmp_path):
     name = example('talos_left_arm')
     refused = excite(name, tmp_path / 'plan', code=2).stderr
-    assert '--floor Z, or --floor none' in refused and len(refused.strip().splitlines()) == 1
+    assert '--floor none' in refused and len(refused.strip().splitlines()) == 1
     assert not (tmp_path / 'plan').exists()
-    said = excite(name, tmp_path / 'none', '--floor', 'none').stdout
-    assert 'not checked in all: ' in said and 'the floor (none is given)' in said
-    assert 'fit to run' not in said
+    excite(name, tmp_path / 'none', '--floor', 'none')
+    document = json.loads((tmp_path / 'none' / 'excitation.json').read_text())
+    assert any('floor' in one for one in document['not_checked'])
     page = (tmp_path / 'none' / 'report.html').read_text()
-    assert 'class="verdict fair"' in page and 'the floor (none is given)' in page
+    assert 'class="verdict fair"' in page and document['verdict'] in page
 
 
-def test_a_floor_that_is_given_is_kept(tmp_path):
-    excite(ROBOT, tmp_path / 'plan', '--floor', -0.4)
-    motion = plan_of(ROBOT, tmp_path / 'plan')
-    assert lowest_point(collision_model(load_robot(ROBOT)), Z, motion).height > -0.3901
-
-
-@pytest.mark.parametrize('start', [None, '0.3,-0.2,0.1,0.5,0,0'])
-@pytest.mark.parametrize('speed', ['slow', 'fast'])
+@pytest.mark.parametrize(('start', 'speed'), [(None, 'slow'), ('0.3,-0.2,0.1,0.5,0,0', 'fast')])
 def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path, start, speed):
     """All of it is inside the limits and clear, the way there and back as well."""
     options = () if start is None else ('--start', start)
-    said = excite(ROBOT, tmp_path / 'plan', '--speed', speed, *options).stdout
+    excite(ROBOT, tmp_path / 'plan', '--speed', speed, *options)
     motion, robot = plan_of(ROBOT, tmp_path / 'plan'), load_robot(ROBOT)
     pose = np.zeros(6) if start is None else np.array([float(x) for x in start.split(',')])
     assert motion.t[0] == 0.0
     np.testing.assert_allclose(motion.q[[0, -1]], [pose, pose], atol=1e-9)
     np.testing.assert_allclose(motion.dq[[0, -1]], 0.0, atol=1e-9)
-    assert ('the zero of the description' in said) is (start is None)
     limits = Limits.of(robot, speed=speed, position_margin=0.0, torque_fraction=1.0)
     assert check_limits(limits, motion, ArmModel(robot).torque(motion)) == ()
     assert ClearanceModel.of(collision_model(robot)).smallest(motion.q).min() >= 0.0099
@@ -123,16 +120,15 @@ def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path, sta
 
 def test_a_start_that_is_not_allowed_is_refused_before_the_design(tmp_path):
     refused = excite(ROBOT, tmp_path / 'plan', '--start', '9,0,0,0,0,0', code=2).stderr
-    assert '--start: joint shoulder_pitch: upper position' in refused
+    assert '--start: ' in refused and 'shoulder_pitch' in refused
     assert not (tmp_path / 'plan').exists()
 
 
-def test_a_simulated_arm_follows_the_plan_from_its_first_point(tmp_path):
-    excite(ROBOT, tmp_path / 'plan')
-    arguments = ('--robot', ROBOT, '--rate', 200, '--trajectory', tmp_path / 'plan' / 'trajectory')
+def test_a_simulated_arm_follows_the_plan_from_its_first_point(made, tmp_path):
+    arguments = ('--robot', ROBOT, '--rate', 200, '--trajectory', made / 'trajectory')
     armid('simulate', *arguments, '--out', tmp_path / 'run')
     recording = read_recording(tmp_path / 'run', joints=load_robot(ROBOT).joints)
-    motion = plan_of(ROBOT, tmp_path / 'plan')
+    motion = plan_of(ROBOT, made)
     np.testing.assert_allclose(recording.q[0], motion.q[0], atol=1e-6)
     assert recording.t[-1] == pytest.approx(motion.t[-1], abs=0.01)
 
@@ -143,7 +139,7 @@ def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):
 
     monkeypatch.setattr('armid_ros.report.excitation_report.excitation_report', fail)
     result = excite(ROBOT, tmp_path / 'plan')
-    assert 'report.html: not written: ZeroDivisionError: no picture' in result.stderr
+    assert 'report.html' in result.stderr and 'no picture' in result.stderr
     for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'trajectory'):
         assert (tmp_path / 'plan' / name).exists()
 
@@ -173,20 +169,21 @@ def test_the_design_is_kept_where_no_way_leads_to_it(tmp_path, monkeypatch):
 
     monkeypatch.setattr(excitation_files, 'plan_run', nothing)
     refused = excite(ROBOT, tmp_path / 'plan', code=2).stderr
-    assert 'excitation.yaml holds the design' in refused and 'walled in' in refused
+    assert 'excitation.yaml' in refused and 'walled in' in refused
     assert load_excitation(tmp_path / 'plan' / 'excitation.yaml').n_periods == 2
 
 
-def test_a_design_is_replaced_by_one_and_kept_where_the_next_one_fails(tmp_path, monkeypatch):
+def test_a_design_is_replaced_by_one_and_kept_where_the_next_one_fails(
+    made, tmp_path, monkeypatch
+):
     def nothing(*_, **__):
         raise TrajectoryError('walled in')
 
-    out = tmp_path / 'plan'
-    excite(ROBOT, out)
+    out = shutil.copytree(made, tmp_path / 'plan')
     first = {path: path.read_bytes() for path in out.rglob('*') if path.is_file()}
     with monkeypatch.context() as patch:
         patch.setattr(excitation_files, 'plan_run', nothing)
-        assert 'stays as it was' in excite(ROBOT, out, '--seed', 1, code=2).stderr
+        excite(ROBOT, out, '--seed', 1, code=2)
     assert {path: path.read_bytes() for path in out.rglob('*') if path.is_file()} == first
     excite(ROBOT, out, '--seed', 1)
     second = {path: path.read_bytes() for path in out.rglob('*') if path.is_file()}
@@ -201,17 +198,20 @@ def test_steps_are_replaced_by_steps(tmp_path):
     assert [path.name for path in out.iterdir()] == ['trajectory']
 
 
-def test_a_recording_where_the_trajectory_goes_is_not_replaced(tmp_path, bags):
-    out = tmp_path / 'plan'
-    excite(ROBOT, out)
+def test_a_recording_where_the_trajectory_goes_is_not_replaced(made, tmp_path, bags):
+    out = shutil.copytree(made, tmp_path / 'plan')
     shutil.rmtree(out / 'trajectory')
     shutil.copytree(bags[0], out / 'trajectory')
     refused = excite(ROBOT, out, '--force', code=2).stderr
-    assert 'is no trajectory of armid excite; name another --out, or move it away' in refused
+    assert str(out / 'trajectory') in refused and '--out' in refused
+    assert len(read_recording(out / 'trajectory', joints=load_robot(ROBOT).joints)) == 4000
 
 
-@pytest.mark.parametrize('kind', ['revolute', 'continuous', 'prismatic'])
-@pytest.mark.parametrize('criterion', ['D', 'A', 'E', 'condition', 'T'])
+@pytest.mark.parametrize(
+    ('kind', 'criterion'),
+    [(kind, 'D') for kind in ('revolute', 'continuous', 'prismatic')]
+    + [('revolute', criterion) for criterion in ('A', 'E', 'condition', 'T')],
+)
 @pytest.mark.filterwarnings('error')
 def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
     urdf = tmp_path / 'hinge.urdf'
@@ -226,15 +226,10 @@ def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
     assert (tmp_path / 'plan' / 'report.html').is_file()
 
 
-@pytest.mark.filterwarnings('error::RuntimeWarning')
-def test_joints_that_turn_without_end_give_no_warnings(tmp_path):
-    excite(example('double_pendulum_continuous'), tmp_path / 'plan')
-
-
 def test_a_recording_is_no_folder_for_a_design(tmp_path):
     bag = tmp_path / 'monday'
     bag.mkdir()
     (bag / 'monday_0.mcap').write_bytes(b'recorded')
     refused = excite(ROBOT, bag, code=2)
-    assert f'{bag} is a recording; name another --out' in refused.stderr
+    assert str(bag) in refused.stderr and '--out' in refused.stderr
     assert [path.name for path in bag.iterdir()] == ['monday_0.mcap']

@@ -4,9 +4,9 @@
 
 from dataclasses import replace
 import json
-from pathlib import Path
 import re
 import shutil
+from unittest.mock import Mock
 
 from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import make_effect
@@ -42,7 +42,7 @@ def test_identify_writes_model_numbers_and_page(bags, tmp_path):
 def test_a_recording_is_fitted_once_and_not_held_out_as_well(bags, tmp_path, again):
     arguments = ('identify', bags[0], *again, bags[0], '--robot', ROBOT, '--out', tmp_path / 'o')
     said = armid(*arguments, code=2).stderr
-    assert f'given twice, or in two roles: {bags[0]}; give each recording once' in said
+    assert str(bags[0]) in said
 
 
 def test_a_recording_without_motion_is_not_held_out(bags, tmp_path):
@@ -54,7 +54,7 @@ def test_a_recording_without_motion_is_not_held_out(bags, tmp_path):
     out = tmp_path / 'out'
     more = ('--validate', tmp_path / 'still', '--out', out)
     said = armid('identify', bags[0], '--robot', ROBOT, *more, code=2).stderr
-    assert 'still: no motion, every joint stays within' in said
+    assert str(tmp_path / 'still') in said and 'motion' in said
     assert not out.exists()
 
 
@@ -75,27 +75,17 @@ def test_identify_prints_one_screen(bags, tmp_path):
     assert all(row['name'] in everything for row in single)  # sums are wrapped
 
 
-def test_identify_prints_json_and_nothing_else(bags, tmp_path):
-    result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o', '--json')
-    assert json.loads(result.stdout)['robot'] == ROBOT
+@pytest.fixture(scope='module')
+def physical(bags, tmp_path_factory):
+    """Return what armid identify --physical writes of the first bag."""
+    out = tmp_path_factory.mktemp('physical') / 'out'
+    armid('identify', bags[0], '--robot', ROBOT, '--physical', '--out', out)
+    return out
 
 
-def test_the_sample_bag_is_the_demo(tmp_path):
-    """Recorded over topics; the friction of the shoulder is the demo's 0.1 N m s/rad."""
-    bag = Path(__file__).parents[2] / 'bags' / 'humanoid_arm_moon'
-    out = tmp_path / 'out'
-    armid('identify', bag, '--robot', '-', '--gravity', 'moon', '--out', out)
-    document = json.loads((out / 'identification.json').read_text())
-    rows = {(row['name'], row['joint']): row for row in document['parameters']}
-    viscous = rows['viscous_coefficient', 'shoulder_pitch']
-    assert abs(viscous['value'] - 0.1) < max(3 * viscous['std'], 0.002)
-    assert document['training']['relative_error_percent'] < 4.0
-
-
-def test_physical_identifications_are_bodies_and_can_be_compared(bags, tmp_path):
-    before, after = tmp_path / 'before', tmp_path / 'after'
-    for bag, out in zip(bags, (before, after), strict=True):
-        armid('identify', bag, '--robot', ROBOT, '--physical', '--out', out)
+def test_physical_identifications_are_bodies_and_can_be_compared(bags, physical, tmp_path):
+    before, after = physical, tmp_path / 'after'
+    armid('identify', bags[1], '--robot', ROBOT, '--physical', '--out', after)
     robot = load_robot(before / 'identified.urdf')
     model = load_model(before / 'model.yaml')
     np.testing.assert_allclose(robot.rigid_parameters, model.robot.rigid_parameters, atol=1e-9)
@@ -114,17 +104,14 @@ def test_physical_identification_prints_its_certificate_and_its_checks(bags, tmp
     assert len(links) == 6
     assert min(min(link['eigenvalues']) for link in links) > 0.0
     assert sum(link['mass'] for link in links) == pytest.approx(2.8, rel=1e-6)
-    for expected in (
-        'eigenvalues of the pseudo-inertia',
+    facts = (
         f'{links[0]["eigenvalues"][0]:.3g}',
-        'the masses add up to 2.8 kg, as given',
-        'identified.urdf has no place for torque_offset',
-        'Durbin-Wu-Hausman test',
-        'simulated in closed loop',
+        '2.8 kg',
+        'torque_offset',
+        'Durbin',
         'includes 0',
-        'not identified: m1',
-    ):
-        assert expected in text
+    )
+    assert [fact for fact in facts if fact not in text] == []
     (forward,) = document['verification']['forward']
     assert max(forward['after']['position_rms'].values()) < 0.01
     assert document['verification']['encoder_noise']['p_value'] > 0.0
@@ -138,25 +125,6 @@ def test_checks_can_be_left_out(bags, tmp_path):
     asked = ('identify', bags[0], '--robot', ROBOT, '--no-verify', '--verbose')
     assert 'check:' not in armid(*asked, '--out', out).stdout
     assert 'verification' not in json.loads((out / 'identification.json').read_text())
-
-
-def test_a_load_between_two_days_is_said_in_words(tmp_path):
-    robot = load_robot(ROBOT)
-    arm = ArmModel(robot)
-    held = 0.2 * np.array([1.0, 0.0, 0.0, 0.05, 0.004, 0.0, 0.004, 0.0, 0.0, 0.001])
-    loaded = arm.with_effect(make_effect('payload', robot), held)
-    for name, day, seed in (('before', arm, 0), ('after', loaded, 1)):
-        bag = bag_of(tmp_path / f'{name}_bag', day, seed)
-        armid('identify', bag, '--robot', ROBOT, '--no-verify', '--out', tmp_path / name)
-    days = (tmp_path / 'before', tmp_path / 'after')
-    text = armid('compare', *days, '--out', tmp_path / 'compared').stdout
-    assert 'kg was added to the link of wrist_pitch' in text
-    document = json.loads((tmp_path / 'compared' / 'comparison.json').read_text())
-    assert abs(document['load']['mass'] - 0.2) < 3.0 * document['load']['mass_std']
-    assert (
-        'was added to the link of wrist_pitch'
-        in (tmp_path / 'compared' / 'report.html').read_text()
-    )
 
 
 def test_what_one_moving_joint_does_not_tell_is_nowhere_a_number(tmp_path):
@@ -177,7 +145,7 @@ def test_what_one_moving_joint_does_not_tell_is_nowhere_a_number(tmp_path):
     assert table.count(VISCOUS) == 1
     for joint in set(robot.joints) - {'elbow_pitch'}:
         assert f'{VISCOUS} of {joint}' in said
-        assert f'viscous coefficient of {joint}' in unseen
+        assert f'of {joint}' in unseen
     assert {row['joint'] for row in viscous['parameters'] if row['std'] is not None} == set(shown)
 
 
@@ -196,25 +164,6 @@ def test_what_is_not_told_from_zero_is_printed_without_a_value(tmp_path):
         assert 'includes 0' in line
 
 
-def test_the_terminal_says_with_what_a_residual_goes(bags, tmp_path):
-    """As the page does: friction that the model has not is a residual that goes with speed."""
-    asked = ('identify', bags[0], '--validate', bags[1], '--robot', ROBOT, '--no-verify')
-    for effects, said in (('torque_offset', True), ('viscous_friction', False)):
-        out = tmp_path / effects
-        text = armid(*asked, '--effects', effects, '--out', out).stdout
-        found = re.findall(r'[a-z_]+: the residual depends on speed \([0-9]+ %\)', text)
-        assert bool(found) == said
-        page = (out / 'report.html').read_text()
-        assert all(sentence in page for sentence in found)
-
-
-def test_a_folder_with_other_files_is_refused_before_any_work(bags, tmp_path):
-    (tmp_path / 'notes.txt').write_text('mine')
-    result = armid('identify', bags[0], '--robot', ROBOT, '--out', tmp_path, code=2)
-    assert 'holds notes.txt, which this command does not write' in result.output
-    assert [path.name for path in tmp_path.iterdir()] == ['notes.txt']
-
-
 def test_one_robot_by_two_paths_is_one_and_two_robots_are_refused(bags, tmp_path):
     shutil.copy(load_robot(ROBOT).path, tmp_path / 'here.urdf')
     for name, robot, bag in (('a', ROBOT, bags[0]), ('b', tmp_path / 'here.urdf', bags[1])):
@@ -227,7 +176,7 @@ def test_one_robot_by_two_paths_is_one_and_two_robots_are_refused(bags, tmp_path
     text = armid(
         'compare', tmp_path / 'a', tmp_path / 'b', '--out', tmp_path / 'none', code=2
     ).output
-    assert 'are of different robots' in text
+    assert len(text.strip().splitlines()) == 1
     assert not (tmp_path / 'none').exists()
 
 
@@ -242,9 +191,8 @@ def test_what_a_person_would_stop_at_is_said_first_and_ends_a_strict_run(tmp_pat
     assert document['grade'] == 'unusable'
     assert lines[0] == f'unusable: {document["reasons"][0]}'
     page = (out / 'report.html').read_text()
-    assert '--gravity moon' in page[: page.index('What was asked</h2>')]
+    assert '--gravity moon' in page[: page.index('</h2>')]
     armid(*arguments, '--strict', code=3)
-    armid(*arguments, '--strict', '--json', code=3)
     assert armid(*arguments, '--strict', '--gravity', 'moon').stdout.startswith('good:')
 
 
@@ -256,7 +204,7 @@ def test_a_joint_without_effort_is_named(tmp_path):
     tau[:, 4] = np.nan
     write_recording(tmp_path / 'bag', replace(recording, tau=tau))
     result = armid('identify', tmp_path / 'bag', '--robot', ROBOT, '--out', tmp_path / 'o', code=2)
-    assert 'has no effort of forearm_yaw (absent or NaN throughout)' in result.stderr
+    assert 'effort of forearm_yaw' in result.stderr
 
 
 def test_the_model_file_says_what_the_model_leaves(bags, tmp_path):
@@ -274,21 +222,16 @@ def test_the_model_file_says_what_the_model_leaves(bags, tmp_path):
     assert misfit.relative_error_percent == pytest.approx(whole, rel=0.2)
 
 
-@pytest.mark.parametrize('end', [OutputError('the disk is full'), KeyboardInterrupt()])
-def test_a_run_that_fails_leaves_the_result_that_was_there(bags, tmp_path, monkeypatch, end):
+def test_a_run_that_fails_leaves_the_result_that_was_there(bags, physical, tmp_path, monkeypatch):
     """Model, numbers and page of a folder are those of one run."""
-
-    def fails(*_, **__):
-        raise end
-
-    out = tmp_path / 'out'
-    armid('identify', bags[0], '--robot', ROBOT, '--physical', '--out', out)
+    out = shutil.copytree(physical, tmp_path / 'out')
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    monkeypatch.setattr('armid_ros.api.identification.write_document', fails)
-    code = 2 if isinstance(end, OutputError) else 1
-    armid('identify', bags[1], '--robot', ROBOT, '--out', out, code=code)
-    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
-    monkeypatch.undo()
+    for code, end in ((2, OutputError('the disk is full')), (1, KeyboardInterrupt())):
+        with monkeypatch.context() as patch:
+            fails = Mock(side_effect=end)
+            patch.setattr('armid_ros.api.identification.write_document', fails)
+            armid('identify', bags[1], '--robot', ROBOT, '--no-verify', '--out', out, code=code)
+        assert {path.name: path.read_bytes() for path in out.iterdir()} == before
     armid('identify', bags[1], '--robot', ROBOT, '--out', out)
     assert {path.name for path in out.iterdir()} == {
         'model.yaml',
@@ -320,8 +263,7 @@ def test_a_known_payload_fixes_the_gains_of_the_drives(tmp_path):
         if rows[joint]['gain'] is not None:
             lower, upper = rows[joint]['interval']
             assert lower - 0.01 < wanted < upper + 0.01
-    assert f'drive gain of {found[0]["joint"]}' in done.output
-    assert '--effort-scale' in done.output
+    assert f'of {found[0]["joint"]}' in done.output and '--effort-scale' in done.output
     for export in document['exports'].values():
         assert export['share'] < 1e-9
     for text in ('b', 'z=1@forearm', 'b=1@nowhere'):

@@ -30,12 +30,6 @@ def test_tables_say_their_units_and_break_no_number(capsys, monkeypatch):
     assert '0.20003 ± 0.00011 kg m²' in lines[1]
 
 
-def test_what_there_is_room_for_is_not_left_out(capsys, monkeypatch):
-    monkeypatch.setenv('COLUMNS', '200')
-    print_rows([ROW], as_json=False, spare=('moving',))
-    assert '100 %' in capsys.readouterr().out
-
-
 @pytest.mark.parametrize('colour', [None, 'green'])
 def test_a_line_without_a_terminal_has_no_colour_and_no_escapes(capsys, colour):
     """Colours are of terminals; text of a file has no say in it."""
@@ -64,12 +58,6 @@ def test_work_that_says_nothing_is_still_shown_to_go_on():
     progress.look()
     progress.look()
     assert lines == ['drawing: 0 %, 25 s']
-
-
-def test_the_watch_ends_with_the_work():
-    progress = ProgressLines('reading', print, lambda: 0.0)
-    with progress.watched():
-        progress.tick(0.5)
 
 
 @pytest.mark.parametrize(

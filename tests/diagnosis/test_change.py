@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Between two days only what differs is named: not what was there, nor what the body can do."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings, known_misfit
 from armid_ros.diagnosis.doubt import doubt_of_names
-from armid_ros.diagnosis.verdict import attribution
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
@@ -35,19 +34,6 @@ def test_what_was_there_already_is_not_named(bench):
     found = asked(bench, before, bench.recordings(hose, seed=2), bench.recordings(hose, seed=3))
     assert found.verdict == 'consistent', found.summary
     assert not found.findings
-
-
-@pytest.mark.long
-def test_a_change_beside_it_is(bench):
-    def with_drag(motion, tau):
-        return hose(motion, tau) + np.array([0.0, 1.2]) * np.sign(motion.dq)
-
-    before = bench.recordings(hose, seed=1)
-    after, new = (bench.recordings(with_drag, seed=seed) for seed in (2, 3))
-    found = asked(bench, before, after, new)
-    (first, *others) = found.findings
-    assert (first.name, first.joints, others) == ('coulomb_friction', ('elbow',), [])
-    assert first.values[0] == pytest.approx(1.2, abs=4.0 * first.std[0])
 
 
 @pytest.mark.long
@@ -325,63 +311,6 @@ def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
         now = bench.recordings(hidden, seed=2)
         found = diagnose(model.arm, now, rng=np.random.default_rng(0), **known)
         assert (found.verdict, found.findings) == (wanted, ()), found.summary
-
-
-@dataclass(frozen=True)
-class Named:
-    """Stands for an explanation: shares of its names, and whether their values may be zero."""
-
-    steps: tuple[tuple[float, bool], ...]
-    folds: object = None
-
-    def without(self, k):
-        return Named(self.steps[:k] + self.steps[k + 1 :])
-
-    def share(self, names):
-        return sum(self.steps[k][0] for k in names)
-
-    @property
-    def denied(self):
-        return ()
-
-    def with_nothing_named(self):
-        return Named(())
-
-
-@pytest.mark.parametrize(
-    ('names', 'stay'),
-    [
-        ([(0.9, False)], [0.9]),
-        ([(0.3, True)], []),
-        ([(0.6, True)], [0.6]),
-        ([(0.6, False), (0.2, True)], [0.6]),
-        ([(0.6, False), (0.2, False)], [0.6, 0.2]),
-    ],
-)
-def test_a_value_that_may_be_zero_is_no_name_unless_it_takes_most_of_the_gap(
-    monkeypatch, names, stay
-):
-    """What the model had wrong before is in the interval of what is stated of the given model."""
-    for name, stub in (
-        ('in_model_as_given', lambda named: named),
-        ('shares_of', lambda named, *others: named),
-        ('may_be_nothing', lambda named, k: named.steps[k][1]),
-    ):
-        monkeypatch.setattr(attribution, name, stub)
-    rest = Named(tuple(names))
-    headline = attribution.Names(rest, rest, rest)
-    kept = attribution._as_stated(headline, rest, None, None, DiagnosisSettings())
-    assert [share for share, _ in kept.rest.steps] == stay
-    assert kept.stated.steps == kept.rest.steps
-
-
-@pytest.mark.parametrize(('own', 'small'), [(0.4, None), (0.04, 0)])
-def test_small_print_takes_little_of_all_data(monkeypatch, own, small):
-    """A slow motion shows little of a drag that takes half of the gap of the others."""
-    monkeypatch.setattr(attribution, 'may_be_nothing', lambda named, k: False)
-    monkeypatch.setattr(attribution, '_opens', lambda *arguments: False)
-    seen = Named(((0.05, False),), Named(((own, False),)))
-    assert attribution.smallest(seen, seen, DiagnosisSettings(), 0.1) == small
 
 
 def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):

@@ -6,12 +6,9 @@ from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.baseline import described_precision
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, products, set_to_zero
 from armid_ros.diagnosis.data.trajectory import trajectories
-from armid_ros.diagnosis.search.held_out import held_out, tried_beside
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification import identify
-from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, inverse_dynamics
 import numpy as np
@@ -116,23 +113,6 @@ def test_a_patched_model_has_none(bench):
         'viscous_friction',
         'coulomb_friction',
     ]
-
-
-def test_the_gap_is_what_is_left_without_it(data):
-    """Products give what a problem without the columns gives, their torque in the residual."""
-    rng = np.random.default_rng(0)
-    columns = [rng.normal(size=(*part.torque.shape, 4)) for part in data]
-    left = [rng.normal(size=part.torque.shape) for part in data]
-    unit = [np.ones(2)] * len(data)
-    whole, values = make_problem(data, unit, left, columns), np.array([0.7, -0.4])
-    prior = NormalEquations(np.diag([3.0, 1.0, 2.0, 1.0]), np.array([0.2, 0.1, 0.3, 0.0]))
-    known, rest = set_to_zero(products(whole, range(4), ()), prior, [1, 3], values)
-    power = tried_beside(known, whole, (), rest)[1]
-
-    more = [own + block[:, :, [1, 3]] @ values for own, block in zip(left, columns, strict=True)]
-    fewer = make_problem(data, unit, more, [block[:, :, [0, 2]] for block in columns])
-    pull = NormalEquations(np.diag([3.0, 2.0]), np.array([0.2, 0.3]))
-    np.testing.assert_allclose(power, held_out(fewer, range(2), [], pull)[1], rtol=1e-9)
 
 
 def test_what_lasts_does_not_excuse_itself(data):

@@ -51,9 +51,7 @@ def scaled(recordings, factor):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (57.3, 'degrees'), (1e-3, 'kN m')]
-)
+@pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'N mm'), (57.3, 'degrees')])
 def test_a_factor_since_the_baseline_is_a_unit(bench, factor, unit):
     """Masses that the model has wrong are wrong on both days."""
     before, now = bench.recordings(), scaled(bench.recordings(seed=1), factor)

@@ -2,17 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a group predicts of data that it was not fitted to, beside a refit row by row."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.diagnosis.data.rows import (
-    beside_themselves,
-    of_nuisance,
     Problem,
-    products,
-    with_candidate,
 )
-from armid_ros.diagnosis.search.held_out import held_out, tried_beside
-from armid_ros.diagnosis.search.trial import Candidate, denies, lead
+from armid_ros.diagnosis.search.held_out import held_out
+from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 import numpy as np
@@ -109,40 +105,6 @@ def test_products_of_blocks_say_what_a_refit_says(bench):
     np.testing.assert_allclose(power, np.bincount(owner, np.sum(left**2, axis=1)))
 
 
-def test_what_a_group_spares_the_data_that_hold_the_rest_is_a_gain(bench):
-    """The precision of free values stands for rows: it is worth what those rows are worth."""
-    rng = np.random.default_rng(3)
-    problem = make_problem(rng, (0.5, -0.3))
-    one, free = [group(bench)], range(OWN, OWN + FREE)
-    rows = rng.normal(size=(40, FREE))
-    left = rows @ np.array([1.5, -2.0, 0.0]) + rng.normal(size=40)
-    prior = NormalEquations.of_rows(rows, left)
-    (with_rows,), _ = held_out(problem, free, one, prior)
-    (without,), _ = held_out(problem, free, one, prior, whole=False)
-    spared = []
-    for alone, both in zip(without.fold_alone, without.fold_free, strict=True):
-        before, after = left - rows @ alone, left - rows @ both
-        spared.append(before @ before - after @ after)
-    assert with_rows.gain - without.gain == pytest.approx(np.mean(spared), rel=1e-6)
-
-
-def test_a_group_that_was_there_before_has_its_old_value_free_beside_it(bench):
-    rng = np.random.default_rng(4)
-    problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
-    own, beside = problem.x[:, :, :OWN], problem.x[:, :, OWN:]
-    size = OWN + FREE
-    root = rng.normal(size=(size, size))
-    wide = NormalEquations(root @ root.T, rng.normal(size=size))
-    one = [group(bench, precision)]
-    twice = replace(problem, x=np.concatenate([own, own, beside], axis=2))
-    (expected,), _ = held_out(twice, range(OWN, OWN + size), one, wide)
-    alone = products(problem, range(OWN, size), ())
-    known = beside_themselves(with_candidate(alone, problem, beside, own))
-    (trial,), _ = tried_beside(of_nuisance(known, slice(0, OWN)), problem, one, wide)
-    np.testing.assert_allclose(trial.values, expected.values, rtol=1e-8)
-    np.testing.assert_allclose(trial.gains, expected.gains, rtol=1e-8)
-
-
 def test_values_are_those_of_least_squares_of_all_rows(bench):
     rng = np.random.default_rng(1)
     problem, precision = make_problem(rng, (0.5, -0.3)), (3.0, 0.5)
@@ -184,43 +146,3 @@ def test_columns_that_free_ones_make_are_not_seen(bench):
     problem.x[:, :, :OWN] = problem.x[:, :, OWN : 2 * OWN]
     nothing = NormalEquations.none(FREE)
     assert held_out(problem, range(OWN, OWN + FREE), [group(bench)], nothing)[0] == []
-
-
-def test_one_cause_leads_another_by_what_it_takes_more(bench):
-    cause, _ = trial_of(bench, 3, (0.8, -0.5))
-    nothing, _ = trial_of(bench, 3, (0.0, 0.0))
-    squares, z = lead(cause, nothing)
-    assert squares == pytest.approx(cause.gain - nothing.gain)
-    assert z > 3.0
-    assert lead(nothing, cause) == (pytest.approx(-squares), pytest.approx(-z))
-
-
-def test_data_deny_a_cause_that_they_do_not_follow_and_nothing_else():
-    rng = np.random.default_rng(0)
-    square = rng.uniform(0.5, 1.5, size=40)
-    noise = 0.1 * rng.normal(size=40)
-    assert denies(noise, square)
-    assert not denies(square + noise, square)
-    assert not denies(0.5 * square + noise, square)
-    assert not denies(noise, np.zeros(40))
-    assert not denies(100.0 * noise, 0.01 * square)
-
-
-def test_two_blocks_that_are_alike_are_no_more_sure_than_white_noise(bench):
-    problem = make_problem(np.random.default_rng(3))
-    (trial, *_), _ = held_out(problem, (), [group(bench)], NormalEquations.none(0))
-    square, cross = np.zeros((2, len(FOLDS)))
-    square[:2], cross[:2] = (7.0, 6.0), (7.1, 5.9)
-    alike = replace(trial, square=square, cross=cross)
-    assert alike.z == pytest.approx(13.0 / np.sqrt(13.0))
-
-
-def test_without_candidates_all_products_are_those_of_the_nuisance_columns(bench):
-    problem = make_problem(np.random.default_rng(5))
-    free = problem.x[:, :, OWN:]
-    known = products(problem, range(OWN, OWN + FREE), ())
-    again = with_candidate(known, problem, free, free[:, :, :0])
-    assert again.border.shape == (len(known.power), FREE, 0)
-    np.testing.assert_allclose(known.free.sum(axis=0), np.einsum('rnp,rnq->pq', free, free))
-    none = products(replace(problem, x=problem.x[:, :, :0]), (), ())
-    np.testing.assert_allclose(none.power, known.power)

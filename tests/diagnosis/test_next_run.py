@@ -9,7 +9,6 @@ from types import SimpleNamespace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.next_run import plan
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.trial import Named
@@ -136,29 +135,6 @@ def test_every_motion_to_choose_from_keeps_clear_where_careless_ones_do_not(benc
         assert list(still) == ([True, False] if template.joints else [False, False])
 
 
-def test_the_worth_of_a_motion_is_what_the_rival_leaves(bench, doubtful):
-    trajectory = FourierTrajectory(
-        bench.robot.joints, 10.0, np.array([0.2, 0.7]), np.full((2, 1), 0.5), np.full((2, 1), 0.3)
-    )
-    (own,) = doubtful.explanation.fitted.named
-    zero = CATALOGUE['encoder_offset'].on(bench.robot, ('elbow',))
-    assert not doubtful.refitted
-    power = Separation.of(doubtful, Doubt(own, zero), trajectory).power
-    motion = trajectory.motion(np.arange(1000) / 50.0)
-    speed = np.abs(motion.dq)
-    used = doubtful.data[0].used
-    unit = doubtful.explanation.evidence.sigma
-    sigma = np.sqrt(np.mean(np.square(unit), axis=0))
-    rows = used.rate_hz / used.decimation / 50.0
-    weight = np.where(speed > 0.02 * speed.max(axis=0), np.sqrt(rows) / sigma, 0.0)
-    (value,) = doubtful.arm.values_of(own.effect)
-    target = (weight * [0.0, value]).ravel()
-    slope = (weight * doubtful.arm.columns_of(zero, motion)[:, :, 0]).ravel()
-    left = target @ target - (target @ slope) ** 2 / (slope @ slope)
-    assert left > 10.0
-    assert power == pytest.approx(left, rel=1e-6)
-
-
 def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen):
     motion = chosen.excitation.motion(200.0)
     rng = np.random.default_rng(3)
@@ -186,21 +162,6 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
         measured = np.sqrt(max(squares(pair.rival) - own, 0.0))
         assert measured == pytest.approx(pair.z, rel=0.5)
     assert chosen.expected_z > 5.0
-
-
-def test_a_motion_is_designed_only_where_no_template_is_enough(doubtful, monkeypatch):
-    designed = []
-
-    def design(*arguments, **options):
-        designed.append(arguments)
-        raise TrajectoryError('asked')
-
-    monkeypatch.setattr(plan, 'design', design)
-    assert plan.next_run(doubtful, np.random.default_rng(1)).expected_z > 5.0
-    assert not designed
-    monkeypatch.setattr(plan, '_SURE', np.inf)
-    plan.next_run(doubtful, np.random.default_rng(1))
-    assert designed
 
 
 def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen):

@@ -29,9 +29,7 @@ def held_by(robot, link=-1):
     return lambda motion, tau: inverse_dynamics(true, motion) - inverse_dynamics(robot, motion)
 
 
-@pytest.mark.parametrize(
-    ('arm', 'friction'), [('bench', 'named'), ('upright', 'known'), ('upright', 'named')]
-)
+@pytest.mark.parametrize(('arm', 'friction'), [('bench', 'named'), ('upright', 'known')])
 def test_a_payload_is_named_with_its_mass(request, arm, friction):
     arm = request.getfixturevalue(arm)
     hidden = arm.recordings(held_by(arm.robot))
@@ -56,12 +54,10 @@ def test_a_load_of_an_inner_link_may_be_that_link(upright):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('arm', ['bench', 'upright'])
-def test_a_payload_that_was_put_down_is_less_than_nothing(request, arm):
-    arm = request.getfixturevalue(arm)
-    loaded = arm.recordings(held_by(arm.robot))
-    model = identify(arm.arm, loaded, rng=np.random.default_rng(0)).arm
-    found = diagnose(model, arm.recordings(seed=7), baseline=loaded, rng=np.random.default_rng(0))
+def test_a_payload_that_was_put_down_is_less_than_nothing(bench):
+    loaded, now = bench.recordings(held_by(bench.robot)), bench.recordings(seed=7)
+    model = identify(bench.arm, loaded, rng=np.random.default_rng(0)).arm
+    found = diagnose(model, now, baseline=loaded, rng=np.random.default_rng(0))
     assert found.verdict in ('named', 'ambiguous'), found.summary
     (payload,) = found.findings
     assert (payload.name, payload.joints) == ('payload', ('elbow',))
@@ -92,12 +88,12 @@ def test_a_light_load_of_a_heavy_arm_is_predicted_no_worse_than_a_link(upright):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(('mass', 'side'), [(3.0, -1.0), (8.0, 1.0)])
-def test_a_heavy_load_is_no_fault_of_the_data(bench, mass, side):
+def test_a_heavy_load_is_no_fault_of_the_data(bench):
     light = bench.robot.rigid_parameters.copy()
     light[-10:] *= 0.02
     robot = bench.robot.with_inertias(light)
-    first = mass * np.array([0.12 * side, 0.0, 0.2])
+    mass = 8.0
+    first = mass * np.array([0.12, 0.0, 0.2])
     reach = (first / mass) @ (first / mass)
     spread = mass * reach * np.eye(3) - np.outer(first, first) / mass + 0.01 * np.eye(3)
     body = [mass, *first, spread[0, 0], 0.0, spread[1, 1], spread[0, 2], 0.0, spread[2, 2]]

@@ -27,14 +27,6 @@ def problem():
     return Problem(x, rng.normal(size=(80, 2)) * weight, weight, block, np.array([0, 0, 1, 1]))
 
 
-def test_more_columns_are_weighted_and_come_last(problem):
-    columns = np.random.default_rng(1).normal(size=(80, 2, 3))
-    more = problem.with_columns(columns)
-    np.testing.assert_array_equal(more.x[:, :, :4], problem.x)
-    weighted = columns * problem.weight[:, :, np.newaxis]
-    np.testing.assert_array_equal(more.x[:, :, 4:], weighted)
-
-
 @pytest.mark.parametrize('rows', [1, 2, 7, 13, 60, 200])
 def test_every_block_has_rows(rows):
     """A short stretch makes folds of a row or two."""
@@ -42,13 +34,6 @@ def test_every_block_has_rows(rows):
     block, fold = block_rows(parts)
     assert np.all(np.bincount(block, minlength=len(fold)) > 0)
     assert len(block) == rows + 90
-
-
-def test_a_loss_is_the_mean_over_the_rows_that_count(problem):
-    expected = [
-        np.mean(y[w > 0.0] ** 2) for y, w in zip(problem.y.T, problem.weight.T, strict=True)
-    ]
-    np.testing.assert_allclose(problem.chi2_per_row(problem.y), expected)
 
 
 def test_products_of_what_is_left_need_not_know_what_is_left(problem):
@@ -75,7 +60,3 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     value, *shapes = np.sum(problem.x[:, :, list(nuisance.free)] ** 2, axis=(0, 1))
     assert value > 0.0
     np.testing.assert_allclose(np.diag(nuisance.prior.matrix), [0.0, *shapes])
-
-
-def test_nothing_that_is_free_leaves_everything(problem):
-    np.testing.assert_array_equal(project(problem, ()).rest(problem.y), problem.y)

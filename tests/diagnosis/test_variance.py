@@ -10,7 +10,7 @@ from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.next_run.steps import next_steps
 from armid_ros.diagnosis.search.round import Later
 from armid_ros.diagnosis.search.trial import Candidate
-from armid_ros.diagnosis.search.variance import Changed, Recordings, UsualSpread, Variance
+from armid_ros.diagnosis.search.variance import Recordings, UsualSpread
 from armid_ros.diagnosis.verdict.words import suspicion
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.identification import identify
@@ -33,22 +33,19 @@ class Rows:
     residual: np.ndarray
 
 
-def recording(rng, value, share=1.0):
+def recording(rng, value):
     """Return rows of a recording in which a cause has a value, beside an unknown slope."""
-    free, own = rng.normal(size=(2, ROWS, 1)) * [[[1.0]], [[share]]]
+    free, own = rng.normal(size=(2, ROWS, 1))
     return Rows(free, own, value * own[:, 0] + 0.7 * free[:, 0] + 0.05 * rng.normal(size=ROWS))
 
 
-def variance(first, second, faint=0.02, precision=(1e-9,)):
+def chance(first, second, usual):
     rows = [*first, *second]
     free, left = ([getattr(one, n) for one in rows] for n in ('free', 'residual'))
     known = NormalEquations.of_rows(np.concatenate(free), np.concatenate(left))
     days = Recordings.of(free, left, [False] * len(first) + [True] * len(second), known)
-    return days.variance([one.own for one in rows], np.array(precision), 1.0, faint)
-
-
-def chance(first, second, usual):
-    return usual.chance(variance(first, second))
+    found = days.variance([one.own for one in rows], np.array([1e-9]), 1.0, 0.02)
+    return usual.chance(found)
 
 
 #: Values of recordings have a variance of one, which is some 12 times that of white noise of a
@@ -88,104 +85,6 @@ def test_heavy_tails_make_no_change_likelier():
     assert count <= 4
 
 
-def test_what_other_candidates_differ_by_makes_a_test_of_few_recordings_sharper():
-    rng = np.random.default_rng(2)
-    found = []
-    for _ in range(20):
-        values = rng.normal(size=4) + np.array([0, 0, 12, 12])
-        days = [recording(rng, value) for value in values]
-        found.append([chance(days[:2], days[2:], usual) for usual in (ALONE, WHOLE)])
-    alone, whole = np.array(found).T
-    assert np.median(whole) < 1e-3 < np.median(alone)
-
-
-def test_what_is_usual_is_the_variance_that_candidates_have_in_common():
-    rng = np.random.default_rng(3)
-    for freedom in (1, 2, 5):
-        within = 7.0 * rng.chisquare(freedom, size=4000) / freedom
-        found = [Variance(0.0, (freedom * one, 1e9), 1.0, (freedom, 3)) for one in within]
-        usual = UsualSpread.of(found, 1e6)
-        assert usual.variance == pytest.approx(7.0, rel=0.1)
-    assert UsualSpread.of([Variance(1.0, (0.0, 0.0), 1.0, (0, 0))], 4.0) is None
-
-
-def test_what_is_usual_is_what_nothing_was_wrong_with():
-    """Today counts where there was one recording before."""
-    today = Variance(1.0, (0.0, 8.0), 1.0, (0, 2))
-    both = Variance(1.0, (2.0, 800.0), 1.0, (2, 2))
-    before = UsualSpread.of([both], 4.0)
-    assert UsualSpread.of([today], 4.0).variance == pytest.approx(4.0 * before.variance)
-
-
-@pytest.mark.parametrize('freedom', [0, 2, 5])
-def test_a_change_of_the_largest_size_is_as_unlikely_as_that(freedom):
-    square = WHOLE.largest(1e-3, freedom) * WHOLE.variance
-    found = Variance(square, (freedom * WHOLE.variance, 0.0), 1.0, (freedom, 0))
-    assert WHOLE.chance(found) == pytest.approx(1e-3)
-
-
-def test_values_that_no_motion_shows_hide_no_change():
-    """An arm in a plane shows four of the ten values of a payload."""
-    rng = np.random.default_rng(2)
-    values = rng.normal(size=7) + np.array([0, 0, 0, 9, 9, 9, 9])
-    days = [recording(rng, value) for value in values]
-    wide = [replace(one, own=np.hstack([one.own, 1e-12 * one.own])) for one in days]
-    expected = variance(days[:3], days[3:])
-    found = variance(wide[:3], wide[3:], precision=(1e-9, 0.3))
-    assert found.between == pytest.approx(expected.between, rel=1e-6)
-    assert found.within == pytest.approx(expected.within, rel=1e-6)
-
-
-def test_a_recording_that_hardly_shows_a_cause_says_nothing_of_when_it_changed():
-    rng = np.random.default_rng(5)
-    days = [recording(rng, v) for v in (0.0, 0.1, 0.0, 1.0, 1.1, 0.9)]
-    faintly = recording(rng, 40.0, 0.01)
-    clear, besides = (variance(days[:3], [*days[3:], *more]) for more in ([], [faintly]))
-    assert besides.freedom == clear.freedom == (2, 2)
-    assert besides.within == pytest.approx(clear.within, rel=0.5)
-    counted = variance(days[:3], [*days[3:], faintly], faint=0.0)
-    assert counted.freedom == (2, 3)
-    assert counted.within[1] > 2.0 * clear.within[1]
-
-
-def test_a_cause_that_one_day_hardly_shows_has_not_changed_as_far_as_they_tell():
-    rng = np.random.default_rng(6)
-    before = [recording(rng, 1.0, 0.001) for _ in range(3)]
-    assert variance(before, [recording(rng, 1.0) for _ in range(3)]) is None
-
-
-def test_what_one_recording_of_the_day_before_had_as_well_is_no_change():
-    rng = np.random.default_rng(3)
-    values = [0.0, 3.0, 0.0, 1.0, 3.0, 1.0]
-    days = [recording(rng, value) for value in values]
-    assert chance(days[:3], days[3:], ALONE) > 0.1
-
-
-def test_one_recording_a_day_says_nothing_of_what_is_usual_but_is_tested_by_it():
-    rng = np.random.default_rng(4)
-    found = variance([recording(rng, 0.0)], [recording(rng, 9.0)])
-    assert (found.within, found.freedom) == ((0.0, 0.0), (0, 0))
-    assert UsualSpread.of([found], 4.0) is None
-    assert WHOLE.chance(found) == pytest.approx(stats.f.sf(found.between / 12.0, 1, 4))
-
-
-def test_what_has_changed_is_asked_of_all_together_and_which_it_is_of_each():
-    tilt, slack = ('base_tilt', (), (0,)), ('interface_slack', ('elbow',), (0,))
-    spring = ('joint_spring', ('wrist',), (0,))
-    singly = frozenset({tilt, slack})
-    nothing = Changed(frozenset(), singly, 3.0)
-    assert not nothing.changed and nothing.suspected == singly
-    assert Changed(frozenset({slack}), singly, 3.0).changed == singly
-    assert nothing.among({slack, spring}, [spring]).changed == {tilt, slack, spring}
-
-
-def test_what_cannot_be_named_does_not_say_that_anything_has_changed():
-    tilt, slack = ('base_tilt', (), (0,)), ('interface_slack', ('elbow',), (0,))
-    found = Changed(frozenset({slack}), frozenset({tilt, slack}), 3.0)
-    assert found.among({tilt, slack}, []).changed == {tilt, slack}
-    assert not found.among({tilt}, []).changed and not found.among({tilt}, [slack]).changed
-
-
 def with_offsets(bench, seed, offsets):
     """Return recordings of an elbow that has another offset in each [N m]."""
 
@@ -223,16 +122,13 @@ def worn(bench, seeds, coulomb):
     return [bench.recordings(hidden, seed=seed)[seed % 3] for seed in seeds]
 
 
-@pytest.mark.parametrize('count', [2, 6])
-def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench, count):
+def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench):
     rng = np.random.default_rng(0)
-    old = worn(bench, range(1, count + 1), 0.0)
-    new = worn(bench, range(11, count + 11), 0.4)
+    old, new = worn(bench, range(1, 7), 0.0), worn(bench, range(11, 17), 0.4)
     arm = identify(bench.arm, old, rng=rng).arm
     found = diagnose(arm, new, baseline=old, rng=rng)
-    assert [(one.name, one.joints) for one in found.findings] == [
-        ('coulomb_friction', ('elbow',))
-    ] * (count > 2), found.summary
+    named = [(one.name, one.joints) for one in found.findings]
+    assert named == [('coulomb_friction', ('elbow',))], found.summary
 
 
 def test_a_change_that_few_recordings_hardly_tell_is_suspected_and_not_named(bench):

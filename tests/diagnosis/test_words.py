@@ -3,19 +3,13 @@
 """Sentences say what the evidence bears out, and no more."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 from armid_ros.diagnosis.data.evidence import NoiseFloor
-from armid_ros.diagnosis.search.explain import without_later
-from armid_ros.diagnosis.search.trial import Step
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.gap import not_repeating
 from armid_ros.diagnosis.verdict.naming import (
-    _as_looked_at,
-    _rivals,
     _separating,
-    small_print,
 )
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
@@ -28,7 +22,6 @@ from armid_ros.diagnosis.verdict.words import (
     Unnamed,
 )
 from armid_ros.effects import CATALOGUE
-from armid_ros.effects.friction import FrictionLevel
 from armid_ros.estimate import ParameterName
 from armid_ros.report.sections.diagnosed import NamedParameters
 import numpy as np
@@ -215,64 +208,6 @@ def test_what_does_not_repeat_has_to_matter(bench):
     assert word(0.1).word == 'not_repeatable'
     assert 'elbow' in word(0.1).summary and 'shoulder' not in word(0.1).summary
     assert word(0.3).word == 'consistent'
-
-
-def test_a_factor_of_all_friction_is_suspected_with_the_names_of_its_parts(bench):
-    effect = FrictionLevel(bench.robot.joints, viscous=(1.0, 1.0), coulomb=(0.5, 0.5))
-    trial = SimpleNamespace(
-        candidate=SimpleNamespace(effect=effect, kept=(0,)),
-        values=np.array([0.05]),
-        std=np.array([0.01]),
-        gains=np.array([1.0, 2.0]),
-        gain=3.0,
-        p=1e-6,
-    )
-    found = _as_looked_at(trial, SimpleNamespace(total=6.0, tried=1), bench.arm)
-    names = 'viscous_friction', 'coulomb_friction'
-    assert [(one.name, one.share, *one.together) for one in found] == [
-        (names[0], 0.5, names[1]),
-        (names[1], 0.5, names[0]),
-    ]
-    assert _as_looked_at(None, SimpleNamespace(total=6.0, tried=1), bench.arm) == ()
-
-
-@pytest.mark.parametrize(('value', 'shown'), [(-0.06, 0), (-0.01, 1), (0.06, 1)])
-def test_the_small_print_has_no_value_beyond_its_bound(bench, value, shown):
-    """A search lets a share of lost torque be negative by what noise makes."""
-    effect = CATALOGUE['actuator_saturation'].on(bench.robot, ('elbow',))
-    trial = SimpleNamespace(
-        candidate=SimpleNamespace(effect=effect, kept=(1,)),
-        values=np.array([value]),
-        std=np.array([0.02]),
-        gains=np.array([1.0, 2.0]),
-        gain=3.0,
-        p=1e-6,
-    )
-    assert len(small_print([trial], 10.0, 1, bench.arm)) == shown
-
-
-def test_the_same_name_in_another_joint_is_a_rival():
-    def trial(name, *joints):
-        effect = SimpleNamespace(said_as=name, joints=joints)
-        return SimpleNamespace(candidate=SimpleNamespace(effect=effect), gain=1.0)
-
-    others = trial('payload', 'elbow'), trial('payload', 'wrist'), trial('torque_gain', 'elbow')
-    step = SimpleNamespace(trial=trial('payload', 'wrist'), rivals=others)
-    arm = SimpleNamespace(robot=SimpleNamespace(joints=('elbow', 'wrist')))
-    found = _rivals([step], Rival('payload', ('wrist',)), {'torque_gain'}, arm)
-    assert found == (Rival('payload', ('elbow',)),)
-
-
-def test_what_stands_in_for_a_later_name_is_no_rival_of_an_earlier_one():
-    def trial(*key):
-        return SimpleNamespace(candidate=SimpleNamespace(key=(*key, ())))
-
-    link, lag = trial('link_inertia', ('elbow',)), trial('torque_lag', ())
-    first = Step(trial('viscous_friction', ('elbow',)), (link, lag), (), 1.0, 1, None)
-    second = Step(trial('payload', ('elbow',)), (link,), (), 1.0, 1, None)
-    earlier, later = without_later([first, second])
-    assert earlier.rivals == (lag,)
-    assert later.rivals == (link,)
 
 
 @pytest.mark.parametrize(('time', 'std', 'told'), [(206.0, 12908.0, False), (206.0, 20.0, True)])

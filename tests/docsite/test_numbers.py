@@ -10,7 +10,6 @@ from armid_ros.diagnosis.settings import Thresholds
 from docsite.numbers import numbers_page
 
 PACKAGE = Path(__file__).parents[2] / 'armid_ros' / 'diagnosis'
-MEASURED = 'as it is        1.0  9 of 10 first\nprice           0.7  8 of 10 first\n'
 
 
 def rows(page):
@@ -20,7 +19,7 @@ def rows(page):
 
 
 def test_each_has_a_value_and_a_reason():
-    page = numbers_page(PACKAGE, MEASURED)
+    page = numbers_page(PACKAGE)
     told = rows(page)
     assert {field.name for field in fields(Thresholds)} <= {row[0].strip('`') for row in told}
     assert not [row for row in told if not (row[1] and row[2])]
@@ -29,7 +28,7 @@ def test_each_has_a_value_and_a_reason():
 def test_a_module_beside_it_is_on_the_page_whole():
     """What says that data are at fault decides as well."""
     faults = PACKAGE.parent / 'identification' / 'assess' / 'data_faults.py'
-    told = {row[0].strip('`') for row in rows(numbers_page(PACKAGE, MEASURED, [faults]))}
+    told = {row[0].strip('`') for row in rows(numbers_page(PACKAGE, [faults]))}
     assert {'_NEAR', '_BEYOND', '_CLIPPED', '_IMPOSSIBLE'} <= told
 
 
@@ -37,23 +36,11 @@ def test_what_decides_is_few():
     assert len(fields(Thresholds)) <= 45
 
 
-def test_what_was_measured_stands_beside_it():
-    (price,) = (row for row in rows(numbers_page(PACKAGE, MEASURED)) if row[0] == '`price`')
-    assert price[3:] == ['8 of 10 first', 'not measured']
-
-
-def test_numbers_of_one_line_are_told_apart_where_they_differ(tmp_path):
-    (tmp_path / 'module.py').write_text('#: Why.\n_ONE, _TWO = 1.0, 2.0\n')
-    measured = 'module.py _ONE   0.7  all\nmodule.py _TWO   0.7  none\n'
-    (row,) = (row for row in rows(numbers_page(tmp_path, measured)) if row[0] == '`_ONE, _TWO`')
-    assert row[4:] == ['`_ONE`: all; `_TWO`: none', 'not measured']
-
-
 def test_a_number_without_a_comment_is_noticed(tmp_path):
     (tmp_path / 'module.py').write_text(
         '#: Why.\n_GOOD, _ALSO = 1.0, -2\n_BAD = 0.3\n_TEXT = "a"\n'
     )
-    page = numbers_page(tmp_path, '')
+    page = numbers_page(tmp_path)
     assert '| `_GOOD, _ALSO` | (1.0, -2) | Why. | `module.py` |' in page
     assert '| `_BAD` | 0.3 |  | `module.py` |' in page
     assert '_TEXT' not in page
@@ -63,28 +50,12 @@ def test_a_number_of_another_package_is_on_the_page(tmp_path):
     (tmp_path / 'whole' / 'diagnosis').mkdir(parents=True)
     (tmp_path / 'whole' / 'other.py').write_text('#: Why.\nTAKEN = 1.5\n#: No.\nLEFT = 2.0\n')
     (tmp_path / 'whole' / 'diagnosis' / 'own.py').write_text('from whole.other import TAKEN\n')
-    page = numbers_page(tmp_path / 'whole' / 'diagnosis', '')
+    page = numbers_page(tmp_path / 'whole' / 'diagnosis')
     assert '| `TAKEN` | 1.5 | Why. | `whole/other.py` |' in page
     assert 'LEFT' not in page
 
 
-def test_numbers_of_a_folder_beside_it_are_on_the_page(tmp_path):
-    own, more = tmp_path / 'whole' / 'diagnosis', tmp_path / 'whole' / 'pair' / 'ties'
-    for folder in (own, more):
-        folder.mkdir(parents=True)
-    (tmp_path / 'whole' / 'other.py').write_text('#: Why.\nTAKEN = 1.5\n')
-    (own / 'own.py').write_text('#: How.\nOWN = 2.0\n')
-    taken = 'from whole.diagnosis.own import OWN\nfrom whole.other import TAKEN\n'
-    (more / 'slack.py').write_text(f'{taken}#: What for.\n_LEAST = 25.0\n')
-    told = [row[:4] for row in rows(numbers_page(own, '', [more]))[-3:]]
-    assert told == [
-        ['`OWN`', '2.0', 'How.', '`own.py`'],
-        ['`_LEAST`', '25.0', 'What for.', '`whole/pair/ties/slack.py`'],
-        ['`TAKEN`', '1.5', 'Why.', '`whole/other.py`'],
-    ]
-
-
 def test_numbers_of_ties_are_on_the_page():
-    places = {(row[0], row[3]) for row in rows(numbers_page(PACKAGE, MEASURED))}
+    places = {(row[0], row[-1]) for row in rows(numbers_page(PACKAGE))}
     assert ('`_LEAST_GAIN`', '`ties/ties.py`') in places
     assert ('`LEAST_Z`', '`armid_ros/identification/ties/stiffness.py`') in places

@@ -8,11 +8,8 @@ import pytest
 
 
 def test_plain_documents_are_what_they_say():
-    assert load_yaml('a: [1, 2.5, x]\nb: &one {c: null}\nd: *one') == {
-        'a': [1, 2.5, 'x'],
-        'b': {'c': None},
-        'd': {'c': None},
-    }
+    document = load_yaml('a: [1, 2.5, x]\nb: &one {c: null}\nd: *one')
+    assert document == {'a': [1, 2.5, 'x'], 'b': {'c': None}, 'd': {'c': None}}
     assert load_json('{"a": [1, 2.5, null]}') == {'a': [1, 2.5, None]}
 
 
@@ -27,12 +24,12 @@ def test_the_line_of_a_place_is_that_of_its_key_or_of_the_last_that_is_there(pla
 def test_aliases_that_grow_beyond_measure_are_refused():
     lines = ['l0: &l0 [x, x, x, x, x, x, x, x, x, x]']
     lines += [f'l{k}: &l{k} [{", ".join([f"*l{k - 1}"] * 10)}]' for k in range(1, 10)]
-    with pytest.raises(ValueError, match='nodes, aliases written out'):
+    with pytest.raises(ValueError, match='aliases'):
         load_yaml('\n'.join(lines))
 
 
 def test_an_alias_of_what_it_is_in_is_refused():
-    with pytest.raises(ValueError, match='has no anchor'):
+    with pytest.raises(ValueError, match='anchor'):
         load_yaml('a: &a [*a]')
 
 
@@ -54,13 +51,13 @@ def test_what_a_parser_raises_names_the_file(problem, said):
 
 @pytest.mark.parametrize('value', ['nan', float('inf'), 10**4000, None, [1], '2001-01-01'])
 def test_a_number_is_finite(value):
-    with pytest.raises(ValueError, match='mass has to be a finite number'):
+    with pytest.raises(ValueError, match=r'mass .* finite'):
         finite(value, 'mass')
 
 
 @pytest.mark.parametrize('value', [1e101, -1e308, '1.48e200', 10**150])
 def test_a_number_has_a_size_that_arithmetic_bears(value):
-    with pytest.raises(ValueError, match=r'mass is .* beyond'):
+    with pytest.raises(ValueError, match='mass'):
         finite(value, 'mass')
 
 

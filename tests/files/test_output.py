@@ -41,7 +41,7 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, 'No space left on device')
 
     monkeypatch.setattr('armid_ros.files.output.os.fdopen', full)
-    with pytest.raises(OutputError, match=r'a.json: cannot be written: No space left'):
+    with pytest.raises(OutputError, match=r'a\.json: .*No space'):
         write_file(tmp_path / 'a.json', 'new')
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ['a.json']
@@ -77,7 +77,7 @@ def test_json_has_null_for_what_is_no_number():
 
 def test_a_second_run_in_one_folder_is_refused(tmp_path):
     with result_folder(tmp_path, SCHEMA):
-        with pytest.raises(OutputError, match='another run is writing'):
+        with pytest.raises(OutputError, match=str(tmp_path)):
             with result_folder(tmp_path, SCHEMA):
                 pass
     with result_folder(tmp_path, SCHEMA):
@@ -88,9 +88,9 @@ def test_a_second_run_in_one_folder_is_refused(tmp_path):
     ('content', 'refusal'),
     [
         ({'schema': SCHEMA, 'robot': 'ur5'}, None),
-        ({'schema': SCHEMA, 'robot': 'panda'}, 'of panda, not of ur5; .*--force'),
-        ({'schema': 'armid/diagnosis/1'}, 'holds armid/diagnosis/1, not armid/ident.*--force'),
-        ('rubbish', 'identification.json, which cannot be read'),
+        ({'schema': SCHEMA, 'robot': 'panda'}, 'panda.* ur5.*--force'),
+        ({'schema': 'armid/diagnosis/1'}, 'armid/diagnosis/1.* armid/ident.*--force'),
+        ('rubbish', 'identification.json'),
     ],
 )
 def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, content, refusal):
@@ -107,9 +107,9 @@ def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, conte
     ('text', 'refusal'),
     [
         ('schema: armid/model/1\nrobot: ur5\n', None),
-        ('schema: armid/model/1\nrobot: panda\n', 'of panda, not of ur5; .*--force'),
-        ('schema: other/1\nrobot: ur5\n', 'holds other/1'),
-        ('hello', 'holds a model.yaml that cannot be read'),
+        ('schema: armid/model/1\nrobot: panda\n', 'panda.* ur5.*--force'),
+        ('schema: other/1\nrobot: ur5\n', 'other/1'),
+        ('hello', 'model.yaml'),
     ],
 )
 def test_a_model_that_no_run_of_this_kind_left_is_kept_unless_forced(tmp_path, text, refusal):
@@ -132,10 +132,10 @@ OWN = {'model.yaml': 'schema: armid/model/1\nrobot: ur5\n'}
         ({}, None),
         ({'report.html': PAGE}, None),
         ({**OWN, 'report.html': PAGE, 'identified.urdf': '<robot/>'}, None),
-        ({'report.html': 'precious'}, 'holds report.html, which armid did not write; .*--force'),
-        ({**OWN, 'report.html': 'precious'}, 'holds report.html, which armid did not'),
-        ({'identified.urdf': '<robot/>'}, 'holds identified.urdf, which armid did not write'),
-        ({**OWN, 'notes.txt': 'mine'}, 'holds notes.txt, which this command does not write'),
+        ({'report.html': 'precious'}, 'report.html.*--force'),
+        ({**OWN, 'report.html': 'precious'}, 'report.html'),
+        ({'identified.urdf': '<robot/>'}, 'identified.urdf'),
+        ({**OWN, 'notes.txt': 'mine'}, 'notes.txt'),
     ],
 )
 def test_what_the_command_did_not_write_is_kept_unless_forced(tmp_path, files, refusal):
@@ -156,7 +156,7 @@ def test_a_page_of_somebody_else_is_no_page_of_a_fleet(tmp_path):
     with result_folder(tmp_path, 'armid/fleet/1'):
         pass
     (tmp_path / 'index.html').write_text('precious')
-    with pytest.raises(OutputError, match='holds index\\.html, which armid did not write'):
+    with pytest.raises(OutputError, match=r'index\.html'):
         with result_folder(tmp_path, 'armid/fleet/1'):
             pass
 
@@ -177,7 +177,7 @@ def test_what_a_service_saves_replaces_only_what_it_wrote(tmp_path, files, refus
     if not refused:
         refuse_replacing(tmp_path, ('estimate.yaml', 'model.yaml', 'robot.urdf'))
         return
-    with pytest.raises(OutputError, match=f'holds {refused}, which armid did not write'):
+    with pytest.raises(OutputError, match=f'holds {refused}'):
         refuse_replacing(tmp_path, ('estimate.yaml', 'model.yaml', 'robot.urdf'))
 
 
@@ -208,11 +208,11 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_work(tmp_path, monke
         raise OSError(errno.EROFS, 'Read-only file system')
 
     monkeypatch.setattr('armid_ros.files.output.os.fdopen', read_only)
-    with pytest.raises(OutputError, match='cannot be written: Read-only file system'):
+    with pytest.raises(OutputError, match='Read-only file system'):
         with result_folder(tmp_path, SCHEMA):
             pytest.fail('the work began')
     (tmp_path / 'file').touch()
-    with pytest.raises(OutputError, match=f'{tmp_path / "file" / "out"}: is a file, or below one'):
+    with pytest.raises(OutputError, match=f'{tmp_path / "file" / "out"}: '):
         with result_folder(tmp_path / 'file' / 'out', SCHEMA):
             pytest.fail('the work began')
     assert os.listdir(tmp_path) == ['file']

@@ -55,7 +55,7 @@ class Flaky(AbstractFileSystem):
             fewer = left.with_name(f'{left.name}_{os.getpid()}')
             fewer.write_text(str(count - 1))
             fewer.replace(left)  # whole, for whoever reads it now
-            raise TimeoutError('the store does not answer')
+            raise TimeoutError('silent')
         shutil.copytree(rpath, lpath)
 
 
@@ -84,33 +84,22 @@ def expected(bags, cluster, tmp_path_factory):
     return digits(Store(out))
 
 
-def test_a_damaged_bag_is_refused_with_its_reason_and_the_others_are_used(
-    copied, cluster, tmp_path
-):
-    (file,) = (copied / 'arm_0001' / '2026-01-02').glob('*.mcap')
-    file.write_bytes(b'\0' * 5000)
-    outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
-    (refused,) = outcome.refused
-    assert (outcome.done, refused.bag.arm, refused.failed) == (8, 'arm_0001', False)
-    assert 'MCAP' in refused.reason
-    rows = Store(str(tmp_path)).data_set('refused').to_pylist()
-    assert [row['reason'] for row in rows] == [refused.reason]
-
-
 def test_an_arm_without_a_usable_bag_is_said(copied, cluster, tmp_path):
     for file in (copied / 'arm_0002').rglob('*.mcap'):
         file.write_bytes(b'')
     outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
-    assert {arm.arm: arm.problem for arm in outcome.arms if arm.problem} == {
-        'arm_0002': 'no bag of it can be used'
-    }
+    assert [arm.arm for arm in outcome.arms if arm.problem] == ['arm_0002']
 
 
-def test_a_bag_that_is_mended_is_used_and_no_longer_refused(bags, copied, cluster, tmp_path):
+def test_a_damaged_bag_is_refused_until_it_is_mended(copied, cluster, tmp_path):
     (file,) = (copied / 'arm_0001' / '2026-01-02').glob('*.mcap')
     whole = file.read_bytes()
     file.write_bytes(b'\0' * 5000)
-    identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
+    outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), FIXED)
+    (refused,) = outcome.refused
+    assert (outcome.done, refused.bag.arm, refused.failed) == (8, 'arm_0001', False)
+    rows = Store(str(tmp_path)).data_set('refused').to_pylist()
+    assert [row['reason'] for row in rows] == [refused.reason]
     file.write_bytes(whole)
     resumed = replace(FIXED, resume=True)
     outcome = identified(cluster, find_bags([f'{copied}/*/*']), URDF, str(tmp_path), resumed)
@@ -137,7 +126,7 @@ def test_a_store_that_never_answers_costs_its_bags_and_no_others(copied, cluster
     assert outcome.done == 6
     assert {one.bag.arm for one in outcome.refused} == {'arm_0001'}
     assert all(one.failed for one in outcome.refused)
-    assert [one.reason for one in outcome.refused if 'does not answer' not in one.reason] == []
+    assert [one.reason for one in outcome.refused if 'silent' not in one.reason] == []
     (copied / 'failures_arm_0001').unlink()
     resumed = replace(FIXED, resume=True)
     again = identified(cluster, find_bags([flaky(copied)]), URDF, str(tmp_path), resumed)
@@ -329,5 +318,5 @@ def test_a_scheduler_that_does_not_answer_is_said_at_once(monkeypatch):
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
         address = f'tcp://127.0.0.1:{free.getsockname()[1]}'
-    with pytest.raises(FleetError, match='does not answer'), connected(address):
+    with pytest.raises(FleetError, match=address), connected(address):
         pass

@@ -166,7 +166,7 @@ def test_each_arm_may_have_a_robot_of_its_own(bags, cluster, tmp_path):
 
 def test_an_effect_that_cannot_be_merged_is_refused_before_anything_is_read(bags, tmp_path):
     settings = replace(SETTINGS, effects='viscous_friction,load_dependent_friction')
-    with pytest.raises(FleetError, match=r'load_dependent_friction.*not linear'):
+    with pytest.raises(FleetError, match='load_dependent_friction'):
         identified(None, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), settings)
 
 

@@ -124,13 +124,8 @@ def test_the_report_of_any_bag_is_made_when_it_is_asked_for_and_linked(lived):
 
 def test_a_bag_that_is_not_there_is_said_with_the_latest_ones(lived):
     _, found, _ = lived
-    with pytest.raises(FleetError, match=r"no bag 'never'; the latest are .*2026-01-08"):
+    with pytest.raises(FleetError, match=r"'never'.*2026-01-08"):
         asked_bags(found, found.arms[0].arm, ['never'])
-
-
-def test_an_arm_that_is_not_there_is_said(lived):
-    with pytest.raises(FleetError, match='arm_9999'):
-        cases(lived[1], ['arm_9999'])
 
 
 def test_a_folder_without_results_is_said(tmp_path):

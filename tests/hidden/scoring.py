@@ -67,8 +67,6 @@ class Outcome:
         What was named, most important first.
     closed : float
         Share of the explainable gap that is closed on motions never used; nan if they have none.
-    before, after, floor : float
-        Root mean square of the torque error over all joints, on held-out data [N m].
     seconds : float
         Processor time it took [s].
     error : str
@@ -79,9 +77,6 @@ class Outcome:
     verdict: str
     findings: tuple[Finding, ...] = ()
     closed: float = np.nan
-    before: float = np.nan
-    after: float = np.nan
-    floor: float = np.nan
     seconds: float = np.nan
     error: str = ''
 
@@ -298,31 +293,6 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
         number('processor time, median [s]', np.median, seconds, '', None),
         number('processor time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
     )
-
-
-def confusion(judged: Sequence[Judged]) -> tuple[list[str], list[str], np.ndarray]:
-    """Return rows (hidden), columns (named first, or the verdict) and counts."""
-    counted = [
-        j
-        for j in judged
-        if j.truth.kind == 'free' or (j.truth.kind in ('single', 'outside') and j.truth.visible)
-    ]
-    rows = list(dict.fromkeys(_row(j) for j in counted))
-    named = [_column(j) for j in counted]
-    columns = [row for row in rows if row in named]
-    columns += sorted({name for name in named if name not in columns})
-    counts = np.zeros((len(rows), len(columns)), dtype=int)
-    for j, name in zip(counted, named, strict=True):
-        counts[rows.index(_row(j)), columns.index(name)] += 1
-    return rows, columns, counts
-
-
-def _row(judged: Judged) -> str:
-    return judged.truth.names[0] if judged.truth.names else 'consistent'
-
-
-def _column(judged: Judged) -> str:
-    return judged.findings[0].name if judged.findings else judged.outcome.verdict
 
 
 def _tenth(values: Any) -> float:

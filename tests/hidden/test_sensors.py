@@ -51,11 +51,3 @@ def test_jitter_makes_a_moving_joint_noisy():
     recording = sensors.record(moving, ('a', 'b'), np.random.default_rng(2))
     error = recording.q[1:-1] - (0.3 + 2.0 * recording.t[1:-1, np.newaxis])
     assert error.std() == pytest.approx(2.0 * 2e-4, rel=0.05)
-
-
-def test_perfect_instruments_show_the_truth(sensors):
-    signals = still(seconds=2.0)
-    recording = sensors.perfect(signals, ('a', 'b'))
-    np.testing.assert_allclose(recording.q, 0.3, atol=1e-15)
-    np.testing.assert_allclose(recording.tau, 0.0, atol=1e-15)
-    np.testing.assert_allclose(np.diff(recording.t), 1.0 / RATE)

@@ -52,7 +52,6 @@ def test_of_a_clean_recording_nothing_is_said(clean, robot):
     assert found.remarks == ()
     assert found.trial.rank == found.trial.theory
     assert found.trial.relative_error_percent < 3.0
-    assert 'parameters are distinguishable' in found.verdict
     assert found.sampling.period == pytest.approx(PERIOD, abs=0.1)
     assert found.sampling.periods == pytest.approx(2.0, abs=0.02)
     for joint in found.joints:
@@ -169,7 +168,7 @@ def test_a_joint_beyond_its_limit_is_doubted_with_both_numbers(clean, robot):
     elbow = clean.q[:, 3].max()
     shifted = replace(clean, q=clean.q + (robot.upper[3] + 0.3 - elbow) * np.eye(6)[3])
     (said,) = (remark for remark in remarks(shifted, robot) if 'limits' in remark)
-    assert said.startswith('doubt: beyond the limits of the description: elbow_pitch reaches ')
+    assert said.startswith('doubt: ') and 'elbow_pitch' in said
     assert f'{robot.upper[3] + 0.3:.4g} of {robot.upper[3]:.4g} rad' in said
 
 

@@ -63,7 +63,9 @@ def test_both_packages_are_found_messages_first(workspace):
     assert run(listed, workspace / 'src' / 'armid_ros').split() == ['armid_msgs', 'armid_ros']
 
 
-@pytest.mark.parametrize('built', ['install', 'linked_install'])
+@pytest.mark.parametrize(
+    'built', ['install', pytest.param('linked_install', marks=pytest.mark.long)]
+)
 def test_build_installs_what_ros2_looks_for(built, root, request):
     """Marker, manifest and executables, without one of the scripts being lost or added."""
     install = request.getfixturevalue(built)

@@ -32,10 +32,6 @@ def test_thinning_keeps_every_peak():
         assert (inside.min(), inside.max()) == (y[samples].min(), y[samples].max())
 
 
-def test_thinning_leaves_short_series_alone():
-    np.testing.assert_array_equal(thinned(np.zeros(3000), np.ones(3000)), np.arange(3000))
-
-
 def test_thinning_keeps_breaks():
     y = np.sin(np.arange(50_000.0))
     y[30_000] = np.nan

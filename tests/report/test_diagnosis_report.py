@@ -7,7 +7,6 @@ import re
 from types import SimpleNamespace
 
 from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
-from armid_ros.diagnosis.verdict.finding import Rival
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -110,27 +109,14 @@ def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet
     assert 'var(--predicted)' not in plain
 
 
-def test_the_share_has_its_interval_wherever_it_is_said(found, html):
-    (finding,) = found.findings
-    low, high = finding.share_interval
-    text, differ = f'({percent(low)} to {percent(high)})', percent(low) != percent(high)
-    body = html[: html.index('>Measured and modelled</h2>')]
-    assert body.count(text) == (2 if differ else 0)
-    assert f'floor, {digits(float(found.gap.floor[1]))} N m, is {found.baseline}' in body
-
-
 def test_one_share_is_on_the_page_and_in_the_document(found, html):
     (finding,) = found.findings
-    share = f'{percent(finding.share)} of the gap'
+    share = percent(finding.share)
     assert found.summary.count('%') == 1 and share in found.summary
     assert diagnosis_document(found)['effects'][0]['share'] == finding.share
     text = re.sub('<[^>]*>', ' ', html[html.index('class="verdict') :])
-    shown = text[: text.index('Measured and modelled')]
+    shown = text[: text.index('Where it shows')]
     assert shown.count(share) >= 2  # the sentence, and the short answers
-    low, high = map(percent, finding.share_interval)
-    bar = f'{percent(finding.share)} (' if low != high else percent(finding.share)
-    assert bar in shown[shown.index('What explains the gap') :]
-    assert 'above the floor' not in text
 
 
 def test_causes_that_are_one_have_one_bar(found):
@@ -138,10 +124,8 @@ def test_causes_that_are_one_have_one_bar(found):
     twin = replace(finding, name='base_tilt', joints=(), together=(finding.name,))
     both = replace(found, findings=(replace(finding, together=('base_tilt',)), twin))
     rows = Shares(both).bars.rows
-    assert [label for label, _ in rows] == [
-        'quadratic friction and base tilt, elbow',
-        'unexplained (noise included)',
-    ]
+    assert len(rows) == 2
+    assert 'quadratic friction' in rows[0][0] and 'base tilt' in rows[0][0]
     assert sum(bar.value for _, bars in rows for bar in bars) == pytest.approx(1.0)
 
 
@@ -153,29 +137,26 @@ def test_the_joint_where_it_lives_is_the_one_with_the_largest_bar(found):
 
 
 def test_a_gap_of_the_fitted_data_alone_is_said_to_be_one(found):
-    assert not any('that were fitted' in line for line in Story(found).rows[0][1])
+    (_, before), *_ = Story(found).rows
     quiet_there = replace(found.gap, chi2_before=0.9 * np.ones(2), predicted=True)
     (_, lines), *_ = Story(replace(found, gap=quiet_there)).rows
-    assert lines[0].startswith('In the fitted recordings only') and 'elbow' in lines[0]
+    assert 'elbow' in lines[0] and 'fitted' in lines[0]
+    assert lines != before
 
 
 def test_what_was_added_to_the_model_is_said(found, recordings, html):
-    assert 'model.yaml is the model with quadratic friction' in html
-    assert 'The model is unchanged.' not in html
     worse = replace(found, harmful=True)
     page = diagnosis_report(worse, DiagnosedRecordings(recordings), robot='two_links')
-    assert 'The model is unchanged.' in page
-    assert 'which model.yaml does not have' in page
     assert '>Patch</h2>' in html and '>Patch</h2>' not in page
+    assert 'unchanged' not in html and 'unchanged' in page
 
 
 def test_what_is_suspected_and_not_checked_is_said_in_short(found):
     nothing = replace(found, verdict='consistent', findings=(), where=(), left=())
     rows = dict(Story(replace(nothing, suspected=found.findings, blind=('elbow',))).rows)
-    assert rows['Where'] == ['No joint that was checked has a gap.', 'Not checked: elbow.']
-    assert rows['Which'][0] == 'No cause was found.'
-    assert rows['Which'][1].startswith('Suspected: quadratic friction of elbow')
-    assert dict(Story(nothing).rows)['Where'] == ['No joint has a gap.']
+    assert 'elbow' in rows['Where'][1]
+    assert 'quadratic friction' in rows['Which'][1] and 'elbow' in rows['Which'][1]
+    assert len(dict(Story(nothing).rows)['Where']) == 1
 
 
 def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found):
@@ -185,24 +166,18 @@ def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found
     numbers = {'values': values, 'std': (0.01,) * len(names), 'added_to': ()}
     link = replace(found.findings[0], name='link_inertia', parameters=names, **numbers)
     rows = NamedParameters((link,)).rows
-    assert [row[1] for row in rows][:2] == [
-        'difference of mass',
-        'difference of first moment along x',
-    ]
+    assert rows[0][1].endswith('of mass') and rows[1][1].endswith('along x')
     (cause,) = dict(Story(replace(found, findings=(link,))).rows)['Which']
-    assert 'difference of moment of inertia about x 0.500' in cause
-    assert 'mass' not in cause
+    assert 'about x 0.500' in cause and 'mass' not in cause
 
 
 def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
     assert '>consistent<' in quiet
-    assert 'No cause was found.' in quiet
-    assert 'The model is unchanged.' in quiet
-    assert '>What explains the gap<' not in quiet
+    assert 'unchanged' in quiet
     assert '>Patch</h2>' not in quiet
 
 
-def test_a_model_that_simulates_worse_is_not_green(found, recordings):
+def test_a_model_that_simulates_worse_is_not_green(found, recordings, html):
     used = conditioning(recordings, SignalSettings())
     spring = CATALOGUE['joint_spring'].on(found.arm.robot, ('elbow',))
     wrong = found.arm.with_effect(spring, np.array([30.0, 0.0]))
@@ -211,9 +186,7 @@ def test_a_model_that_simulates_worse_is_not_green(found, recordings):
     page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='arm', extras=extras)
     assert 'elbow' in extras.worse
     assert (tone_of(found), tone_of(found, extras.worse)) == ('good', 'fair')
-    assert 'larger position errors than before in ' in page
-    assert 'It is worse than before in ' in page
-    assert 'Do not simulate with model.yaml' in page
+    assert 'class="verdict fair"' in page and 'class="verdict good"' in html
 
 
 def test_bad_data_have_no_green_tick():
@@ -222,12 +195,11 @@ def test_bad_data_have_no_green_tick():
     found = diagnose(bench.arm, turned, rng=np.random.default_rng(0))
     assert found.verdict == 'bad_data'
     page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
-    assert '<li class="fine">' not in page
-    assert 'The recorded signals are at fault' in page
+    assert 'class="fine"' not in page
     sound = [replace(one, source=f'before {k}') for k, one in enumerate(bench.recordings(seed=1))]
     both = DiagnosedRecordings(turned, baseline=sound)
     beside = diagnosis_report(found, both, robot='two_links')
-    assert beside.count('<li class="fine">') == len(sound)
+    assert beside.count('class="fine"') == len(sound)
 
 
 def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):
@@ -275,16 +247,8 @@ def test_nothing_is_loaded_from_elsewhere(html):
     assert 'href="http' not in html
 
 
-@pytest.mark.parametrize('width', [390, 1280])
-def test_a_browser_draws_it_without_complaint(browser, tmp_path, html, width):
-    path = tmp_path / 'report.html'
-    path.write_text(html, encoding='utf-8')
-    browser.open(path, width)
-    browser.run('document.querySelectorAll("details").forEach(d => { d.open = true; })')
-    browser.run('new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))')
-    assert browser.complaints == []
-    assert browser.run('document.documentElement.scrollWidth') <= width
-    assert browser.run('document.querySelectorAll(".u-over").length') >= 4
+def test_a_browser_draws_it_without_complaint(browser, charts_drawn, html):
+    assert charts_drawn(html, 390, dark=False) >= 4
     shown = browser.run('document.querySelector(".verdict").innerText')
     assert 'quadratic friction' in shown
     box = 'document.querySelector("svg.arm").getBoundingClientRect()'
@@ -306,17 +270,10 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
     assert any(torque.x[-1] == pytest.approx(one.trajectory.t[-1], abs=0.1) for one in shown)
 
 
-def test_the_page_says_from_which_size_each_effect_would_show(html):
-    section = html[html.index('id="smallest-detectable-effects"') :]
-    assert 'Detectable from' in section
-    assert 'Not detectable with this motion in' in section
-    assert '<td class="name">torque ripple</td>' in section
-
-
 def test_curves_of_where_it_lives_are_without_the_mean_which_is_said(found):
     place = replace(found.where[0], mean=2.0, mean_share=0.9)
     section = EvidenceSection([place])
-    assert section.taken_off(place).startswith('The mean of the residual, 2.0 N m or 90 % of its')
+    assert '2.0 N m' in section.taken_off(place) and '90 %' in section.taken_off(place)
     for axis, (caption, chart) in zip(place.axes, section.charts(place), strict=True):
         np.testing.assert_allclose(chart.series[0].y, axis.means - 2.0)
         share = 100.0 * max(axis.share - 0.9, 0.0) / 0.1
@@ -361,21 +318,6 @@ def test_a_joint_of_which_no_row_counts_has_no_error_of_zero(found):
     bars = GapBars(found.arm.robot, replace(gap, **none), 'noise', True).bars.rows
     assert [bar.text for bar in bars[0][1]] == ['not judged']
     assert len(bars[1][1]) == 3
-
-
-def test_a_rival_of_the_same_name_is_told_by_its_joint(found):
-    (finding,) = found.findings
-    rival = Rival(finding.name, ('shoulder',))
-    (cause,) = dict(Story(replace(found, findings=(replace(finding, rivals=(rival,)),))).rows)[
-        'Which'
-    ]
-    assert cause.endswith('the data do not distinguish it from one of shoulder')
-
-
-def test_steps_have_the_sign_that_the_sentence_has(found, recordings):
-    extras = Extras(no_run='the load is 0.3 +- 0.1 kg')
-    page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='r', extras=extras)
-    assert 'The load is 0.3 ± 0.1 kg.' in page
 
 
 @pytest.mark.parametrize(

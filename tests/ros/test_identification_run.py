@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 import json
 from pathlib import Path
 
@@ -95,14 +96,15 @@ def test_two_runs_are_recorded_identified_held_out_and_diagnosed(bench, arm, exc
         assert recording.duration > excitation.duration
     identify, diagnose = programs.called
     assert identify[:4] == ('identify', str(first), '--validate', str(second))
-    assert '--effects viscous_friction,coulomb_friction' in ' '.join(identify)
-    assert '--gravity moon' in ' '.join(identify)
+    pairs = list(pairwise(identify))
+    assert ('--effects', 'viscous_friction,coulomb_friction') in pairs
+    assert ('--gravity', 'moon') in pairs
     assert identify[-2:] == ('--out', str(tmp_path / 'identification'))
     assert diagnose[0] == 'diagnose'
     assert ('--model', str(tmp_path / 'identification' / 'model.yaml')) == diagnose[-4:-2]
     results = run.condition()[1]['results']
     assert results.startswith('identify: good (')
-    assert 'diagnose: not repeatable: nothing to name (' in results
+    assert 'diagnose: not repeatable: ' in results
 
 
 def test_after_a_rehearsal_that_is_as_foreseen_it_goes_on(bench, arm, excitation, tmp_path):
@@ -121,7 +123,7 @@ def test_a_rehearsal_that_surprises_ends_it(bench, arm, excitation, tmp_path):
     arm.faults.torque = 10.0
     node, run = everything(bench, arm, excitation, tmp_path, programs, rehearse=True)
     carry_on(bench, arm, node, run)
-    assert 'were foreseen; look into it' in run.failure
+    assert 'N m' in run.failure
     assert not programs.called
     assert len(arm.goals) == 1
 
@@ -133,7 +135,7 @@ def test_a_run_that_is_stopped_ends_it_with_the_reason(bench, arm, excitation, t
     programs = Programs()
     node, run = everything(bench, arm, excitation, tmp_path, programs)
     carry_on(bench, arm, node, run, fault=stick)
-    assert 'run 1 of 2: stopped' in run.failure
+    assert run.failure.startswith('run 1 of 2')
     assert 'elbow_pitch' in run.failure
     assert not programs.called
     bench.settle()
@@ -145,22 +147,22 @@ def test_data_that_cannot_be_diagnosed_are_an_answer(bench, arm, excitation, tmp
     node, run = everything(bench, arm, excitation, tmp_path, programs, runs=1)
     carry_on(bench, arm, node, run)
     assert not run.failure
-    assert 'diagnose: bad data: nothing to name' in run.condition()[1]['results']
+    assert 'diagnose: bad data: ' in run.condition()[1]['results']
 
 
 def test_a_program_that_fails_is_said_with_what_there_is(bench, arm, excitation, tmp_path):
     programs = Programs(codes=(0, 2))
     node, run = everything(bench, arm, excitation, tmp_path, programs, runs=1)
     carry_on(bench, arm, node, run)
-    assert 'armid diagnose ended with code 2' in run.failure
-    assert f'the recordings are {tmp_path / "run"}' in run.failure
-    assert 'until then: identify: good' in run.failure
+    assert 'armid diagnose' in run.failure and 'code 2' in run.failure
+    assert str(tmp_path / 'run') in run.failure
+    assert 'identify: good' in run.failure
 
 
 def test_nodes_that_do_not_come_up_are_named(bench, tmp_path):
     run = bench.add(IdentificationRunNode, Programs(), save_to=str(tmp_path), patience=1.0)
     bench.spin_until(lambda: run.finished, 'the end')
-    assert run.failure == '/excitation_publisher and /recorder did not come up'
+    assert '/excitation_publisher' in run.failure and '/recorder' in run.failure
 
 
 def test_a_start_that_is_refused_is_in_log_and_status_at_once(bench, arm, excitation, tmp_path):
@@ -199,7 +201,7 @@ def test_a_node_that_is_ended_stops_the_arm_and_the_recording(bench, arm, excita
         ({'joints': ['knee']}, 'knee'),
         ({'effects': ['glue']}, "no effect 'glue'"),
         ({'gravity': 'mars'}, 'mars'),
-        ({'save_to': 'FILE/results'}, 'cannot be made: Not a directory'),
+        ({'save_to': 'FILE/results'}, 'file/results'),
     ],
 )
 def test_what_armid_would_refuse_is_refused_before_the_arm_moves(

@@ -124,12 +124,12 @@ def test_an_array_without_a_stamp_is_of_the_time_it_comes(bench):
 def test_the_joints_are_those_of_the_description(bench):
     robot = load_robot('humanoid_arm')
     node = bench.add(JointStateMergerNode)
-    assert node.condition()[0] == 'waiting for robot_description'
+    assert 'robot_description' in node.condition()[0]
     publisher = bench.matched_publisher(String, 'robot_description', LATCHED)
     publisher.publish(String(data=robot.urdf))
     bench.spin_until(lambda: node.joints, 'the joints')
     assert node.joints == robot.joints
-    assert f'no position of {", ".join(robot.joints)}' in node.condition()[0]
+    assert ', '.join(robot.joints) in node.condition()[0]
 
 
 def test_what_is_missing_is_named(bench):
@@ -139,17 +139,17 @@ def test_what_is_missing_is_named(bench):
     positions.publish(state(1.0, JOINTS, [0.1, 0.2]))
     efforts.publish(currents(1.0, [1.0, 1.0]))
     bench.settle()
-    assert node.condition()[0] == 'no torque of a, b so far'
-    assert "no joint has the interface 'torque'; there are current" in node.complaints.latest
+    assert 'torque of a, b' in node.condition()[0]
+    assert "'torque'" in node.complaints.latest and 'current' in node.complaints.latest
 
 
 def test_a_topic_without_torques_and_wrong_counts_are_refused(bench):
-    with pytest.raises(ParameterError, match=r"'gains' has 3 for 2 joints: a, b"):
+    with pytest.raises(ParameterError, match=r"'gains' has 3 .* a, b"):
         merger(bench, gains=[1.0, 2.0, 3.0])
     node, _ = merger(bench, effort_topic='words')
     bench.probe.create_publisher(String, 'words', 10)
     bench.spin_until(lambda: node.complaints.counts, 'a complaint')
-    assert 'std_msgs/msg/String holds no efforts' in node.complaints.latest
+    assert 'std_msgs/msg/String' in node.complaints.latest
 
 
 @pytest.mark.long
@@ -165,5 +165,5 @@ def test_torques_that_a_driver_low_passes_are_said(bench):
             bench.settle()
     bench.spin_until(lambda: len(out) > 1400, OUT)
     _, values = node.condition()
-    assert values['low-passed to [Hz] a'] == pytest.approx(8.4, rel=0.35)  # 500/2 pi ln(1/0.9)
-    assert 'low-passed to [Hz] b' not in values
+    ((joint, cutoff),) = [one for one in values.items() if '[Hz]' in one[0]]
+    assert joint.endswith(' a') and cutoff == pytest.approx(8.4, rel=0.35)  # 500/2 pi ln(1/0.9)

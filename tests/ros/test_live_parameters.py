@@ -145,7 +145,7 @@ def test_changes_that_were_never_looked_for_cannot_be_looked_for_in_between(benc
     core = identifier(OnlineSettings(changes=None))
     node = bench.add(OnlineIdentifierNode, core, false_alarm_time=0.0)
     (result,) = node.set_parameters([Parameter('false_alarm_time', value=100.0)])
-    assert not result.successful and 'from the beginning' in result.reason
+    assert not result.successful
     assert node.value('false_alarm_time') == 0.0
 
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from armid_ros.nodes.base import EXECUTOR
 from armid_ros.nodes.parameters.table import (
     as_declared,
     declare,
@@ -78,15 +77,9 @@ def test_parameters_that_a_node_does_not_have_are_named_once_but_not_those_of_ro
     node.warn_of_unknown()
     bench.spin_until(lambda: any('is named' in log.msg for log in said), 'the warning')
     (text,) = [log.msg for log in said if 'is named' in log.msg]
-    assert "'compresion'; did you mean 'compression'?" in text and "'rte'" in text
+    assert "'compresion'" in text and "'compression'" in text and "'rte'" in text
     assert not any(name in text for name in given)
     assert node.complaints.counts['parameter'] == 1
-
-
-def test_a_node_with_the_parameters_it_has_warns_of_none(bench, tmp_path):
-    node = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), record=False)
-    node.warn_of_unknown()
-    assert not node.complaints.counts
 
 
 def test_descriptors_hold_unit_range_choices_and_read_only(bench):
@@ -123,7 +116,3 @@ def test_a_refused_parameter_is_said_on_rosout_and_counted_on_diagnostics(bench,
     values = {v.key: v.value for v in status.values}
     assert values['rejected parameter'] == '3'
     assert sum('chunk_age' in m.msg for m in rosout) == 1
-
-
-def test_every_node_has_an_executor_choice():
-    assert EXECUTOR.objection('many') and not EXECUTOR.objection('events')

@@ -105,7 +105,7 @@ def test_drives_give_no_more_torque_than_they_have(humanoid) -> None:
 
 @pytest.mark.parametrize('bad', [-1.0, np.nan, [1.0, 2.0]])
 def test_gains_that_make_no_sense_are_refused(humanoid, bad) -> None:
-    with pytest.raises(ModelError, match='bandwidth has to be one number, or one for each of 6'):
+    with pytest.raises(ModelError, match=r'bandwidth.* 6'):
         ComputedTorque(ArmModel(humanoid), bandwidth=bad)
     with pytest.raises(ModelError, match='stiffness'):
         GravityPD(ArmModel(humanoid), stiffness=bad)

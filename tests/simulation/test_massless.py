@@ -13,5 +13,5 @@ MASSLESS = """<robot name="r"><link name="base"/><link name="hand"/>
 
 def test_a_joint_that_moves_nothing_cannot_be_simulated():
     arm = ArmModel(robot_from_urdf(MASSLESS))
-    with pytest.raises(ModelError, match=r"wrist' moves no mass.*link 'hand'"):
+    with pytest.raises(ModelError, match=r"wrist'.* 'hand'"):
         Plant(arm)

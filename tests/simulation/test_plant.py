@@ -163,7 +163,7 @@ def test_hitting_a_stop_gains_no_energy(pendulum) -> None:
 
 
 def test_an_arm_cannot_begin_beyond_its_stops(pendulum) -> None:
-    with pytest.raises(TrajectoryError, match=r"joint 'joint1' cannot be at 0.6.* -0.5 and 0.5"):
+    with pytest.raises(TrajectoryError, match=r"'joint1' .* 0\.6.* -0\.5 and 0\.5"):
         Plant(ArmModel(pendulum(stop=0.5))).state([0.6])
     Plant(ArmModel(pendulum(stop=0.5)), hard_stops=False).state([0.6])
     assert Plant(ArmModel(pendulum(stop=0.5))).state([0.5 + 1e-9]).q[0] == 0.5
@@ -171,7 +171,7 @@ def test_an_arm_cannot_begin_beyond_its_stops(pendulum) -> None:
 
 def test_bodies_that_cannot_be_are_refused(slider) -> None:
     robot = slider()
-    with pytest.raises(ModelError, match=r'not positive definite.* identify with --physical'):
+    with pytest.raises(ModelError, match='--physical'):
         Plant(ArmModel(robot.with_inertias(-robot.rigid_parameters)))
     with pytest.raises(ModelError, match='positive time'):
         Plant(ArmModel(robot), dt=0.0)

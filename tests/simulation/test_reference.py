@@ -87,22 +87,22 @@ def test_joints_are_matched_by_name(humanoid) -> None:
 
 def test_unknown_and_missing_joints_are_named(humanoid) -> None:
     names = ('elbo', *humanoid.joints[1:])
-    with pytest.raises(TrajectoryError, match=r"'elbo' is not one of .*shoulder_pitch"):
+    with pytest.raises(TrajectoryError, match=r"'elbo' .*shoulder_pitch"):
         Reference(names, np.zeros(1), np.zeros((1, 6))).for_robot(humanoid)
-    with pytest.raises(TrajectoryError, match="'shoulder_pitch' is missing"):
+    with pytest.raises(TrajectoryError, match="'shoulder_pitch'"):
         Reference(humanoid.joints[1:], np.zeros(1), np.zeros((1, 5))).for_robot(humanoid)
 
 
 @pytest.mark.parametrize(
     ('t', 'q', 'message'),
     [
-        ([0.0, 1.0, 1.0], np.zeros((3, 1)), r'point 2 is at 1.0 s and the one before it at 1.0 s'),
-        ([0.0, 2.0, 1.0], np.zeros((3, 1)), r'time has to increase'),
-        ([-1.0, 1.0], np.zeros((2, 1)), r'first time is -1.0 s'),
-        ([0.0, np.nan], np.zeros((2, 1)), r'point 1 is at nan s'),
+        ([0.0, 1.0, 1.0], np.zeros((3, 1)), r'point 2 .* 1\.0 s'),
+        ([0.0, 2.0, 1.0], np.zeros((3, 1)), r'point 2'),
+        ([-1.0, 1.0], np.zeros((2, 1)), r'-1\.0 s'),
+        ([0.0, np.nan], np.zeros((2, 1)), r'point 1 .* nan s'),
         ([], np.zeros((0, 1)), r'no points'),
-        ([0.0, 1.0], np.zeros((3, 1)), r'q has shape \(3, 1\)'),
-        ([0.0, 1.0], np.array([[0.0], [np.nan]]), r"q of joint 'a' at point 1 is nan"),
+        ([0.0, 1.0], np.zeros((3, 1)), r'\(3, 1\)'),
+        ([0.0, 1.0], np.array([[0.0], [np.nan]]), r"'a' at point 1"),
     ],
 )
 def test_malformed_waypoints_are_refused(t, q, message: str) -> None:
@@ -111,7 +111,7 @@ def test_malformed_waypoints_are_refused(t, q, message: str) -> None:
 
 
 def test_accelerations_without_velocities_and_repeated_joints_are_refused() -> None:
-    with pytest.raises(TrajectoryError, match='accelerations but no velocities'):
+    with pytest.raises(TrajectoryError, match='velocities'):
         Reference(('a',), np.zeros(1), np.zeros((1, 1)), None, np.zeros((1, 1)))
     with pytest.raises(TrajectoryError, match='named twice'):
         Reference(('a', 'a'), np.zeros(1), np.zeros((1, 2)))
@@ -135,11 +135,11 @@ def test_lower_and_velocity_limits_are_named(humanoid) -> None:
     q = np.zeros((2, 6))
     q[1, 0] = humanoid.lower[0] - 0.1
     slow = Reference(humanoid.joints, np.array([0.0, 100.0]), q)
-    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' reaches .* lower limit"):
+    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' .* lower"):
         slow.require_limits(humanoid, 1e-3)
     q[1, 0] = 0.5
     fast = Reference(humanoid.joints, np.array([0.0, 0.1]), q)
-    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' reaches 5 rad/s .* velocity"):
+    with pytest.raises(TrajectoryError, match=r"'shoulder_pitch' .* 5 rad/s"):
         fast.require_limits(humanoid, 1e-3)
 
 

@@ -118,8 +118,8 @@ def test_a_run_cannot_be_written_to(run) -> None:
 
 def test_what_does_not_fit_is_refused(arm) -> None:
     rng = np.random.default_rng(0)
-    with pytest.raises(ModelError, match='a rate of 300 Hz does not fit the step of'):
+    with pytest.raises(ModelError, match='300 Hz'):
         simulate(arm, swinging(arm.robot), rng=rng, rate=300.0)
     far = Reference(arm.robot.joints, np.zeros(1), np.full((1, 6), 10.0))
-    with pytest.raises(TrajectoryError, match='beyond its upper limit'):
+    with pytest.raises(TrajectoryError, match='upper limit'):
         simulate(arm, far, rng=rng)

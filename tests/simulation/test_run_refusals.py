@@ -44,14 +44,14 @@ def test_an_arm_of_one_joint_follows(kind):
 @pytest.mark.parametrize('rate', [0.0, -5.0, np.nan])
 def test_a_rate_has_to_be_positive(rate):
     robot = one_joint()
-    with pytest.raises(ModelError, match=r'rate of .* Hz: samples per second'):
+    with pytest.raises(ModelError, match=r'rate .* Hz'):
         simulate(ArmModel(robot), sine(robot.joints), rng=np.random.default_rng(0), rate=rate)
 
 
 def test_a_link_of_negative_mass_is_named():
     robot = one_joint(mass=1.0)
     negative = robot.with_inertias(-robot.rigid_parameters)
-    with pytest.raises(ModelError, match=r"link 'arm' has a mass of -1 kg; correct"):
+    with pytest.raises(ModelError, match=r"'arm' .* -1 kg"):
         require_masses(negative)
 
 
@@ -61,7 +61,7 @@ def test_what_makes_an_inertia_matrix_impossible_is_named(link):
     bodies = robot.rigid_parameters.reshape(-1, 10).copy()
     bodies[link] *= -1.0
     arm = ArmModel(robot.with_inertias(bodies.ravel()))
-    with pytest.raises(ModelError, match=f"link '{robot.links[link]}' has a mass of -"):
+    with pytest.raises(ModelError, match=f"'{robot.links[link]}' .* -"):
         simulate(arm, sine(robot.joints), rng=np.random.default_rng(0))
 
 
@@ -83,7 +83,7 @@ def test_an_arm_that_flies_away_does_not_follow_and_warns_of_nothing():
         ONE_JOINT.format(kind='continuous', mass=1.0).replace('effort="20"', 'effort="1e300"'),
         source='one.urdf',
     )
-    with pytest.raises(ModelError, match=r'does not follow; hinge is faster than'):
+    with pytest.raises(ModelError, match='hinge'):
         simulate(
             ArmModel(robot),
             sine(robot.joints),
@@ -100,9 +100,9 @@ def test_what_needs_springs_or_has_none_is_told_so():
     )
     arm = ArmModel(robot).with_effect(*springs).with_effect(*rotors)
     plant = Plant(arm, elasticity=Elasticity())
-    with pytest.raises(ModelError, match=r'give way are read on both sides.* use SimulatedArm'):
+    with pytest.raises(ModelError, match='SimulatedArm'):
         simulate(plant, sine(robot.joints), rng=np.random.default_rng(0))
-    with pytest.raises(ModelError, match='keeps its effects; start it with others'):
+    with pytest.raises(ModelError, match='effects'):
         SimulatedArm(plant, rng=np.random.default_rng(0)).become(ArmModel(robot))
-    with pytest.raises(ModelError, match='its joints are rigid; use ComputedTorque'):
+    with pytest.raises(ModelError, match='ComputedTorque'):
         MotorControl.of(Plant(arm))

@@ -103,7 +103,7 @@ def test_the_diagnosis_is_text_above_the_base(bench, drawn):
     sender.publish(Diagnosis(verdict='not_repeatable', summary='the torque differs ' * 8))
     _, markers = drawn([0.0] * 6)
     (text,) = of(markers, 'diagnosis')
-    assert text.text.startswith('not repeatable: the torque differs')
+    assert text.text.startswith('not repeatable: the torque')
     assert '\n' in text.text
     assert text.pose.position.z > 0.0
 
@@ -111,6 +111,6 @@ def test_the_diagnosis_is_text_above_the_base(bench, drawn):
 def test_nothing_is_drawn_before_the_arm_is_known(bench):
     node = bench.add(ResidualMarkersNode)
     out = bench.listen(MarkerArray, 'residual_markers/markers')
-    assert node.condition()[0] == 'waiting for robot_description'
+    assert 'robot_description' in node.condition()[0]
     bench.settle()
     assert not out

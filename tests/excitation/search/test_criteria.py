@@ -155,12 +155,9 @@ def test_payload_is_visible_when_the_arm_is_known(humanoid, with_effects):
 
 
 def test_unknown_names_are_refused_with_those_that_exist(two_link_arm):
-    for kind, settings in (
-        ('criterion', {'criterion': 'X'}),
-        ('target', {'target': 'X'}),
-    ):
-        with pytest.raises(TrajectoryError, match=f"no {kind} 'X'; there are"):
-            DesignSettings(**settings)
+    for setting in ('criterion', 'target'):
+        with pytest.raises(TrajectoryError, match="'X'"):
+            DesignSettings(**{setting: 'X'})
     with pytest.raises(TrajectoryError, match='viscous_friction, coulomb_friction'):
         DesignProblem.of(
             two_link_arm, DesignSettings(focus=('backlash',)), np.random.default_rng(0)

@@ -13,7 +13,6 @@ import numpy as np
 
 from tests.hidden.arrays import FloatArray, Parameter
 from tests.hidden.lived.arms import load_arm, worn_bodies
-from tests.hidden.lived.cache import kept
 from tests.hidden.lived.causes import Cause, CAUSES, Mounting, Scene
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.instruments import Instruments, sampled
@@ -168,9 +167,7 @@ def lived_case(kind: str, index: int) -> LivedCase:
         Number, from 0.
 
     """
-    spec = specify(kind, index)
-    case = kept(spec.key.replace('/', '_'), lambda: case_of(spec))
-    return replace(case, urdf=_path_of(load_arm(spec.arm)))
+    return case_of(specify(kind, index))
 
 
 def case_with(kind: str, index: int, cause: str, size: tuple[float, float]) -> LivedCase:

@@ -7,11 +7,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.arms import ARMS, load_arm
 from tests.hidden.lived.cases import draw_case, lived_case
 from tests.hidden.lived.chain import body_parts, Chain
-from tests.hidden.lived.specification import KINDS, ORDER, SIZES, specify, sphere
+from tests.hidden.lived.specification import KINDS, ORDER, SIZES, specify
 
 pytestmark = pytest.mark.long
 
@@ -35,17 +34,6 @@ def test_a_case_is_the_same_every_time_and_like_no_other():
     assert first.truth[0].parameters != other.truth[0].parameters
 
 
-def test_a_case_that_was_kept_is_the_one_that_was_made(tmp_path, monkeypatch):
-    made = lived_case('development/exact', 5)
-    monkeypatch.setenv('ARMID_LIVED_CACHE', str(tmp_path))
-    for _ in range(2):
-        lived_case.cache_clear()
-        kept = lived_case('development/exact', 5)
-        np.testing.assert_array_equal(made.held_out.tau, kept.held_out.tau)
-        assert made.truth == kept.truth
-    assert len(list(tmp_path.rglob('*.pickle'))) == 1
-
-
 @pytest.mark.parametrize('kind', KINDS)
 def test_specifications_of_all_kinds_have_seeds_of_their_own(kind):
     seeds = {specify(kind, k).seed for k in range(100)}
@@ -60,18 +48,6 @@ def test_arms_of_the_sets_differ_and_have_three_to_seven_joints():
         assert len(set(arms) - others) >= 6
     for names in ARMS.values():
         assert {load_arm(name).n_joints for name in names} == {3, 4, 5, 6, 7}
-
-
-def test_every_round_has_every_cause_and_clear_ones_are_most():
-    specs = [specify('development', k) for k in range(4 * ROUND)]
-    assert {spec.cause for spec in specs[:ROUND]} == {cause for cause, _ in ORDER}
-    sizes = [spec.size for spec in specs if spec.cause != 'none']
-    assert 0.3 < sizes.count('clear') / len(sizes) < 0.7
-    assert {'natural', 'medium', 'small'} <= set(sizes)
-    for cause in {cause for cause, size in ORDER if size == 'by turns'}:
-        assert len({spec.size for spec in specs if spec.cause == cause}) >= 3
-    styles = {style for spec in specs for style in spec.styles.values()}
-    assert styles == {'sines', 'dwells', 'wandering', 'periodic'}
 
 
 @pytest.mark.parametrize('index', range(8))
@@ -124,14 +100,6 @@ def test_effort_less_contribution_is_a_healthy_arm_with_noise():
     assert np.all(np.abs(left.mean(axis=0)) < 0.3 * run.noise)
 
 
-def test_no_two_recordings_move_alike():
-    case = lived_case('development', 2)
-    runs = (*case.day_1, *case.day_2, case.held_out)
-    starts = {tuple(run.q[len(run.t) // 3]) for run in runs}
-    assert len(starts) == len(runs) == 7
-    assert all(15.0 < run.t[-1] < 26.0 for run in runs)
-
-
 def test_exact_arms_are_their_description():
     case = lived_case('development/exact', 2)
     assert case.day_1 == ()
@@ -147,28 +115,9 @@ def test_exact_arms_are_their_description():
     assert lived_case('development/exact', 1).known[0].values is None
 
 
-def test_mountings_cover_the_sphere():
-    directions = np.array([sphere(k) for k in range(20)])
-    sizes = np.linalg.norm(directions, axis=1)
-    np.testing.assert_allclose(sorted(set(sizes.round(6))), [1.62, 9.81])
-    unit = directions / sizes[:, np.newaxis]
-    nearest = np.sort(unit @ unit.T, axis=1)[:, -2]
-    assert np.degrees(np.arccos(nearest.min())) < 50.0
-    assert np.all(np.linalg.norm(unit.mean(axis=0)) < 0.1)
-    case = lived_case('development/mounting', 1)
-    np.testing.assert_allclose(case.gravity, sphere(1))
-
-
 def test_the_second_of_a_pair_has_the_cause_of_the_first():
     periodic, pauses = (lived_case('development/pairs', k) for k in (2, 3))
     assert periodic.truth == pauses.truth
     assert periodic.urdf == pauses.urdf
     assert {r.style for r in periodic.day_2} == {'periodic'}
     assert {r.style for r in pauses.day_2} == {'dwells'}
-
-
-def test_the_adapter_gives_what_the_package_reads():
-    case = lived_case('development', 0)
-    robot, recording = robot_of(case), recording_of(case.held_out)
-    assert recording.joints == robot.joints
-    np.testing.assert_array_equal(recording.tau, case.held_out.tau)

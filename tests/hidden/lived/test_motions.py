@@ -56,10 +56,3 @@ def test_only_periodic_motions_repeat():
         )
     assert likeness.pop('periodic') > 0.9
     assert max(likeness.values()) < 0.9
-
-
-def test_point_to_point_motions_dwell():
-    moving = np.any(np.abs(draw('dwells')[0].dq) > 1e-6, axis=1)
-    stops = np.flatnonzero(np.diff(moving.astype(int)) == -1)
-    assert len(stops) >= 4
-    assert 0.1 < 1.0 - moving.mean() < 0.8

@@ -17,15 +17,9 @@ from armid_ros.papers.exo.plant.leg_pair import (
     TiedPair,
     walking,
 )
-from armid_ros.robots import Robot
 import numpy as np
 import pytest
 
-from tests.model.newton_euler import joint_torques, Segment
-
-SIGNS = (1.0, -1.0, 1.0, -1.0, 1.0, -1.0)
-#: Position of the tied segments among stance shank ... swing foot, in the order F1 to F4.
-TIED = (4, 3, 1, 0)
 STIFFNESS = np.array([1.0e4, 2.0e4, 5.0e3, 3.0e4])
 
 
@@ -39,41 +33,6 @@ def motions(pair) -> PairMotion:
     rng = np.random.default_rng(0)
     own, other = (random_motion(robot, 40, rng) for robot in (pair.robot, pair.other))
     return PairMotion(own, other)
-
-
-def planar(robot: Robot) -> list[Segment]:
-    ahead = [np.array(p.translation)[[0, 2]] for p in list(robot.model.jointPlacements)[2:]]
-    return [
-        Segment(body.mass, body.inertia[1, 1], np.array(body.lever)[[0, 2]], following, sign)
-        for body, following, sign in zip(
-            list(robot.model.inertias)[1:], [*ahead, np.zeros(2)], SIGNS, strict=True
-        )
-    ]
-
-
-@pytest.mark.parametrize('foot_force', [None, (30.0, 400.0)])
-def test_the_recursion_of_the_source_is_rigid_body_dynamics_plus_springs(
-    pair, motions, foot_force
-) -> None:
-    ground = None if foot_force is None else np.array(foot_force)
-    spatial = None if ground is None else np.tile([ground[0], 0.0, ground[1]], (40, 1))
-    torques = pair_torques(pair, *motions, foot_force=spatial)
-    bodies = [planar(robot) for robot in (pair.robot, pair.other)]
-    base = np.array([-0.2572, 0.0])
-    for k in range(40):
-        states = [(m.q[k], m.dq[k], m.ddq[k]) for m in motions]
-        centroids = [
-            joint_torques(body, base, *state, {})[1]
-            for body, state in zip(bodies, states, strict=True)
-        ]
-        push = {
-            segment: stiffness * (centroids[1][segment] - centroids[0][segment])
-            for segment, stiffness in zip(TIED, STIFFNESS, strict=True)
-        }
-        tau, _ = joint_torques(bodies[0], base, *states[0], push, ground)
-        back, _ = joint_torques(bodies[1], base, *states[1], {s: -f for s, f in push.items()})
-        np.testing.assert_allclose(torques.tau[k], tau, rtol=0.0, atol=1e-9)
-        np.testing.assert_allclose(torques.other_tau[k], back, rtol=0.0, atol=1e-9)
 
 
 def test_action_equals_reaction(pair, motions) -> None:

@@ -49,7 +49,7 @@ def test_one_machine_alone_is_not_enough():
     pair = leg_pair()
     online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
     online.take(0.0, np.zeros(6), np.zeros(6))
-    with pytest.raises(IdentificationError, match='joint states of both'):
+    with pytest.raises(IdentificationError, match='joint states'):
         online.take(5.0, np.zeros(6), np.zeros(6))
 
 

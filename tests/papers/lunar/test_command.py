@@ -71,10 +71,3 @@ def test_twelve_parameters_and_the_load_are_found(repeated):
     ]
     assert sum(inside) >= 23
     assert document['load']['value'] == pytest.approx(0.3, abs=0.01)
-
-
-def test_terminal_and_page_have_the_tables(repeated):
-    text, _, page = repeated
-    assert 'Table 6, on Earth' in text
-    for heading in ('Tables', 'Torque curves', 'Gravity parameters'):
-        assert f'>{heading}<' in page

@@ -15,7 +15,6 @@ from armid_ros.papers.elastic.command import elastic
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.papers.elastic.identification.output import springs_document
-from armid_ros.papers.elastic.report.springs_page import springs_report
 from armid_ros.recording import write_recording
 from armid_ros.recording.elastic_topics import write_runs
 from armid_ros.robots import load_robot
@@ -102,13 +101,6 @@ def test_frequencies_are_those_of_a_motor_and_a_link_on_a_spring(found):
 def test_the_document_is_as_its_schema_says(found):
     document = json.loads(json_text(springs_document(found, 'humanoid_arm')))
     assert faults('springs', document) == []
-
-
-def test_the_report_names_every_joint_and_its_stiffness(found):
-    page = springs_report(found, 'humanoid_arm')
-    for one in found:
-        assert one.joint in page
-    assert f'{found[0].transmission.stiffness[0]:.4g}' in page
 
 
 def test_armid_elastic_takes_any_arm(bag, tmp_path):

@@ -44,18 +44,6 @@ def test_two_seconds_tell_inertias_and_springs(runs, true) -> None:
     assert np.sqrt(np.mean(off**2)) < 2.5
 
 
-def test_more_is_known_of_all_parameters_as_time_goes_by(runs, true) -> None:
-    live = OnlineTwoInertia(runs[0].motor.joints)
-    std = []
-    for run in runs[:2]:
-        live.interrupt()
-        for sample in samples(run):
-            live.take(sample)
-        std.append(live.estimate.std)
-    assert np.all(std[1] < std[0])
-    np.testing.assert_allclose(live.estimate.values[MAIN], true[MAIN], rtol=0.005)
-
-
 def test_nothing_is_learned_across_an_interruption(runs) -> None:
     """Two stretches far apart: without the word of it, the jump would be an acceleration."""
     live = OnlineTwoInertia(runs[0].motor.joints)

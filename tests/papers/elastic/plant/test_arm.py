@@ -190,5 +190,5 @@ def test_an_arm_without_springs_is_not_recorded_on_both_sides():
     still = Reference(HUMANOID.joints, np.zeros(1), HUMANOID.lower[np.newaxis] + 0.5)
     with pytest.raises(ModelError, match='use simulate'):
         record(SimulatedArm(ArmModel(HUMANOID), rng=np.random.default_rng(0)), still)
-    with pytest.raises(ModelError, match='do not oscillate'):
+    with pytest.raises(ModelError, match='oscillate'):
         modes(Plant(ArmModel(HUMANOID)), still.q[0])

@@ -180,14 +180,14 @@ def test_step_response_is_that_of_the_literature() -> None:
 
 def test_a_rigid_arm_is_refused() -> None:
     robot = load_robot('two_link_elastic')
-    with pytest.raises(ModelError, match='add joint_elasticity'):
+    with pytest.raises(ModelError, match='joint_elasticity'):
         Plant(ArmModel(robot), elasticity=Elasticity())
 
 
 def test_a_motor_without_inertia_is_refused_by_name() -> None:
     robot = load_robot('two_link_elastic')
     arm = ArmModel(robot).with_effect(make_effect('joint_elasticity@joint2', robot), [1e-4])
-    with pytest.raises(ModelError, match=r"'joint2'.*no inertia"):
+    with pytest.raises(ModelError, match="'joint2'"):
         Plant(arm, elasticity=Elasticity())
 
 

@@ -2,6 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The browser that looks at pages."""
 
-from tests.report.conftest import browser
+from tests.report.conftest import browser, charts_drawn
 
-__all__ = ['browser']
+__all__ = ['browser', 'charts_drawn']
