@@ -208,7 +208,7 @@ def _named(
 def rigid_base_parameters(robot: Robot, rng: np.random.Generator) -> BaseParameters:
     """Find the base parameters of the rigid body for the gravity in use."""
     robot = levelled(robot)
-    w = _stack(regressor(robot, random_motion(robot, 40 * robot.n_joints, rng)))
+    w = _stack(regressor(robot, random_motion(robot, None, rng)))
     return group_columns(w, rigid_parameter_names(robot))
 
 
@@ -235,7 +235,7 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
 
     """
     robot = levelled(robot)
-    motion = random_motion(robot, 40 * robot.n_joints, rng)
+    motion = random_motion(robot, None, rng)
     rest = Motion(motion.joints, motion.t, motion.q, 0.0 * motion.dq, 0.0 * motion.ddq)
     names = rigid_parameter_names(robot)
     static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]
