@@ -11,7 +11,6 @@ from armid_ros.arm.arm_model import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.model.mjcf_export import export_mjcf
 from armid_ros.model.urdf_export import export_urdf
-from armid_ros.robots import held_joints
 import numpy as np
 
 
@@ -61,12 +60,18 @@ def arm_urdf(arm: ArmModel) -> Exported:
         remarks=_remarks('a URDF', missing),
     )
     left_out = ('ros2_control',) if '<ros2_control' in arm.robot.urdf else ()
-    return Exported(text, missing, left_out, found)
+    robot = arm.robot  # what is not identified stays as described
+    described = {'damping': robot.urdf_damping, 'friction': robot.urdf_friction}
+    values = {
+        key: dict(zip(robot.joints, own.tolist(), strict=True)) | found.get(key, {})
+        for key, own in described.items()
+    }
+    return Exported(text, missing, left_out, values)
 
 
 def arm_mjcf(arm: ArmModel) -> Exported:
     """
-    Return a MuJoCo model of the arm, without shapes.
+    Return a MuJoCo model of the arm with its shapes.
 
     Raises
     ------
@@ -77,18 +82,14 @@ def arm_mjcf(arm: ArmModel) -> Exported:
     missing = _without_place(arm, lambda effect: effect.traits.mjcf_attribute)
     found = _of_joints(arm, lambda effect: effect.traits.mjcf_attribute)
     found['friction'] = found.pop('frictionloss', {})
-    left_out = ['shapes', 'the base link']
-    if np.any(np.isfinite(arm.robot.velocity_limit)):
-        left_out.append('velocity limits')
-    left_out += [f'joint {joint.name}' for joint in held_joints(arm.robot)]
-    text = export_mjcf(
+    text, left_out = export_mjcf(
         arm.body,
         damping=found.get('damping'),
         friction=found.get('friction'),
         armature=found.get('armature'),
-        remarks=(*_remarks('MuJoCo', missing), f'without {", ".join(left_out)}'),
+        remarks=_remarks('MuJoCo', missing),
     )
-    return Exported(text, missing, tuple(left_out), found)
+    return Exported(text, missing, left_out, found)
 
 
 def _of_joints(arm: ArmModel, place: Callable[[Effect], str]) -> dict[str, dict[str, float]]:

@@ -34,8 +34,9 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
     Returns
     -------
     dict
-        'program', 'states', and the largest 'difference' [N m or N] and its 'share' of the largest
-        torque; or 'not_checked' with the reason. Dry friction counts as it is at any speed.
+        'program', 'states', the largest 'difference' [N m or N] and its 'share' of the largest
+        torque, and 'shapes' where those of an MJCF are not loaded; or 'not_checked' with the
+        reason. Dry friction counts as it is at any speed.
 
     """
     try:
@@ -55,6 +56,7 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')
             spec = mujoco.MjSpec.from_string(exported.text)
+            shapes = _shapes(spec) if exported.text.startswith('<mujoco') else {}
             for element in (*spec.geoms, *spec.meshes, *spec.materials, *spec.textures):
                 spec.delete(element)
             spec.option.gravity = robot.gravity
@@ -67,7 +69,17 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
         'states': STATES,
         'difference': difference,
         'share': difference / float(np.abs(wanted).max()),
+        **shapes,
     }
+
+
+def _shapes(spec: Any) -> dict[str, str]:
+    """Return why MuJoCo does not load the shapes of a file; empty where it does."""
+    try:
+        spec.compile()
+    except (ValueError, RuntimeError) as error:
+        return {'shapes': f'not loaded: {" ".join(str(error).split())}'}
+    return {}
 
 
 def _inverse(mujoco: Any, model: Any, motion: Motion, held: dict[str, float]) -> FloatArray:

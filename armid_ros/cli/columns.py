@@ -10,6 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli.choices import TIME_UNITS
 from armid_ros.errors import RecordingError
+from armid_ros.files.cells import listed
 import click
 
 if TYPE_CHECKING:
@@ -37,15 +38,15 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     """Keep pairs of names, each of which has to be one."""
     rules = []
     for text in value:
-        old, colon, new = text.partition(':')
-        if not colon:
+        old, *new = listed(text, ':')
+        if not new:
             first, equals, second = text.partition('=')
             right = f'{first}:{second}' if equals else f'{text}:NEW'
             raise RecordingError(
                 f"--rename '{text}' has to be OLD:NEW, in quotes where a name has blanks, and an "
                 f"option for each pair: --rename '{right}' --rename fer_:panda_"
             )
-        rules.append((old, new))
+        rules.append((old, ':'.join(new)))
     return _kept(ctx, parameter, tuple(rules))
 
 
@@ -187,8 +188,8 @@ def read(
 def _coupling(text: str) -> tuple[str, str, float]:
     from armid_ros.recording.tables.settings import number
 
-    pair, equals, ratio = text.partition('=')
-    motor, comma, joint = pair.partition(',')
-    if not equals or not comma:
+    pair, equals, ratio = text.rpartition('=')
+    names = listed(pair)
+    if not equals or len(names) != 2:
         raise RecordingError(f"--coupling '{text}' has to be MOTOR,JOINT=RATIO, as in 6,5=32")
-    return motor.strip(), joint.strip(), number(ratio)
+    return names[0].strip(), names[1].strip(), number(ratio)

@@ -168,7 +168,8 @@ def _print(
             f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
             f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
         )
-        say(f'{name}: {torque}{left_out}')
+        shapes = f'; shapes {check["shapes"]}' if 'shapes' in check else ''
+        say(f'{name}: {torque}{left_out}{shapes}')
     recordings = [*found.recordings, *found.held_out]
     for line in summary(found.core, found.validation, recordings, found.verification):
         say(line)

@@ -156,7 +156,8 @@ def with_effects(arm: ArmModel, names: str) -> ArmModel:
 
 def box(text: str, robot: Robot) -> tuple[str, Corners]:
     """Read --box: a joint of the robot, and two corners [m]."""
-    joint, _, corners = text.partition('=')
+    *parts, corners = listed(text, '=')
+    joint = '='.join(parts)
     robot.index(joint)
     try:
         lower, upper = ([float(x) for x in corner.split(',')] for corner in corners.split(':'))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
@@ -26,7 +27,7 @@ _SAMPLES, _SLOWER, _TRIES = 200, 1.3, 20
 #: How far beyond a position limit a joint may be measured before it is said to be [rad or m].
 _BEYOND = 0.01
 #: Poses about zero that are tried, at each of these distances, where zero itself is not free.
-_NEARBY, _DISTANCES = 200, (0.1, 0.2, 0.4, 0.8, 1.6)
+_NEARBY, _DISTANCES = 200, (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 #: Digits of a pose that was found, so that a person can type it.
 _DIGITS = 2
 _SEED = 0
@@ -214,8 +215,21 @@ class TransferPlanner:
                     return self._simplified(q, zero), reason
         raise TrajectoryError(
             f'the zero of {self.arm.robot.name} is not free, nor is a pose about it: {reason}; '
-            'give a pose to start from, --start'
+            f'give a pose to start from, --start{self._always_near(about)}'
         )
+
+    def _always_near(self, poses: FloatArray) -> str:
+        """Name the two bodies that most poses take too close, and a clearance that they keep."""
+        near = [clear_line(self.clearance, self.margin, q, q) for q in poses]
+        pairs = Counter((one.first, one.second) for one in near if one is not None)
+        if not pairs:
+            return ''
+        (first, second), count = pairs.most_common(1)[0]
+        best = max(
+            one.distance for one in near if one and (one.first, one.second) == (first, second)
+        )
+        then = f', at most {best:.4f} m: --clearance {0.8 * best:.1g}' if best > 0.0 else ''
+        return f'; {first} and {second} are too close in {count} of {len(near)} poses{then}'
 
     def _simplified(self, q: FloatArray, zero: FloatArray) -> FloatArray:
         """Put joints back to zero that need not leave it, and round the others."""

@@ -14,6 +14,7 @@ import uuid
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.files import json_text
+from armid_ros.files.cells import listed
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Filters, Job, require_linear
 from armid_ros.fleet.kinds import choose_filters, document, Entry, known_filters, SCHEMA
@@ -228,7 +229,7 @@ def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
     robot = load_robot(
         entry.robot,
         gravity=entry.gravity or settings.gravity,
-        joints=tuple(chosen.replace(';', ',').split(',')) if chosen else None,
+        joints=listed(chosen.replace(';', ',')) if chosen else None,
     )
     model = ArmModel.of(robot, effects=(entry.effects or settings.effects).replace(';', ','))
     require_linear(model, np.random.default_rng(settings.seed))

@@ -27,7 +27,9 @@ from armid_ros.fleet.kinds import document
 from armid_ros.fleet.results import table_of
 from armid_ros.fleet.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.fleet.store import Store
+from armid_ros.identification.assess.comparison import ParameterChange, unit_factors
 from armid_ros.motion import FloatArray
+from armid_ros.report.compare_report import tell_units
 from armid_ros.report.families import full_label
 import numpy as np
 import pyarrow as pa
@@ -44,7 +46,7 @@ _DAY_NS = 86_400 * 1e9
 
 _CHANGE = [
     ('arm', pa.string()),
-    ('kind', pa.string()),  # step or trend
+    ('kind', pa.string()),  # step, trend or units
     ('name', pa.string()),
     ('joint', pa.string()),
     ('unit', pa.string()),
@@ -85,6 +87,44 @@ ARMS = pa.schema(
 
 
 @dataclass(frozen=True, eq=False)
+class UnitChange:
+    """
+    Torques of an arm that are in another unit from one bag to the next.
+
+    Attributes
+    ----------
+    before, after : dict
+        Rows of the table ``bags``.
+    factors : mapping of str to float
+        By which the torques of each joint changed.
+
+    """
+
+    before: dict[str, Any]
+    after: dict[str, Any]
+    factors: Mapping[str, float]
+
+    def row(self, arm: str) -> dict[str, Any]:
+        """Return it as a row of the table ``changes``; its size is the median factor, less 1."""
+        return {
+            'arm': arm,
+            'kind': 'units',
+            'name': 'torque',
+            'joint': '',
+            'unit': '',
+            'last_day': day_text(self.before['start_ns'] / _DAY_NS),
+            'first_day': day_text(self.after['start_ns'] / _DAY_NS),
+            'bag': self.after['bag'],
+            'level': 1.0,
+            'size': float(np.median(list(self.factors.values()))) - 1.0,
+            'std': 0.0,
+            'p': 0.0,
+            'adjusted_p': 0.0,
+            'text': tell_units(self.before['bag'], self.after['bag'], self.factors),
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class WatchedArm:
     """
     An arm over time.
@@ -109,6 +149,8 @@ class WatchedArm:
         Parameter furthest from that of its siblings, and by how much.
     refused : tuple of dict
         Rows of the table ``refused``.
+    units : UnitChange or None
+        Two bags that follow each other, of which torques of one are in another unit.
 
     """
 
@@ -121,10 +163,13 @@ class WatchedArm:
     named: tuple[HistoryChange, ...]
     unlike: tuple[str, float]
     refused: tuple[dict[str, Any], ...]
+    units: UnitChange | None = None
 
     @property
     def health(self) -> str:
         """One word or two."""
+        if self.units is not None:
+            return 'changed'
         if self.named:
             return 'changed' if self.named[0].kind == 'step' else 'wearing'
         return 'healthy' if self.judged.changes else 'too few bags'
@@ -198,9 +243,11 @@ def watch(store: Store, alpha: float = ALPHA) -> Watch:
             named(one, alpha),
             _furthest(unlike[kind_of.get(one.arm, '')], own[one.arm]),
             tuple(refused.get(one.arm, ())),
+            _units(own[one.arm], bags.get(one.arm, ())),
         )
         for one in judged
     ]
+    arms.sort(key=lambda arm: arm.units is None)
     return Watch(tuple(arms), spread, _beside_the_body(store), alpha)
 
 
@@ -218,7 +265,14 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """Return the changes that an arm is named for, the least probable first."""
+    """
+    Return the changes that an arm is named for, the least probable first.
+
+    Torques in another unit are the only one: they make all values change.
+
+    """
+    if arm.units is not None:
+        return [arm.units.row(arm.arm)]
     rows = []
     for change in arm.named:
         series = change.series
@@ -314,6 +368,29 @@ def _judged(
     adjusted = stats.false_discovery_control([one.p for one in judged]) if judged else []
     both = [replace(one, adjusted=float(q)) for one, q in zip(judged, adjusted, strict=True)]
     return sorted(both, key=lambda one: (one.adjusted, one.p, one.arm))
+
+
+def _units(
+    series: Sequence[ParameterHistory], bags: Sequence[dict[str, Any]]
+) -> UnitChange | None:
+    """Return the first two bags of which torques of one are in another unit."""
+    of_bag: dict[float, dict[ParameterName, tuple[float, float]]] = {}
+    for one in (s for s in series if s.name != RESIDUAL):
+        parameter = ParameterName(one.name, one.joint, one.unit)
+        for day, value, std in zip(one.days, one.values, one.std, strict=True):
+            of_bag.setdefault(float(day), {})[parameter] = value, std
+    for before, after in itertools.pairwise(bags):
+        first, then = (of_bag.get(row['start_ns'] / _DAY_NS, {}) for row in (before, after))
+        factors = unit_factors(
+            [
+                ParameterChange(name, first[name][0], then[name][0], first[name][1], then[name][1])
+                for name in first
+                if name in then
+            ]
+        )
+        if factors:
+            return UnitChange(before, after, factors)
+    return None
 
 
 def _by_arm(series: Iterable[ParameterHistory]) -> dict[str, list[ParameterHistory]]:

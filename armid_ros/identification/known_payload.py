@@ -18,6 +18,7 @@ from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError, meant
+from armid_ros.files.cells import listed, parted
 from armid_ros.identification.rows.regression import filtered_torque, regressions
 from armid_ros.identification.rows.signals import (
     Conditioning,
@@ -71,11 +72,12 @@ class KnownPayload:
             The text is neither.
 
         """
-        bag, _, body = text.rpartition('=')
+        *parts, body = parted(text, '=')
+        bag = '='.join(parts)
         mass, _, where = body.partition('@')
-        link, _, place = where.partition(':')
+        link, *place = listed(where, ':')
         try:
-            x, y, z = (float(part) for part in (place or '0,0,0').split(','))
+            x, y, z = (float(part) for part in (':'.join(place) or '0,0,0').split(','))
             payload = cls(float(mass), link, (x, y, z))
         except ValueError:
             payload = None

@@ -5,13 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from xml.etree import ElementTree
 
 from armid_ros.model.pseudo_inertia import require_consistent
 from armid_ros.motion import FloatArray
-from armid_ros.robots import Robot
+from armid_ros.robots import held_joints, Robot
+from armid_ros.robots.geometry import Shape, shapes_of
 import numpy as np
 import pinocchio as pin
+
+#: Files of meshes that MuJoCo reads.
+_MESHES = ('.stl', '.obj', '.msh')
+#: Visuals touch nothing; collision bodies touch what is around the arm, and not each other, for
+#: links that are joined overlap.
+_CLASSES = {
+    'visual': {'contype': '0', 'conaffinity': '0', 'group': '2', 'mass': '0'},
+    'collision': {'contype': '1', 'conaffinity': '0', 'group': '3', 'mass': '0'},
+}
 
 
 def export_mjcf(
@@ -21,9 +32,9 @@ def export_mjcf(
     friction: Mapping[str, float] | None = None,
     armature: Mapping[str, float] | None = None,
     remarks: Sequence[str] = (),
-) -> str:
+) -> tuple[str, tuple[str, ...]]:
     """
-    Return a MuJoCo model of a robot: bodies, joints and motors, without shapes.
+    Return a MuJoCo model of a robot: base, bodies with their shapes, joints and motors.
 
     Parameters
     ----------
@@ -37,35 +48,38 @@ def export_mjcf(
 
     Returns
     -------
-    str
-        MJCF.
+    text : str
+        MJCF; files of meshes have absolute paths.
+    left_out : tuple of str
+        What of the description is not in it; a comment says so too.
 
     Raises
     ------
     ModelError
         If the parameters of a link are not those of a body.
+    RobotError
+        If a shape of the description is none.
 
     """
     require_consistent(robot.links, robot.rigid_parameters)
     root = ElementTree.Element('mujoco', model=robot.name)
-    if remarks:
-        lines = ''.join(f'\n    {line.replace("--", "- -")}' for line in remarks)
-        root.append(ElementTree.Comment(f'{lines}\n  '))
     ElementTree.SubElement(root, 'compiler', angle='radian')
     ElementTree.SubElement(root, 'option', gravity=_numbers(robot.gravity))
+    defaults = ElementTree.SubElement(root, 'default')
+    for of, values in _CLASSES.items():
+        default = ElementTree.SubElement(defaults, 'default', {'class': of})
+        ElementTree.SubElement(default, 'geom', values)
+    assets = ElementTree.SubElement(root, 'asset')
     world = ElementTree.SubElement(root, 'worldbody')
     model = robot.model
-    bodies = {0: world}
+    base = robot.base
+    bodies = {0: world if base == 'world' else ElementTree.SubElement(world, 'body', name=base)}
     for index, joint in enumerate(robot.joints):
         identity = index + 1
-        placement = model.jointPlacements[identity]
-        x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
         body = ElementTree.SubElement(
             bodies[model.parents[identity]],
             'body',
-            name=robot.links[index],
-            pos=_numbers(placement.translation),
-            quat=_numbers([w, x, y, z]),
+            {'name': robot.links[index]} | _place(model.jointPlacements[identity]),
         )
         bodies[identity] = body
         inertia = model.inertias[identity]
@@ -85,11 +99,59 @@ def export_mjcf(
         ):
             if table and table.get(joint):
                 body[-1].set(key, repr(float(table[joint])))
+    left_out = [
+        *_shapes(robot, bodies, assets),
+        'contacts of links with each other',
+        *(['velocity limits'] if np.any(np.isfinite(robot.velocity_limit)) else []),
+        *(f'joint {joint.name}' for joint in held_joints(robot)),
+    ]
+    lines = ''.join(
+        f'\n    {line.replace("--", "- -")}'
+        for line in (*remarks, f'without {", ".join(left_out)}')
+    )
+    root.insert(0, ElementTree.Comment(f'{lines}\n  '))
     actuators = ElementTree.SubElement(root, 'actuator')
     for joint in robot.joints:
         ElementTree.SubElement(actuators, 'motor', name=joint, joint=joint)
     ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding='unicode') + '\n'
+    return ElementTree.tostring(root, encoding='unicode') + '\n', tuple(left_out)
+
+
+def _shapes(
+    robot: Robot, bodies: Mapping[int, ElementTree.Element], assets: ElementTree.Element
+) -> list[str]:
+    """Add the shapes of links to their bodies; return those that MuJoCo has no place for."""
+    left_out: dict[str, None] = {}
+    files: dict[tuple[Path, tuple[float, ...]], str] = {}
+    for of in _CLASSES:
+        for shape in shapes_of(robot, 'visual' if of == 'visual' else 'collision'):
+            size = _size(shape)
+            if shape.kind == 'mesh':
+                if shape.path is None or shape.path.suffix.lower() not in _MESHES:
+                    left_out[f'{of} mesh {shape.mesh.rsplit("/", 1)[-1]}'] = None
+                    continue
+                key = shape.path.resolve(), shape.size
+                if key not in files:
+                    files[key] = f'{shape.path.stem}_{len(files)}'
+                    values = {'name': files[key], 'file': str(key[0]), 'inertia': 'shell'}
+                    ElementTree.SubElement(assets, 'mesh', values, scale=_numbers(shape.size))
+                size = {'mesh': files[key]}
+            body = bodies[robot.model.frames[shape.frame].parentJoint]
+            values = {'class': of, 'type': shape.kind, **size, **_place(shape.placement)}
+            ElementTree.SubElement(body, 'geom', values)
+    return list(left_out)
+
+
+def _size(shape: Shape) -> dict[str, str]:
+    """Return the attribute of a geom with halves of its edges and lengths."""
+    if shape.kind in ('box', 'sphere'):
+        return {'size': _numbers([(0.5 if shape.kind == 'box' else 1.0) * x for x in shape.size])}
+    return {'size': _numbers([shape.size[0], 0.5 * shape.size[1]])}
+
+
+def _place(placement: pin.SE3) -> dict[str, str]:
+    x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+    return {'pos': _numbers(placement.translation), 'quat': _numbers([w, x, y, z])}
 
 
 def _joint(robot: Robot, index: int) -> dict[str, str]:

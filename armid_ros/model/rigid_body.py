@@ -23,6 +23,8 @@ import pinocchio as pin
 #: origin of the joint frame.
 LINK_PARAMETERS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 _LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
+#: Random states beyond which no more is told: each has a row for every joint.
+_MOST_STATES = 560
 
 
 def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
@@ -185,15 +187,18 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     return columns
 
 
-def random_motion(robot: Robot, n_samples: int, rng: np.random.Generator) -> Motion:
+def random_motion(robot: Robot, n_samples: int | None, rng: np.random.Generator) -> Motion:
     """
     Draw independent random states that excite every identifiable parameter.
 
     Positions are uniform within the limits (one turn where there are none), velocities and
-    accelerations are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m).
+    accelerations are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). None
+    stands for as many states as tell all parameters.
 
     """
     n = robot.n_joints
+    if n_samples is None:
+        n_samples = min(40 * n, _MOST_STATES)
     lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     return Motion(

@@ -261,13 +261,13 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
         )
     listed = ', '.join(f"'{name}'" for name in missing)
     found = nearest(missing[0], [name for name in decoder.names_seen if name not in joints])
-    hint = (
-        f"; if '{found}' is '{missing[0]}', say --rename {found}:{missing[0]}; if it is another "
-        'one, --joints names those to read'
-    )
+    present = ','.join(name for name in joints if name in decoder.names_seen)
+    hint = f'; --joints {present} reads the others' if present else ''
+    if found:
+        hint = f"; if '{found}' is '{missing[0]}', say --rename {found}:{missing[0]}{hint}"
     raise RecordingError(
         f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
-        f'its joints are {", ".join(decoder.names_seen)}{hint if found else ""}'
+        f'its joints are {", ".join(decoder.names_seen)}{hint}'
     )
 
 

@@ -23,10 +23,13 @@ from armid_ros.recording.recording import Clock, TimeGap
 from armid_ros.recording.source import IntArray
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import median_filter
 
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
+# Messages around one, itself among them, whose median is its time; half as many may be rubbish.
+_AROUND = 5
 # As many messages in a row, in time that others have had, are no late messages any more.
 _FEWEST_AGAIN = 10
 # A stretch without samples is a gap when it is longer than this many sampling periods.
@@ -156,8 +159,22 @@ def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> JointSam
     return longest_in_order(series, counts)
 
 
+def _strays(stamps: IntArray) -> npt.NDArray[np.bool_]:
+    """Return which stamps are far from those of the messages before and after, (N,)."""
+    if len(stamps) < _AROUND or not (np.abs(np.diff(stamps)) > RESTART_NS).any():
+        return np.zeros(len(stamps), dtype=np.bool_)
+    around = median_filter(stamps, _AROUND, mode='mirror')
+    return np.asarray(
+        np.abs(stamps - around) > RESTART_NS + 2 * np.median(np.abs(np.diff(stamps)))
+    )
+
+
 def longest_in_order(series: JointSamples, counts: Counter[str]) -> JointSamples:
     """Return the longest stretch between restarts of the clock, in order of time."""
+    stray = _strays(series.stamps)
+    if stray.any():
+        counts['unstamped'] += int(stray.sum())
+        series = series.select(~stray)
     run = longest_run(series.stamps)
     if run is not None:
         counts['restarted'] += len(series) - (run.stop - run.start)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 from armid_ros.estimate import ParameterName
@@ -67,7 +67,8 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
 def tell(comparison: Comparison) -> tuple[str, ...]:
     """Say in words what changed, the surest first; the first sentence is the sum of it."""
     if comparison.factors:
-        return (*(_unusable(one) for one in comparison.unusable), _units(comparison))
+        units = tell_units(comparison.before.source, comparison.after.source, comparison.factors)
+        return (*(_unusable(one) for one in comparison.unusable), units)
     return (
         *(_unusable(one) for one in comparison.unusable),
         _sum(comparison),
@@ -77,14 +78,13 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
     )
 
 
-def _units(comparison: Comparison) -> str:
-    """Say that torques of one of the two are in another unit."""
-    named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in comparison.factors.items())
+def tell_units(before: str, after: str, factors: Mapping[str, float]) -> str:
+    """Say that torques of one of two identifications are in another unit."""
+    named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in factors.items())
     return (
-        f'Inertia and friction of {comparison.after.source} are those of '
-        f'{comparison.before.source} times one factor a joint ({named}): torques of one '
-        'of the two are in another unit, or are currents, as drivers change with their version. '
-        'Convert them with --current-gain, and identify again.'
+        f'Inertia and friction of {after} are those of {before} times one factor a joint '
+        f'({named}): torques of one of the two are in another unit, or are currents, as drivers '
+        'change with their version. Convert them with --current-gain, and identify again.'
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 import math
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 from armid_ros.errors import RobotError
 from armid_ros.files.documents import LARGEST
@@ -111,18 +112,26 @@ class Description:
 
 
 def parse_xml(text: str, source: str) -> ElementTree.Element:
-    """Return the root element of a URDF; RobotError says the line where the XML is broken."""
+    """
+    Return the root element of a URDF; RobotError says the line where the XML is broken.
+
+    Prefixes of names are not looked up, as tools add attributes of theirs without declaring them.
+
+    """
     if len(text) > TEXT_LIMIT:
         raise RobotError(f'{source}: {len(text)} characters, which no description has')
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
     try:
-        root = ElementTree.fromstring(text)
+        parser.Parse(text, True)
+        root = builder.close()
     except ValueError as error:  # an encoding that is not known, characters that are none
         raise RobotError(f'{source}: malformed XML: {error}') from None
-    except ElementTree.ParseError as error:
-        line, column = error.position
+    except expat.ExpatError as error:
         reason = str(error).split(':')[0]
         raise RobotError(
-            f'{source}: malformed XML at line {line}, column {column + 1}: {reason}'
+            f'{source}: malformed XML at line {error.lineno}, column {error.offset + 1}: {reason}'
         ) from None
     if root.tag != 'robot':
         hint = '; an MJCF is loaded by its path' if root.tag == 'mujoco' else ''

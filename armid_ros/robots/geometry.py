@@ -1,11 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The collision bodies of a URDF, as geometry objects placed on the bodies of a robot's model."""
+"""The shapes of a URDF, placed on the bodies of a robot's model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
@@ -16,7 +17,100 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-_Meshes = dict[tuple[Path, tuple[float, float, float]], tuple[coal.CollisionGeometry, ...]]
+_Meshes = dict[tuple[Path, tuple[float, ...]], tuple[coal.CollisionGeometry, ...]]
+#: Attributes of each kind of shape, and the default of those that have one.
+_SIZES = {
+    'box': ('size',),
+    'sphere': ('radius',),
+    'cylinder': ('radius', 'length'),
+    'capsule': ('radius', 'length'),
+    'mesh': ('scale',),
+}
+
+
+class Shape(NamedTuple):
+    """
+    One <visual> or <collision> of a link.
+
+    Attributes
+    ----------
+    link : str
+        The link.
+    frame : int
+        Its frame in the model.
+    number : int
+        Of the shape within the link.
+    placement : pinocchio.SE3
+        In the frame of the joint that carries it.
+    kind : {'box', 'sphere', 'cylinder', 'capsule', 'mesh'}
+        What it is.
+    size : tuple of float
+        Edges of a box, radius and length of others [m], or scale of a mesh.
+    mesh : str
+        Name of the file as it is written; empty for others.
+    path : Path or None
+        Where the file is; None where it is not found.
+
+    """
+
+    link: str
+    frame: int
+    number: int
+    placement: pin.SE3
+    kind: str
+    size: tuple[float, ...]
+    mesh: str = ''
+    path: Path | None = None
+
+
+def shapes_of(
+    robot: Robot,
+    tag: Literal['visual', 'collision'],
+    other: Literal['visual', 'collision'] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Iterator[Shape]:
+    """
+    Yield the shapes of a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    tag : {'visual', 'collision'}
+        Which of them.
+    other : {'visual', 'collision'}, optional
+        Taken of links that have none of the first.
+    progress : callable, optional
+        Receives the share of the links that is done.
+
+    Raises
+    ------
+    RobotError
+        If a shape has no geometry, or numbers that are none.
+
+    """
+    frames = {
+        frame.name: index
+        for index, frame in enumerate(robot.model.frames)
+        if frame.type == pin.FrameType.BODY
+    }
+    links = parse_xml(robot.urdf, robot.name).findall('link')
+    for done, link in enumerate(links):
+        if progress is not None:
+            progress(done / len(links))
+        name = link.get('name', '')
+        frame = robot.model.frames[frames[name]]
+        for number, element in enumerate(link.findall(tag) or link.findall(other or tag)):
+            try:
+                placement = frame.placement * _placement(element)
+                kind, size, mesh = _geometry(element)
+            except (TypeError, ValueError):
+                raise RobotError(
+                    f"{robot.name}: <{element.tag}> {number + 1} of link '{name}' is not a box, "
+                    f'sphere, cylinder, capsule or mesh with its numbers'
+                ) from None
+            path = find_mesh(mesh, robot.path) if kind == 'mesh' else None
+            yield Shape(name, frames[name], number, placement, kind, size, mesh, path)
 
 
 def collision_geometry(
@@ -44,62 +138,45 @@ def collision_geometry(
     geometry = pin.GeometryModel()
     notes: dict[str, str] = {}
     meshes: _Meshes = {}
-    frames = {
-        frame.name: index
-        for index, frame in enumerate(robot.model.frames)
-        if frame.type == pin.FrameType.BODY
-    }
-    links = parse_xml(robot.urdf, robot.name).findall('link')
-    for done, link in enumerate(links):
-        if progress is not None:
-            progress(done / len(links))
-        name = link.get('name', '')
-        frame = robot.model.frames[frames[name]]
-        for number, element in enumerate(link.findall('collision')):
-            try:
-                shapes, missing = _shapes(element, robot.path, meshes)
-                placement = frame.placement * _placement(element)
-            except (TypeError, ValueError):
-                raise RobotError(
-                    f"{robot.name}: <collision> {number + 1} of link '{name}' is not a box, "
-                    f'sphere, cylinder or mesh with its numbers'
-                ) from None
-            if missing:
-                notes[name] = f"link '{name}': collision mesh {missing} not found; left out"
-            for piece, shape in enumerate(shapes):
-                geometry.addGeometryObject(
-                    pin.GeometryObject(
-                        f'{name}_{number}_{piece}',
-                        frame.parentJoint,
-                        frames[name],
-                        placement,
-                        shape,
-                    )
-                )
+    for shape in shapes_of(robot, 'collision', progress=progress):
+        if shape.kind == 'mesh' and shape.path is None:
+            notes[shape.link] = (
+                f"link '{shape.link}': collision mesh {shape.mesh} not found; left out"
+            )
+        joint = robot.model.frames[shape.frame].parentJoint
+        for piece, (body, along) in enumerate(_bodies(shape, meshes)):
+            name = f'{shape.link}_{shape.number}_{piece}'
+            place = shape.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))
+            geometry.addGeometryObject(pin.GeometryObject(name, joint, shape.frame, place, body))
     return geometry, notes
 
 
-def _shapes(
-    element: ElementTree.Element, urdf: Path | None, meshes: _Meshes
-) -> tuple[tuple[coal.CollisionGeometry, ...], str]:
-    """Bodies of a <collision>; and the name of its mesh when there is no such file."""
+def _bodies(shape: Shape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
+    """Return the bodies of a shape, and how far along its z axis each is."""
+    if shape.kind == 'box':
+        return [(coal.Box(*shape.size), 0.0)]
+    if shape.kind == 'sphere':
+        return [(coal.Sphere(*shape.size), 0.0)]
+    if shape.kind == 'mesh':
+        if shape.path is None:
+            return []
+        if (shape.path, shape.size) not in meshes:
+            meshes[shape.path, shape.size] = convex_bodies(shape.path, np.array(shape.size))
+        return [(body, 0.0) for body in meshes[shape.path, shape.size]]
+    radius, length = shape.size
+    ends = (0.5 * length, -0.5 * length) if shape.kind == 'capsule' else ()
+    return [(coal.Cylinder(radius, length), 0.0), *((coal.Sphere(radius), end) for end in ends)]
+
+
+def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str]:
+    """Return the kind of a shape, its numbers, and the name of its mesh."""
     for shape in element.findall('geometry/*'):
-        if shape.tag == 'box':
-            return (coal.Box(*_numbers(shape.get('size', ''))),), ''
-        if shape.tag == 'sphere':
-            return (coal.Sphere(float(shape.get('radius', ''))),), ''
-        if shape.tag == 'cylinder':
-            radius, length = float(shape.get('radius', '')), float(shape.get('length', ''))
-            return (coal.Cylinder(radius, length),), ''
-        if shape.tag == 'mesh':
-            name = shape.get('filename', '')
-            path = find_mesh(name, urdf)
-            scale = _numbers(shape.get('scale', '1 1 1'))
-            if path is None:
-                return (), name
-            if (path, scale) not in meshes:
-                meshes[path, scale] = convex_bodies(path, np.array(scale))
-            return meshes[path, scale], ''
+        if shape.tag in _SIZES:
+            texts = [shape.get(name, '') for name in _SIZES[shape.tag]]
+            if shape.tag == 'mesh':
+                return 'mesh', _numbers(texts[0] or '1 1 1'), shape.get('filename', '')
+            size = _numbers(texts[0]) if shape.tag == 'box' else tuple(map(float, texts))
+            return shape.tag, size, ''
     raise ValueError
 
 
@@ -107,8 +184,7 @@ def _placement(element: ElementTree.Element) -> pin.SE3:
     origin = element.find('origin')
     if origin is None:
         return pin.SE3.Identity()
-    roll, pitch, yaw = _numbers(origin.get('rpy', '0 0 0'))
-    rotation = pin.rpy.rpyToMatrix(roll, pitch, yaw)
+    rotation = pin.rpy.rpyToMatrix(*_numbers(origin.get('rpy', '0 0 0')))
     return pin.SE3(rotation, np.array(_numbers(origin.get('xyz', '0 0 0'))))
 
 

@@ -161,7 +161,8 @@ class Reference:
         for joint in robot.joints:
             if joint not in self.joints:
                 raise TrajectoryError(
-                    f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}"
+                    f"trajectory: joint '{joint}' is missing; {robot.name} needs {listed}; "
+                    f'--joints {",".join(self.joints)} holds the others still'
                 )
         if self.joints == robot.joints:
             return self

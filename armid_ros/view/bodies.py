@@ -12,17 +12,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
-from armid_ros.robots.description import parse_xml
-from armid_ros.robots.meshes import find_mesh
+from armid_ros.robots.geometry import Shape, shapes_of
 from armid_ros.robots.sticks import sticks
 import coal
 import numpy as np
-import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 #: Corners of a circle, points of a sphere, and how thick a bar is [m].
@@ -66,41 +63,32 @@ def bodies(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
     """
     found: list[Body] = []
     notes: list[str] = []
-    frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
-    for link in parse_xml(robot.urdf, robot.name).findall('link'):
-        name = link.get('name', '')
-        frame = frames[name]
-        for element in link.findall('visual') or link.findall('collision'):
-            try:
-                corners = _triangles(element, robot.path)
-            except (TypeError, ValueError) as error:
-                raise RobotError(f"{robot.name}: a shape of link '{name}': {error}") from None
-            if corners is None:
-                notes.append(f"link '{name}': its mesh is not found; it is not drawn")
-                continue
-            placed = frame.placement * _origin(element)
-            turned = corners @ np.array(placed.rotation).T + np.array(placed.translation)
-            found.append(Body(name, int(frame.parentJoint) - 1, turned))
+    for shape in shapes_of(robot, 'visual', 'collision'):
+        if shape.kind == 'mesh' and shape.path is None:
+            notes.append(f"link '{shape.link}': its mesh is not found; it is not drawn")
+            continue
+        place = shape.placement
+        try:
+            corners = _triangles(shape) @ np.array(place.rotation).T + np.array(place.translation)
+        except ValueError as error:
+            raise RobotError(f"{robot.name}: a shape of link '{shape.link}': {error}") from None
+        joint = int(robot.model.frames[shape.frame].parentJoint) - 1
+        found.append(Body(shape.link, joint, corners))
     return tuple(found) or _bars(robot), tuple(notes)
 
 
-def _triangles(element: ElementTree.Element, urdf: Path | None) -> FloatArray | None:
-    """Return the triangles of a <visual> or <collision>; None where its mesh is nowhere."""
-    for shape in element.findall('geometry/*'):
-        if shape.tag == 'box':
-            return _hull(0.5 * np.array(_numbers(shape.get('size', ''))) * _CUBE)
-        if shape.tag == 'sphere':
-            return _hull(float(shape.get('radius', '')) * _sphere())
-        if shape.tag in ('cylinder', 'capsule'):
-            radius, length = float(shape.get('radius', '')), float(shape.get('length', ''))
-            ends = _RING if shape.tag == 'cylinder' else _sphere()
-            shift = np.array([0.0, 0.0, 0.5 * length])
-            return _hull(np.concatenate([radius * ends + shift, radius * ends - shift]))
-        if shape.tag == 'mesh':
-            path = find_mesh(shape.get('filename', ''), urdf)
-            scale = np.array(_numbers(shape.get('scale', '1 1 1')))
-            return None if path is None else _mesh(path, scale)
-    raise ValueError('no geometry that is a box, sphere, cylinder, capsule or mesh')
+def _triangles(shape: Shape) -> FloatArray:
+    """Return the triangles of a shape in its own frame."""
+    if shape.path is not None:
+        return _mesh(shape.path, np.array(shape.size))
+    if shape.kind == 'box':
+        return _hull(0.5 * np.array(shape.size) * _CUBE)
+    if shape.kind == 'sphere':
+        return _hull(shape.size[0] * _sphere())
+    radius, length = shape.size
+    ends = _RING if shape.kind == 'cylinder' else _sphere()
+    shift = np.array([0.0, 0.0, 0.5 * length])
+    return _hull(np.concatenate([radius * ends + shift, radius * ends - shift]))
 
 
 def _mesh(path: Path, scale: FloatArray) -> FloatArray:
@@ -139,19 +127,6 @@ def _sphere() -> FloatArray:
     z, turn = 1.0 - 2.0 * k / _SPHERE, np.pi * (1.0 + np.sqrt(5.0)) * k
     wide = np.sqrt(1.0 - z**2)
     return np.column_stack([wide * np.cos(turn), wide * np.sin(turn), z])
-
-
-def _origin(element: ElementTree.Element) -> pin.SE3:
-    origin = element.find('origin')
-    if origin is None:
-        return pin.SE3.Identity()
-    rotation = pin.rpy.rpyToMatrix(*_numbers(origin.get('rpy', '0 0 0')))
-    return pin.SE3(rotation, np.array(_numbers(origin.get('xyz', '0 0 0'))))
-
-
-def _numbers(text: str) -> tuple[float, float, float]:
-    x, y, z = (float(number) for number in text.split())
-    return x, y, z
 
 
 _CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])

@@ -9,6 +9,7 @@ from armid_ros.effects import make_effect
 from armid_ros.robots import load_robot, robot_from_urdf
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 VALUES = {
@@ -75,11 +76,72 @@ def test_the_torque_in_mujoco_is_that_of_the_arm(export, joints):
     check = torque_check(exported, arm)
     assert check['states'] == 50
     assert check['share'] < 1e-9
-    heavier = replace(exported, text=exported.text.replace('mass="', 'mass="1', 1))
+    heavier = replace(exported, text=exported.text.replace('mass="', 'mass="1'))
     heavier = replace(heavier, text=heavier.text.replace('<mass value="', '<mass value="1'))
     assert torque_check(heavier, arm)['share'] > 1e-3
     broken = replace(exported, text=exported.text[:-20])
     assert 'MuJoCo' in torque_check(broken, arm)['not_checked']
+
+
+CORNERS = [(x, y, z) for x in (0, 2) for y in (0, 1) for z in (0, 1)]
+FACES = '1 2 4|1 4 3|5 7 8|5 8 6|1 5 6|1 6 2|3 4 8|3 8 7|1 3 7|1 7 5|2 6 8|2 8 4'
+LINK = (
+    '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" '
+    'iyz="0"/></inertial>{}</link>'
+)
+JOINT = (
+    '<joint name="j{}" type="continuous"><parent link="{}"/><child link="{}"/><axis xyz="0 1 0"/>'
+    '<origin xyz="0.1 0.2 0.3" rpy="0.1 0.2 0.3"/></joint>'
+)
+
+
+@pytest.mark.parametrize(
+    ('shape', 'size', 'middle'),
+    [
+        ('box size="0.1 0.2 0.3"', [0.05, 0.1, 0.15], [0.0, 0.0, 0.0]),
+        ('sphere radius="0.1"', [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        ('cylinder radius="0.1" length="0.6"', [0.1, 0.3, 0.0], [0.0, 0.0, 0.0]),
+        ('capsule radius="0.1" length="0.6"', [0.1, 0.3, 0.0], [0.0, 0.0, 0.0]),
+        ('mesh filename="box.obj" scale="0.1 0.1 0.1"', None, [0.1, 0.05, 0.05]),
+    ],
+)
+def test_an_exported_mjcf_has_base_and_shapes_in_their_places(tmp_path, shape, size, middle):
+    faces = ''.join(f'f {face}\n' for face in FACES.split('|'))
+    (tmp_path / 'box.obj').write_text(''.join(f'v {x} {y} {z}\n' for x, y, z in CORNERS) + faces)
+    place = '<origin xyz="0.1 0.2 0.3" rpy="0.4 0.5 0.6"/>'
+    body = f'<collision>{place}<geometry><{shape}/></geometry></collision>'
+    picture = '<visual><geometry><mesh filename="shape.dae"/></geometry></visual>'
+    links = LINK.format('base', body) + LINK.format('a', body + picture) + LINK.format('b', body)
+    joints = JOINT.format(1, 'base', 'a') + JOINT.format(2, 'a', 'b')
+    (tmp_path / 'arm.urdf').write_text(f'<robot name="r">{links}{joints}</robot>')
+    robot = load_robot(tmp_path / 'arm.urdf')
+    exported = arm_mjcf(ArmModel(robot))
+    assert exported.left_out == ('visual mesh shape.dae', 'contacts of links with each other')
+    check = torque_check(exported, ArmModel(robot))
+    assert check['share'] < 1e-9 and 'shapes' not in check
+
+    model = mujoco.MjModel.from_xml_string(exported.text)
+    data, pose = mujoco.MjData(model), robot.model.createData()
+    data.qpos[:] = q = np.array([0.3, -0.8])
+    mujoco.mj_kinematics(model, data)
+    pin.framesForwardKinematics(robot.model, pose, q)
+    origin = pin.SE3(pin.rpy.rpyToMatrix(0.4, 0.5, 0.6), np.array([0.1, 0.2, 0.3]))
+    for geom, link in enumerate(('base', 'a', 'b')):
+        wanted = pose.oMf[robot.model.getFrameId(link)] * origin
+        np.testing.assert_allclose(data.geom_xpos[geom], wanted.act(np.array(middle)), atol=1e-9)
+        if size is not None:
+            np.testing.assert_allclose(model.geom_size[geom], size, atol=1e-12)
+            np.testing.assert_allclose(
+                data.geom_xmat[geom].reshape(3, 3), wanted.rotation, atol=1e-9
+            )
+    gone = replace(exported, text=exported.text.replace('box.obj', 'gone.obj'))
+    assert ('shapes' in torque_check(gone, ArmModel(robot))) == (size is None)
+
+
+def test_damping_that_is_not_identified_stays_as_described():
+    text = load_robot('humanoid_arm').urdf.replace('</joint>', '<dynamics damping="2"/></joint>')
+    arm = ArmModel(robot_from_urdf(text))
+    assert torque_check(arm_urdf(arm), arm)['share'] < 1e-9
 
 
 def test_an_exported_urdf_has_its_meshes_and_no_password(tmp_path):

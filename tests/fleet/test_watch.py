@@ -4,6 +4,7 @@
 
 import json
 import re
+import shutil
 from urllib.parse import quote
 
 from armid_ros.errors import FleetError
@@ -12,7 +13,9 @@ from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.diagnose import cases, diagnose_fleet
 from armid_ros.fleet.pages import write_arm_page, write_pages
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.watch import watch, write_watch
+from armid_ros.fleet.watch import change_rows, watch, write_watch
+import pyarrow as pa
+from pyarrow import parquet
 import pytest
 
 from benchmarks.fleet import generate
@@ -37,6 +40,28 @@ def lived(cluster, tmp_path_factory):
 def test_arms_that_changed_are_named_and_no_others(lived):
     _, found, truth = lived
     assert {arm.arm for arm in found.arms if arm.named} == set(truth['arms'])
+
+
+@pytest.mark.parametrize('days', [['2026-01-05'], [f'2026-01-0{day}' for day in range(5, 9)]])
+def test_currents_beside_torques_are_named_as_that(lived, tmp_path, days):
+    store, found, _ = lived
+    arm = next(arm.arm for arm in found.arms if arm.health == 'healthy')
+    shutil.copytree(store.url, tmp_path / 'copy')
+    for file in (tmp_path / 'copy' / 'parameters' / f'arm={arm}').glob('*/*.parquet'):
+        if file.parent.name.removeprefix('day=') in days:
+            rows = parquet.read_table(file, partitioning=None).to_pylist()
+            for row in rows:
+                gain = {'waist': 13.3, 'shoulder': 11.1, 'elbow': 10.6}[row['joint']]
+                row |= {'value': row['value'] / gain, 'std': row['std'] / gain}
+            parquet.write_table(pa.Table.from_pylist(rows), file)
+    first = watch(Store(str(tmp_path / 'copy'))).arms[0]
+    (row,) = change_rows(first)
+    assert (first.arm, first.health, row['kind']) == (arm, 'changed', 'units')
+    assert row['first_day'] == '2026-01-05'
+    assert first.units.factors == pytest.approx(
+        {'waist': 1 / 13.3, 'shoulder': 1 / 11.1, 'elbow': 1 / 10.6}, rel=0.1
+    )
+    assert 'currents' in row['text'] and '--current-gain' in row['text']
 
 
 def test_what_changed_is_said_with_its_day(lived):

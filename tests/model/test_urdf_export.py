@@ -120,7 +120,7 @@ def test_description_read_again_has_the_parameters(robot):
 def test_pinocchio_and_mujoco_agree_with_the_model(robot):
     motion = random_motion(robot, 30, np.random.default_rng(1))
     tau = inverse_dynamics(robot, motion)
-    urdf, mjcf = export_urdf(robot), export_mjcf(robot)
+    urdf, (mjcf, _) = export_urdf(robot), export_mjcf(robot)
     bound = 1e-9 * np.abs(tau).max()
     np.testing.assert_allclose(inverse_dynamics(read(urdf, robot), motion), tau, atol=bound)
     np.testing.assert_allclose(mujoco_torque(mjcf, robot, motion), tau, atol=bound)
@@ -150,7 +150,7 @@ def test_damping_and_armature_act_in_mujoco():
     motion = random_motion(robot, 30, np.random.default_rng(1))
     damping, armature = (dict.fromkeys(robot.joints, value) for value in (0.3, 0.02))
     tau = inverse_dynamics(robot, motion) + 0.3 * motion.dq + 0.02 * motion.ddq
-    mjcf = export_mjcf(robot, damping=damping, armature=armature)
+    mjcf, _ = export_mjcf(robot, damping=damping, armature=armature)
     np.testing.assert_allclose(mujoco_torque(mjcf, robot, motion), tau, atol=1e-9)
     urdf = without_shapes(export_urdf(robot, damping=damping))
     rest = mujoco_torque(urdf, robot, motion) + 0.02 * motion.ddq

@@ -339,7 +339,7 @@ def test_a_joint_the_topic_does_not_name_is_refused_with_those_it_names(swinging
         read_recording(tmp_path / 'bag', joints=['elbow', 'elbo', 'hip'])
     assert str(refusal.value) == (
         f"{tmp_path / 'bag'}: /joint_states does not name joints 'elbo', 'hip'; "
-        'its joints are shoulder, elbow, wrist'
+        'its joints are shoulder, elbow, wrist; --joints elbow reads the others'
     )
 
 
@@ -421,3 +421,17 @@ def test_messages_that_a_queue_held_back_are_late_and_no_restart(
     recording = read_recording(write_bag(held), joints=JOINTS)
     assert recording.report.restarted == 0
     assert_same(recording, swinging)
+
+
+@pytest.mark.parametrize('off', [-(10**18), -(10**12), 50 * 10**9, 10**18])
+@pytest.mark.parametrize('at', [[0], [200], [200, 201], [100, 300], [499]])
+def test_a_stamp_that_fits_no_other_costs_its_message_alone(
+    swinging, stamps, write_bag, messages_of, off, at
+):
+    rubbish = stamps.copy()
+    rubbish[at] += off
+    bag = write_bag(messages_of(swinging, rubbish, log=rubbish))
+    read = read_recording(bag, joints=JOINTS)
+    kept = np.delete(np.arange(len(stamps)), at)
+    np.testing.assert_array_equal(read.q, swinging.q[kept])
+    assert read.report.unstamped == len(at) and read.report.restarted == 0

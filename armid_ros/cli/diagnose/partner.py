@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING, TypeVar
 
 from armid_ros.errors import ModelError
+from armid_ros.files.cells import listed, parted
 import click
 
 if TYPE_CHECKING:
@@ -108,10 +109,10 @@ def _equal_links(robot: Robot, other: Robot) -> list[Tie]:
 def _tie(text: str, robot: Robot, other: Robot) -> Tie:
     from armid_ros.model.spring_ties import centroid_ties
 
-    ends = [end.partition('@') for end in text.split('=')]
+    ends = [[*listed(end, '@'), ''] for end in parted(text, '=')]
     if len(ends) != 2:
         raise ModelError(f"--tie '{text}' has to be JOINT=JOINT, of the arm and of its partner")
-    (joint, _, point), (far, _, far_point) = ends
+    (joint, point, *_), (far, far_point, *_) = ends
     (tie,) = centroid_ties(robot, other, [(joint, far)])
     return replace(
         tie,

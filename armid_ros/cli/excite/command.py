@@ -232,6 +232,7 @@ def excite(
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.parallel import INTERRUPTED
     from armid_ros.files import json_text
+    from armid_ros.files.cells import parted
 
     refuse_other_options(click.get_current_context())
     robot = _driven(robot_source, gravity, joints, after)
@@ -245,7 +246,7 @@ def excite(
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
     settings |= {
-        'focus': tuple(name.partition('@')[0] for name in focus.split(',') if name),
+        'focus': tuple(name.partition('@')[0] for name in parted(focus) if name),
         'acceleration': limits,
         'noise': options.per_joint(torque_noise, robot, '--torque-noise'),
         'clearance': clearance,

@@ -124,8 +124,9 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
         return collision
     geometry = collision.geometry.copy()
     _add_points(geometry, collision.robot)
-    bodies = list(geometry.geometryObjects)
-    links = [str(collision.robot.model.frames[body.parentFrame].name) for body in bodies]
+    # copied, for the objects that Python sees are gone once another one is added
+    bodies = [(int(body.parentJoint), int(body.parentFrame)) for body in geometry.geometryObjects]
+    links = [str(collision.robot.model.frames[frame].name) for _, frame in bodies]
     names = [obstacle.name for obstacle in obstacles]
     for obstacle in obstacles:
         if names.count(obstacle.name) > 1:
@@ -141,8 +142,8 @@ def with_obstacles(collision: CollisionModel, obstacles: Sequence[Obstacle]) -> 
         number = geometry.addGeometryObject(
             pin.GeometryObject(obstacle.name, 0, 0, placement, obstacle.geometry())
         )
-        for other, (body, link) in enumerate(zip(bodies, links, strict=True)):
-            if body.parentJoint > 0 and link not in obstacle.ignore:
+        for other, ((joint, _), link) in enumerate(zip(bodies, links, strict=True)):
+            if joint > 0 and link not in obstacle.ignore:
                 geometry.addCollisionPair(pin.CollisionPair(other, number))
     return replace(collision, geometry=geometry)
 

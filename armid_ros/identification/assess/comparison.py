@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -40,7 +41,7 @@ class ParameterChange:
     after: float
     before_std: float
     after_std: float
-    changed: bool
+    changed: bool = False
 
     @property
     def difference(self) -> float:
@@ -160,30 +161,8 @@ class Comparison:
 
     @property
     def factors(self) -> dict[str, float]:
-        """
-        Return by what one factor the values of each joint changed, where that is all that did.
-
-        No load and no wear makes masses and friction of all joints several times what they were:
-        torques of one of the two are in another unit, or are currents. Empty where none are.
-
-        """
-        clear = [
-            (c.parameter.joint, c.after / c.before)
-            for c in self.changes
-            if abs(c.before) > _CLEAR * c.before_std and abs(c.after) > _CLEAR * c.after_std
-        ]
-        ratios = np.array([ratio for _, ratio in clear])
-        if len(ratios) < _FEWEST or np.mean(ratios > 0.0) < _MOST:
-            return {}
-        common = float(np.median(ratios))
-        near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
-        if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < _MOST:
-            return {}
-        joints = dict.fromkeys(joint for joint, _ in clear if joint)
-        return {
-            joint: float(np.median([ratio for of, ratio in clear if of == joint]))
-            for joint in joints
-        }
+        """Return by what one factor the torques of each joint changed; see ``unit_factors``."""
+        return unit_factors(self.changes)
 
     @property
     def not_compared(self) -> tuple[NotCompared, ...]:
@@ -246,3 +225,29 @@ class Comparison:
             'only_before': [one.document() for one in self.only_before],
             'only_after': [one.document() for one in self.only_after],
         }
+
+
+def unit_factors(changes: Sequence[ParameterChange]) -> dict[str, float]:
+    """
+    Return by what one factor the values of each joint changed, where that is all that did.
+
+    No load and no wear makes masses and friction of all joints several times what they were:
+    torques of one of the two are in another unit, or are currents. Empty where none are.
+
+    """
+    clear = [
+        (c.parameter.joint, c.after / c.before)
+        for c in changes
+        if abs(c.before) > _CLEAR * c.before_std and abs(c.after) > _CLEAR * c.after_std
+    ]
+    ratios = np.array([ratio for _, ratio in clear])
+    if len(ratios) < _FEWEST or np.mean(ratios > 0.0) < _MOST:
+        return {}
+    common = float(np.median(ratios))
+    near = np.abs(np.log(np.maximum(ratios / common, 1e-9))) < np.log(NEAR)
+    if 1.0 / LIMITS.torque_factor < common < LIMITS.torque_factor or np.mean(near) < _MOST:
+        return {}
+    joints = dict.fromkeys(joint for joint, _ in clear if joint)
+    return {
+        joint: float(np.median([ratio for of, ratio in clear if of == joint])) for joint in joints
+    }

@@ -9,6 +9,7 @@ from pathlib import Path
 import re
 from typing import Any, NamedTuple
 
+from armid_ros.files.cells import listed
 import yaml
 
 #: Parameters of the simulated arm, where neither an argument nor a parameter file sets them.
@@ -47,7 +48,7 @@ class Argument(NamedTuple):
         """Return the value of a text; RuntimeError, with the argument, where it is none."""
         try:
             if self.kind is list:
-                return [part.strip() for part in text.split(',') if part.strip()]
+                return [part.strip() for part in listed(text) if part.strip()]
             if self.kind is bool:
                 return {'true': True, 'false': False}[text.lower()]
             return self.kind(text)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import re
 
 from armid_ros.errors import RecordingError
+from armid_ros.files.cells import listed
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.tables.table import Table, TableColumn
 
@@ -143,7 +144,7 @@ def _matching(table: Table, pattern: str) -> dict[TableColumn, str]:
     if members:
         return {column: column.name[len(pattern) + 1 : -1] for column in members}
     if ',' in pattern:
-        parts = [(part.strip(), table.column(part.strip())) for part in pattern.split(',')]
+        parts = [(part.strip(), table.column(part.strip())) for part in listed(pattern)]
         missing = [part for part, column in parts if column is None]
         if missing:
             raise RecordingError(

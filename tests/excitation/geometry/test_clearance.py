@@ -12,7 +12,7 @@ from armid_ros.excitation import (
     Obstacle,
     with_obstacles,
 )
-from armid_ros.robots import collision_model
+from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -58,6 +58,26 @@ def poses(humanoid):
 @pytest.fixture(scope='module')
 def clearance(humanoid_collision):
     return ClearanceModel.of(humanoid_collision)
+
+
+def test_an_obstacle_is_checked_against_the_moving_links_alone():
+    """Of arms of any length: the list of bodies moves in memory as it grows."""
+    for count in (*range(1, 12), 31, 32, 33, 63, 64, 65):
+        text = '<robot name="r">' + ''.join(
+            f'<link name="l{k}"><collision><geometry><sphere radius="0.1"/></geometry></collision>'
+            '</link>'
+            for k in range(count + 1)
+        )
+        text += ''.join(
+            f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/>'
+            '<origin xyz="0 0 1"/></joint>'
+            for k in range(count)
+        )
+        bodies = collision_model(load_robot(text + '</robot>'))
+        obstacles = [Obstacle('floor', 'plane'), Obstacle('post', 'sphere', size=(0.1,))]
+        pairs = with_obstacles(bodies, obstacles).geometry.collisionPairs
+        around = [(int(p.first), int(p.second)) for p in pairs if p.second > count]
+        assert around == [(k, n) for n in (count + 1, count + 2) for k in range(1, count + 1)]
 
 
 def test_smallest_distance_is_the_collision_models(clearance, humanoid_collision, poses):
