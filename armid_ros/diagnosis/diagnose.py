@@ -38,8 +38,8 @@ from armid_ros.diagnosis.verdict.gap import (
     not_repeating,
     places_held,
 )
-from armid_ros.diagnosis.verdict.leaving import Leaving
 from armid_ros.diagnosis.verdict.naming import findings, not_named
+from armid_ros.diagnosis.verdict.remaining_misfit import RemainingMisfit
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
@@ -150,7 +150,7 @@ def diagnose(
     if known is not None and known.errors[0] > 1.0:
         return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
     doubt = doubt_of(given, known, baseline, misfit, settings.thresholds)
-    asked = _Asked(arm, given, prepared, known, doubt, validate, settings, rng, tell)
+    asked = _Request(arm, given, prepared, known, doubt, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
         found = diagnose_ties(arm, recordings, prepared, settings)
@@ -160,7 +160,7 @@ def diagnose(
     return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
 
 
-def _explainer(asked: _Asked, misfit: Misfit | None) -> Explainer:
+def _explainer(asked: _Request, misfit: Misfit | None) -> Explainer:
     arm, prepared, known = asked.arm, asked.prepared, asked.before
     written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
     seen = trajectories(asked.validate, prepared.used, arm, prepared.allowed) if known else ()
@@ -170,7 +170,7 @@ def _explainer(asked: _Asked, misfit: Misfit | None) -> Explainer:
 
 
 def _each_alone(
-    result: Diagnosis, days: Iterable[Sequence[Recording]], used: Conditioning, asked: _Asked
+    result: Diagnosis, days: Iterable[Sequence[Recording]], used: Conditioning, asked: _Request
 ) -> Diagnosis:
     """Return a result, or that single recordings are at fault, where something stays open."""
     open_or_doubted = result.verdict in ('unknown', 'partial') or bool(result.doubt)
@@ -205,7 +205,7 @@ def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Request:
     """The parameters of `diagnose`; `given` is its arm, `arm` the same memoized."""
 
     arm: ArmModel
@@ -220,7 +220,7 @@ class _Asked:
 
     def doubting(
         self, found: Sequence[Finding], as_it_is: Excess | None, floor_in_words: str
-    ) -> _Asked:
+    ) -> _Request:
         """Return the same, with a doubt of what was named, or of the model where nothing was."""
         doubt = self.doubt or (doubt_of_names(found) if self.before else '')
         if not (doubt or as_it_is is None):
@@ -228,7 +228,7 @@ class _Asked:
         return replace(self, doubt=doubt)
 
 
-def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
+def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
     """Return the diagnosis of an explanation, measured on held-out data."""
     arm, settings = asked.arm, asked.settings
     asked.tell(0.85, 'held-out gap')
@@ -240,7 +240,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Asked) -> Diagnosis:
     hardly = unseen is not None and not names.shares.predicted
     explanation, notes = names.stated, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
     found = findings(explanation, names.shares, arm, asked.rng)
-    measured = Leaving(chosen, unseen, asked.before, arm, settings)
+    measured = RemainingMisfit(chosen, unseen, asked.before, arm, settings)
     refitted = measured.as_it_is(explanation)
     as_it_is = measured.patched(names) if found else refitted
     worse = measured.harmed(explanation)
@@ -298,7 +298,7 @@ def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
     return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
 
 
-def _doubts(asked: _Asked, chosen: Chosen, verdict: Verdict, blind: Sequence[str]) -> list[str]:
+def _doubts(asked: _Request, chosen: Chosen, verdict: Verdict, blind: Sequence[str]) -> list[str]:
     """Say what would tell a change from a misfit, why a model may be wrong, what is not seen."""
     remedy = chosen.untested if verdict.word == 'unknown' else ''
     still = ', '.join(at_rest(asked.prepared.data, asked.arm.robot.joints))
@@ -311,7 +311,7 @@ def _doubts(asked: _Asked, chosen: Chosen, verdict: Verdict, blind: Sequence[str
     return [text for text in (remedy, asked.doubt, not_checked, short) if text]
 
 
-def _unseen(asked: _Asked, explanation: Explanation, chosen: Chosen) -> Evidence | None:
+def _unseen(asked: _Request, explanation: Explanation, chosen: Chosen) -> Evidence | None:
     """Return the recordings to validate, which are only predicted, in the unit of the gap."""
     if not asked.validate:
         return None

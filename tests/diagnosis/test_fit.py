@@ -5,7 +5,7 @@
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
-from armid_ros.diagnosis.search.trial import Named
+from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -21,7 +21,10 @@ def test_what_does_nothing_along_the_motion_is_not_told(bench):
     shape = strap.shape_values.copy()
     shape[:, -1] = 5.0
     fitted = fit(
-        bench.arm, [Named(strap.with_shape(shape), (0,))], Evidence.over_noise(data, sigma), None
+        bench.arm,
+        [SelectedEffect(strap.with_shape(shape), (0,))],
+        Evidence.over_noise(data, sigma),
+        None,
     )
     assert np.all(np.isinf(fitted.estimate.std))
 
@@ -39,7 +42,7 @@ def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape,
     (part,) = cut(bench.recordings()[:1])
     effect = CATALOGUE[name].on(bench.robot, ('elbow',)).with_shape(shape)
     kept = tuple(range(len(values)))
-    state = Patch(bench.arm, (Named(effect, kept),), (np.array(values),), np.zeros(0))
+    state = Patch(bench.arm, (SelectedEffect(effect, kept),), (np.array(values),), np.zeros(0))
     columns = patch_columns(state, part, None)[:, :, len(values) :]
     for index in range(len(shape)):
         step = 1e-3 * max(abs(shape[index]), 0.01) * np.eye(len(shape))[index]

@@ -11,7 +11,7 @@ from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.trial import Named
+from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import identify, SignalSettings
@@ -69,7 +69,7 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     recordings = bench.recordings(lambda m, tau: np.array([0.0, 0.4]) * m.q)
     data = tuple(trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm))
     evidence = Evidence.over_noise(data, tuple(np.full(2, 0.3) for _ in data))
-    named = [Named(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
+    named = [SelectedEffect(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
     base, _ = excited(bench.arm, bench.arm.base_parameters(np.random.default_rng(0)), data)
     errors = []
     for _ in range(40):

@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.rows import make_problem
 from armid_ros.diagnosis.data.trajectory import trajectories, Workspace
 from armid_ros.diagnosis.search.acceptance import without_echo
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.round import Nuisance, Round
+from armid_ros.diagnosis.search.search_state import Nuisance, SearchState
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE
@@ -39,7 +39,7 @@ def tried(bench, seed, level=0.6, lost=0.0, loud=2.0):
     evidence = Evidence.over_noise(data, noise)
     nuisance = Nuisance((), NormalEquations.none(0))
     work = Workspace(bench.arm, data)
-    here = Round(evidence, work, DiagnosisSettings(), problem, nuisance, 1.0)
+    here = SearchState(evidence, work, DiagnosisSettings(), problem, nuisance, 1.0)
     return trial, without_echo(trial, here)
 
 

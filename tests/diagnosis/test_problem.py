@@ -10,7 +10,7 @@ from armid_ros.diagnosis.data.trajectory import block_rows, trajectories
 from armid_ros.diagnosis.search.candidates import candidates
 from armid_ros.diagnosis.search.explain import nuisance_of
 from armid_ros.diagnosis.search.fit import fit, Start
-from armid_ros.diagnosis.search.trial import Named
+from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -53,7 +53,7 @@ def test_shapes_of_a_name_are_held_by_what_all_data_tell_of_them(bench):
     sigma = [np.full(2, 0.01)] * len(data)
     effect = CATALOGUE['stribeck_friction'].on(bench.robot, ('elbow',)).with_shape((0.2, 2.0))
     evidence, start = Evidence.over_noise(data, sigma), Start([np.array([0.2])])
-    fitted = fit(bench.arm, [Named(effect, (0,))], evidence, None, start)
+    fitted = fit(bench.arm, [SelectedEffect(effect, (0,))], evidence, None, start)
     assert fitted.named[0].effect.shape[0] == pytest.approx(0.3, rel=0.2)
     found = candidates(fitted, evidence, [CATALOGUE['viscous_friction']])
     problem, nuisance = nuisance_of(found, fitted, evidence)

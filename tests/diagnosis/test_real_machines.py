@@ -9,7 +9,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.trial import Named
+from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.papers.elastic.identification.transmission import fit_transmission
 from armid_ros.recording import read_recording
@@ -92,7 +92,7 @@ def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(m
         rough = [noise_floor(part, arm).sigma for part in data]
         nearer = fit(arm, (), Evidence.over_noise(data, rough), base).arm
         sigma = [noise_floor(part, nearer).sigma for part in data]
-        fitted = fit(arm, [Named(friction, (0,))], Evidence.over_noise(data, sigma), base)
+        fitted = fit(arm, [SelectedEffect(friction, (0,))], Evidence.over_noise(data, sigma), base)
         values.append(fitted.estimate.values[0])
         std.append(fitted.estimate.std[0])
     assert np.all(np.array(values) > 4.0 * np.array(std))

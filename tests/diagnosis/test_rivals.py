@@ -4,7 +4,7 @@
 
 from types import SimpleNamespace
 
-from armid_ros.diagnosis.search.round import rarity
+from armid_ros.diagnosis.search.search_state import rarity
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.gravity import GravityVector
 import pytest

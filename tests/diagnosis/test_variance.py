@@ -8,7 +8,7 @@ from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.next_run.steps import next_steps
-from armid_ros.diagnosis.search.round import Later
+from armid_ros.diagnosis.search.search_state import UnseenRows
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.diagnosis.search.variance import Recordings, UsualSpread
 from armid_ros.diagnosis.verdict.words import suspicion
@@ -152,7 +152,7 @@ def test_stretches_of_one_recording_are_one_recording_of_the_test(bench):
     evidence = Evidence(tuple(stretches), unit, unit)
     rng = np.random.default_rng(0)
     columns = [rng.normal(size=(*part.torque.shape, 3)) for part in data]
-    later = Later.of(evidence, columns, [part.torque for part in data])
+    later = UnseenRows.of(evidence, columns, [part.torque for part in data])
     rows = [part.torque.size for part in data]
     assert [len(one) for one in later.residual] == [rows[0] + rows[1], rows[2]]
     assert [one.shape for one in later.free] == [(rows[0] + rows[1], 3), (rows[2], 3)]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.round import Round, worth
+from armid_ros.diagnosis.search.search_state import SearchState, worth
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.search.variance import Changed, Recordings, UsualSpread
 from armid_ros.identification.fitting.normal_equations import NormalEquations
@@ -17,28 +17,28 @@ import numpy as np
 import numpy.typing as npt
 
 
-def acceptable(trial: Trial, here: Round) -> bool:
+def acceptable(trial: Trial, state: SearchState) -> bool:
     """Return whether a candidate is significant and possible, and its share exceeds its price."""
-    return beyond_chance(trial, here) and worth(trial, here) > 0.0
+    return beyond_chance(trial, state) and worth(trial, state) > 0.0
 
 
-def beyond_chance(trial: Trial, here: Round) -> bool:
+def beyond_chance(trial: Trial, state: SearchState) -> bool:
     """Return whether a candidate is possible, and significant over all that were tried."""
-    surely = trial.p * here.tried <= here.settings.thresholds.error_rate
-    return surely and possible(trial, here)
+    surely = trial.p * state.tried <= state.settings.thresholds.error_rate
+    return surely and possible(trial, state)
 
 
-def possible(trial: Trial, here: Round) -> bool:
+def possible(trial: Trial, state: SearchState) -> bool:
     """Return whether the values are physically possible, and plausible for such an effect."""
-    effect, arm, kept = trial.candidate.effect, here.work.arm, list(trial.candidate.kept)
-    if not inside(trial, here).all():
+    effect, arm, kept = trial.candidate.effect, state.work.arm, list(trial.candidate.kept)
+    if not inside(trial, state).all():
         return False
     values, std = np.zeros((2, len(effect.parameters(arm.robot))))
     values[kept], std[kept] = trial.values, trial.deviation
     return effect.plausible(values, std, arm)
 
 
-def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
+def inside(trial: Trial, state: SearchState) -> npt.NDArray[np.bool_]:
     """
     Return which values are within their bounds, shape (p,).
 
@@ -46,14 +46,14 @@ def inside(trial: Trial, here: Round) -> npt.NDArray[np.bool_]:
     explains nearly as much.
 
     """
-    kept, thresholds = list(trial.candidate.kept), here.settings.thresholds
-    lower, upper = (bound[kept] for bound in room(trial.candidate.effect, here.work.arm))
+    kept, thresholds = list(trial.candidate.kept), state.settings.thresholds
+    lower, upper = (bound[kept] for bound in room(trial.candidate.effect, state.work.arm))
     inexact = np.sqrt(thresholds.tie) * np.abs(trial.values)
     slack = np.maximum(thresholds.surely * trial.deviation, inexact)
     return np.asarray((trial.values > lower - slack) & (trial.values < upper + slack))
 
 
-def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
+def material(gains: FloatArray, state: SearchState, misfit_share: float) -> bool:
     """
     Return whether gains (n,) are material in any joint, and such a share of the misfit in all.
 
@@ -61,22 +61,22 @@ def material(gains: FloatArray, here: Round, misfit_share: float) -> bool:
     misfit is summed over joints.
 
     """
-    alone, beside = (here.evidence.least_squares(here.settings, x) for x in (0.0, misfit_share))
+    alone, beside = (state.evidence.least_squares(state.settings, x) for x in (0.0, misfit_share))
     return bool(np.any(gains >= alone) and np.sum(np.maximum(gains, 0.0) / beside) >= 1.0)
 
 
-def material_sizes(trial: Trial, here: Round, misfit_share: float) -> FloatArray:
+def material_sizes(trial: Trial, state: SearchState, misfit_share: float) -> FloatArray:
     """Return the size of each value, (p,), from which on what it makes alone is that material."""
-    made = np.sum(here.own(trial.candidate) ** 2, axis=0) * trial.visible**2
+    made = np.sum(state.own(trial.candidate) ** 2, axis=0) * trial.visible**2
     alone, beside = (
-        made / here.evidence.least_squares(here.settings, x)[:, np.newaxis]
+        made / state.evidence.least_squares(state.settings, x)[:, np.newaxis]
         for x in (0.0, misfit_share)
     )
     of_size_one = np.minimum(alone.max(axis=0), beside.sum(axis=0))
     return np.asarray(1.0 / np.sqrt(np.maximum(of_size_one, 1e-300)))
 
 
-def without_echo(trial: Trial, here: Round) -> Trial:
+def without_echo(trial: Trial, state: SearchState) -> Trial:
     """
     Return a trial without the gain that is due to noise of the torque; itself if that is nothing.
 
@@ -87,27 +87,29 @@ def without_echo(trial: Trial, here: Round) -> Trial:
     """
     if not trial.candidate.effect.reads_torque:
         return trial
-    echo = here.work.torque_echo(trial.candidate.effect, trial.candidate.kept, here.evidence.noise)
+    echo = state.work.torque_echo(
+        trial.candidate.effect, trial.candidate.kept, state.evidence.noise
+    )
     if not echo.any():
         return trial
-    rows = np.einsum('rjp,rj->rp', echo, here.problem.weight**2)
+    rows = np.einsum('rjp,rj->rp', echo, state.problem.weight**2)
     blocks = np.zeros((len(trial.cross), rows.shape[1]))
-    np.add.at(blocks, here.problem.block, rows)
+    np.add.at(blocks, state.problem.block, rows)
     made = np.sum(blocks * trial.fold_values[trial.fold], axis=1)
     return replace(trial, cross=trial.cross - made)
 
 
-def changed(trial: Trial, here: Round) -> bool:
+def changed(trial: Trial, state: SearchState) -> bool:
     """Return whether a candidate has changed since the baseline; true where nothing tells."""
-    return here.tested is None or trial.candidate.key in here.tested.changed
+    return state.tested is None or trial.candidate.key in state.tested.changed
 
 
-def may_have_changed(trial: Trial, here: Round) -> bool:
+def may_have_changed(trial: Trial, state: SearchState) -> bool:
     """Return whether more recordings may tell that a candidate has changed, where these do not."""
-    return here.tested is not None and trial.candidate.key in here.tested.suspected
+    return state.tested is not None and trial.candidate.key in state.tested.suspected
 
 
-def tested(trials: Sequence[Trial], here: Round) -> Changed | None:
+def tested(trials: Sequence[Trial], state: SearchState) -> Changed | None:
     """
     Test whether candidates have changed between the days; None where nothing tells.
 
@@ -115,13 +117,13 @@ def tested(trials: Sequence[Trial], here: Round) -> Changed | None:
     candidates that are tested.
 
     """
-    if here.before is None:
+    if state.before is None:
         return None
-    thresholds, today = here.settings.thresholds, _today(here)
-    both = _recordings(here, today)
+    thresholds, today = state.settings.thresholds, _today(state)
+    both = _recordings(state, today)
     found = {
         trial.candidate.key: both.variance(
-            _own(trial, here, both, today),
+            _own(trial, state, both, today),
             trial.candidate.precision,
             trial.freedom,
             thresholds.tie,
@@ -142,38 +144,38 @@ def tested(trials: Sequence[Trial], here: Round) -> Changed | None:
     )
 
 
-def _recordings(here: Round, parts: Sequence[npt.NDArray[np.bool_]]) -> Recordings:
+def _recordings(state: SearchState, parts: Sequence[npt.NDArray[np.bool_]]) -> Recordings:
     """Return the recordings of the baseline, those in question, and those nothing is fitted to."""
-    assert here.before is not None
-    later, rank = here.before.later, len(here.nuisance.free)
-    before = list(here.before.prior.recordings(here.before.change))
-    days = [(here.free[rows], here.problem.y[rows]) for rows in parts]
+    assert state.before is not None
+    later, rank = state.before.later, len(state.nuisance.free)
+    before = list(state.before.prior.recordings(state.before.change))
+    days = [(state.free[rows], state.problem.y[rows]) for rows in parts]
     today = [(free.reshape(-1, rank), y.ravel()) for free, y in days]
     if later is not None:
         today += zip(later.free, later.residual, strict=True)
-    known = sum((NormalEquations.of_rows(*rows) for rows in today), start=here.nuisance.prior)
+    known = sum((NormalEquations.of_rows(*rows) for rows in today), start=state.nuisance.prior)
     free, residual = zip(*before, *today, strict=True)
     return Recordings.of(free, residual, [False] * len(before) + [True] * len(today), known)
 
 
 def _own(
-    trial: Trial, here: Round, both: Recordings, parts: Sequence[npt.NDArray[np.bool_]]
+    trial: Trial, state: SearchState, both: Recordings, parts: Sequence[npt.NDArray[np.bool_]]
 ) -> list[FloatArray]:
     """Return the columns of a candidate in these recordings, each (S, p)."""
-    assert here.before is not None
-    baseline, arm, candidate = here.before.baseline, here.work.arm, trial.candidate
+    assert state.before is not None
+    baseline, arm, candidate = state.before.baseline, state.work.arm, trial.candidate
     before = baseline.columns(arm, candidate.effect, candidate.kept)
     sizes = [len(rest) for rest, late in zip(both.rest, both.today, strict=True) if not late]
-    own = here.own(candidate)
+    own = state.own(candidate)
     result = np.split(before, np.cumsum(sizes)[:-1])
     result += [own[rows].reshape(-1, candidate.size) for rows in parts]
-    if here.before.later is not None:
-        result += here.before.later.own(arm, candidate)
+    if state.before.later is not None:
+        result += state.before.later.own(arm, candidate)
     return result
 
 
-def _today(here: Round) -> list[npt.NDArray[np.bool_]]:
+def _today(state: SearchState) -> list[npt.NDArray[np.bool_]]:
     """Return the rows of each recording in question, each (R,)."""
-    data = here.evidence.data
+    data = state.evidence.data
     fold = np.concatenate([np.full(len(part.rows), part.fold) for part in data])
     return [fold == one for one in np.unique(fold)]

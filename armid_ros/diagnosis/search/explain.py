@@ -21,13 +21,20 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.search.candidates import Candidates, candidates, Question
+from armid_ros.diagnosis.search.elimination import BackwardElimination, doubtful, LinearFit, pruned
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
-from armid_ros.diagnosis.search.held_out import widened
-from armid_ros.diagnosis.search.look import Look, look_at
-from armid_ros.diagnosis.search.prune import doubtful, pruned, Retrial, View
-from armid_ros.diagnosis.search.round import Before, Later, Nuisance, Round
-from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Survey, Trial
+from armid_ros.diagnosis.search.held_out import with_jackknife_std
+from armid_ros.diagnosis.search.screening import screen_candidates, Screening
+from armid_ros.diagnosis.search.search_state import BaselineRows, Nuisance, SearchState, UnseenRows
+from armid_ros.diagnosis.search.trial import (
+    AcceptedCause,
+    Candidate,
+    SelectedEffect,
+    Step,
+    Survey,
+    Trial,
+)
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
 from armid_ros.identification.fitting.normal_equations import NormalEquations
@@ -40,33 +47,33 @@ def explain(
     question: Question,
     evidence: Evidence,
     settings: DiagnosisSettings,
-    start: Sequence[Accepted] = (),
+    start: Sequence[AcceptedCause] = (),
     baseline: Baseline | None = None,
     unseen: Evidence | None = None,
 ) -> Explanation:
     """Accept causes as long as any passes, then name the friction that matters, and prune."""
     search = Search(question, evidence, settings, baseline, unseen)
-    way = search.forward(start)
+    path = search.forward(start)
     if question.since:
-        way = search.exchanged(way)
-    survey, last = way.first, None if way.last is None else way.last.look.survey
+        path = search.exchanged(path)
+    survey, last = path.first, None if path.last is None else path.last.screening.survey
     whole = None if survey is None else survey.total, 1 if survey is None else survey.tried
-    retrial = Retrial(question, evidence, settings)
-    friction, tried = _friction(retrial, way.taken, whole)
-    taken, minor = [*way.taken, *friction], () if last is None else last.there
-    instead = search.in_place_of(friction, way)
+    retrial = BackwardElimination(question, evidence, settings)
+    friction, tried = _friction(retrial, path.taken, whole)
+    taken, minor = [*path.taken, *friction], () if last is None else last.there
+    instead = search.replacing_offsets(friction, path)
     if instead:
-        others, _ = _friction(retrial, [*way.taken, *instead], whole)
+        others, _ = _friction(retrial, [*path.taken, *instead], whole)
         fewer = len(instead) + len(_offsets(others)) < len(_offsets(friction))
         if fewer or not question.body_is_free:
-            taken, minor = [*way.taken, *instead, *others], ()
+            taken, minor = [*path.taken, *instead, *others], ()
     if survey is not None:
         survey = survey.and_nuisance(tried, settings.thresholds.least_visible)
-    change = way.change if question.nuisance_arm is question.arm else None
+    change = path.change if question.nuisance_arm is question.arm else None
     steps, fitted = pruned(retrial, taken, change)
     steps = steps if question.since else without_later(steps)
     by_chance = 0.0 if last is None else last.by_chance
-    fitted = widened(fitted, evidence, question.prior, by_chance)
+    fitted = with_jackknife_std(fitted, evidence, question.prior, by_chance)
     said = {own.effect.name for own in fitted.named}
     small = tuple(trial for trial in minor if trial.candidate.effect.name not in said)
     return Explanation(
@@ -101,44 +108,44 @@ def without_later(steps: Sequence[Step]) -> tuple[Step, ...]:
 
 
 @dataclass(frozen=True)
-class Place:
+class SearchPoint:
     """A place of the search: the accepted causes, the fit with them, and a look at all others."""
 
-    named: tuple[Named, ...]
+    named: tuple[SelectedEffect, ...]
     values: tuple[FloatArray, ...]
     current: Fitted
     found: Candidates
-    before: Before | None
-    look: Look
+    before: BaselineRows | None
+    screening: Screening
 
 
 @dataclass(frozen=True)
-class Way:
+class SelectionPath:
     """
     Causes in the order in which they were accepted.
 
     Attributes
     ----------
-    taken : tuple of Accepted
+    taken : tuple of AcceptedCause
         The causes.
     first : Survey or None
         What the first look at all candidates showed.
-    last : Place or None
+    last : SearchPoint or None
         The place of the last look.
     change : ndarray, shape (r,), or None
         Change of the base parameters of the arm in the last fit.
 
     """
 
-    taken: tuple[Accepted, ...]
+    taken: tuple[AcceptedCause, ...]
     first: Survey | None
-    last: Place | None
+    last: SearchPoint | None
     change: FloatArray | None = None
 
     @property
     def left(self) -> float:
         """Held-out squares that the last look was to explain."""
-        return np.inf if self.last is None else self.last.look.here.power
+        return np.inf if self.last is None else self.last.screening.state.power
 
 
 @dataclass(frozen=True)
@@ -167,27 +174,31 @@ class Search:
     baseline: Baseline | None = None
     unseen: Evidence | None = None
 
-    def forward(self, start: Sequence[Accepted] = (), total: float | None = None) -> Way:
+    def forward(
+        self, start: Sequence[AcceptedCause] = (), total: float | None = None
+    ) -> SelectionPath:
         """Accept causes in addition to those to start with as long as any passes."""
         if not self.question.most:
-            return Way(tuple(start), None, None)
-        place = self.first_place(start, total)
-        first, steps = place.look.survey, [one.step for one in start]
-        named, values = place.named, place.values
+            return SelectionPath(tuple(start), None, None)
+        point = self.first_point(start, total)
+        first, steps = point.screening.survey, [one.step for one in start]
+        named, values = point.named, point.values
         for remaining in range(self.question.most, 0, -1):
-            step = place.look.step()
+            step = point.screening.step()
             if step is None:
                 break
             steps.append(step)
             one = _of(step, self.question)
-            named, values = (*place.named, one.named), (*place.values, one.values)
+            named, values = (*point.named, one.named), (*point.values, one.values)
             if remaining > 1:
-                place = self._after(place, step, named, values)
-                named, values = place.named, place.values
+                point = self._after(point, step, named, values)
+                named, values = point.named, point.values
         rows = zip(named, steps, values, strict=True)
-        return Way(tuple(Accepted(*row) for row in rows), first, place, place.current.change)
+        return SelectionPath(
+            tuple(AcceptedCause(*row) for row in rows), first, point, point.current.change
+        )
 
-    def exchanged(self, way: Way, most: int = 1) -> Way:
+    def exchanged(self, path: SelectionPath, most: int = 1) -> SelectionPath:
         """
         Ask anew for each cause but the last, beside those that were accepted after it.
 
@@ -197,28 +208,32 @@ class Search:
         the most, for what leaves no more in the end. To ask for one takes as long as a first look.
 
         """
-        taken = list(way.taken)
+        taken = list(path.taken)
         for k in range(len(taken) - 1):
-            assert way.first is not None
+            assert path.first is not None
             others = [*taken[:k], *taken[k + 1 :]]
-            step = self.first_place(others, way.first.total).look.step()
+            step = self.first_point(others, path.first.total).screening.step()
             same = step is None or step.trial.candidate.key[:2] == taken[k].key
             if step is not None and not same and most:
                 start = [*others, _of(step, self.question)]
-                again = self.forward(start, way.first.total)
-                if again.left <= way.left:
-                    return self.exchanged(replace(again, first=way.first), most - 1)
+                again = self.forward(start, path.first.total)
+                if again.left <= path.left:
+                    return self.exchanged(replace(again, first=path.first), most - 1)
             rivals = step.rivals if step is not None and same else ()
             taken[k] = taken[k]._replace(step=replace(taken[k].step, rivals=rivals))
-        return replace(way, taken=tuple(taken))
+        return replace(path, taken=tuple(taken))
 
-    def first_place(self, start: Sequence[Accepted] = (), total: float | None = None) -> Place:
-        """Fit the causes to start with, and look at all others; see `Round.total`."""
-        return self._fitted_place(
+    def first_point(
+        self, start: Sequence[AcceptedCause] = (), total: float | None = None
+    ) -> SearchPoint:
+        """Fit the causes to start with, and look at all others; see `SearchState.total`."""
+        return self._fitted_point(
             [one.named for one in start], [one.values for one in start], total
         )
 
-    def in_place_of(self, friction: Sequence[Accepted], way: Way) -> list[Accepted]:
+    def replacing_offsets(
+        self, friction: Sequence[AcceptedCause], path: SelectionPath
+    ) -> list[AcceptedCause]:
         """
         Return the causes that win where the named offsets are no longer nuisance parameters.
 
@@ -228,9 +243,9 @@ class Search:
         if they make more offsets needless than they are themselves.
 
         """
-        question, place = self.question, way.last
+        question, point = self.question, path.last
         asked = _offsets(friction)
-        if not asked or place is None or place.before is not None:
+        if not asked or point is None or point.before is not None:
             return []
         arm, base = question.nuisance_arm, question.nuisance_base
         assert base is not None
@@ -238,51 +253,61 @@ class Search:
         where = [
             names.index((p.name, p.joint)) for one in asked for p in one.parameters(arm.robot)
         ]
-        here, values = place.look.here, _base_values(place.current, base)
+        state, values = point.screening.state, _base_values(point.current, base)
         for column in sorted(np.flatnonzero(np.isin(base.independent, where)), reverse=True):
-            here = here.without(int(column), float(values[column]))
-        assert way.first is not None
-        here = replace(here, total=max(way.first.total, float(np.sum(here.residual**2))))
-        found: list[Accepted] = []
-        others = place.found.candidates
+            state = state.without(int(column), float(values[column]))
+        assert path.first is not None
+        state = replace(state, total=max(path.first.total, float(np.sum(state.residual**2))))
+        found: list[AcceptedCause] = []
+        others = point.found.candidates
         for _ in range(min(len(asked), self.settings.thresholds.few_causes)):
-            look = look_at(others, here)
-            step = look.step()
+            screening = screen_candidates(others, state)
+            step = screening.step()
             if step is None:
                 break
             found.append(_of(step, question))
             taken = step.trial.candidate
-            here = replace(look.here, nuisance=here.nuisance.and_columns(taken), known=None)
+            state = replace(
+                screening.state, nuisance=state.nuisance.and_columns(taken), known=None
+            )
             others = tuple(one for one in others if one.key != taken.key)
         return found
 
     def _after(
-        self, place: Place, step: Step, named: Sequence[Named], values: Sequence[FloatArray]
-    ) -> Place:
+        self,
+        point: SearchPoint,
+        step: Step,
+        named: Sequence[SelectedEffect],
+        values: Sequence[FloatArray],
+    ) -> SearchPoint:
         """Return the place after a step, with the names that there are then, and their values."""
         candidate = step.trial.candidate
         if not candidate.effect.linear or named[-1].effect is not candidate.effect:
-            return self._fitted_place(named, values, place.look.survey.total, place.current.change)
-        arm, here = place.current.arm, place.look.here
-        before = None if place.before is None else place.before.and_columns(arm, candidate)
-        nuisance = here.nuisance.and_columns(candidate)
-        others = tuple(one for one in place.found.candidates if one.key != candidate.key)
+            return self._fitted_point(
+                named, values, point.screening.survey.total, point.current.change
+            )
+        arm, state = point.current.arm, point.screening.state
+        before = None if point.before is None else point.before.and_columns(arm, candidate)
+        nuisance = state.nuisance.and_columns(candidate)
+        others = tuple(one for one in point.found.candidates if one.key != candidate.key)
         return replace(
-            place,
+            point,
             named=tuple(named),
             values=tuple(values),
-            found=replace(place.found, candidates=others),
+            found=replace(point.found, candidates=others),
             before=before,
-            look=look_at(others, replace(here, nuisance=nuisance, before=before, known=None)),
+            screening=screen_candidates(
+                others, replace(state, nuisance=nuisance, before=before, known=None)
+            ),
         )
 
-    def _fitted_place(
+    def _fitted_point(
         self,
-        named: Sequence[Named],
+        named: Sequence[SelectedEffect],
         values: Sequence[FloatArray],
         total: float | None,
         change: FloatArray | None = None,
-    ) -> Place:
+    ) -> SearchPoint:
         """Fit what is named, from values and a change of the body on, and try all candidates."""
         question = self.question
         arm, base = question.nuisance_arm, question.nuisance_base
@@ -293,7 +318,7 @@ class Search:
         nuisance = replace(nuisance, discrepancy=_discrepancy(current, base))
         before = self._before(current)
         work = Workspace(memoized_arm(current.arm), self.evidence.data)
-        here = Round(
+        state = SearchState(
             self.evidence,
             work,
             self.settings,
@@ -303,18 +328,18 @@ class Search:
             before=before,
             since=question.since,
         )
-        look = look_at(found.candidates, here)
+        screening = screen_candidates(found.candidates, state)
         if named:
             named, values = current.named, current.values
-        return Place(tuple(named), tuple(values), current, found, before, look)
+        return SearchPoint(tuple(named), tuple(values), current, found, before, screening)
 
-    def _before(self, current: Fitted) -> Before | None:
+    def _before(self, current: Fitted) -> BaselineRows | None:
         """Return the baseline and unseen recordings, with their residuals of a fitted arm."""
         question, unseen = self.question, self.unseen
         prior = question.nuisance_prior
         if self.baseline is None or prior is None:
             return None
-        before = Before(self.baseline, prior, current.change)
+        before = BaselineRows(self.baseline, prior, current.change)
         if unseen is None:
             return before
         arm, base = question.nuisance_arm, question.nuisance_base
@@ -322,7 +347,7 @@ class Search:
         rank = len(current.change)
         pairs = zip(there.residual, there.columns, strict=True)
         residual = [rest - columns[:, :, :rank] @ current.change for rest, columns in pairs]
-        return replace(before, later=Later.of(unseen, there.columns, residual))
+        return replace(before, later=UnseenRows.of(unseen, there.columns, residual))
 
 
 def _discrepancy(current: Fitted, base: BaseParameters | None) -> tuple[tuple[int, float], ...]:
@@ -332,8 +357,8 @@ def _discrepancy(current: Fitted, base: BaseParameters | None) -> tuple[tuple[in
     names = {quantity.name for quantity in Discrepancy.quantities}
     values = _base_values(current, base)
     return tuple(
-        (place, float(values[place]))
-        for place, column in enumerate(base.independent)
+        (point, float(values[point]))
+        for point, column in enumerate(base.independent)
         if base.standard[column].name in names
     )
 
@@ -343,24 +368,24 @@ def _base_values(fitted: Fitted, base: BaseParameters) -> FloatArray:
     return base.values(fitted.arm.theta[: len(base.standard)])
 
 
-def _offsets(friction: Sequence[Accepted]) -> list[Effect]:
+def _offsets(friction: Sequence[AcceptedCause]) -> list[Effect]:
     """Return those of the effects without given values that are no friction."""
     return [one.named.effect for one in friction if not one.named.effect.traits.friction]
 
 
-def _of(step: Step, question: Question) -> Accepted:
+def _of(step: Step, question: Question) -> AcceptedCause:
     """Return a step as an accepted effect, with the values of its trial."""
     candidate = step.trial.candidate
     values = np.zeros(len(candidate.effect.parameters(question.arm.robot)))
     values[list(candidate.kept)] = step.trial.values
     effect, first = candidate.effect.when_found(values)
     kept = candidate.kept if effect is candidate.effect else tuple(range(len(first)))
-    return Accepted(Named(effect, kept), step, first)
+    return AcceptedCause(SelectedEffect(effect, kept), step, first)
 
 
 def _friction(
-    retrial: Retrial, taken: Sequence[Accepted], whole: tuple[float | None, int]
-) -> tuple[list[Accepted], list[Trial]]:
+    retrial: BackwardElimination, taken: Sequence[AcceptedCause], whole: tuple[float | None, int]
+) -> tuple[list[AcceptedCause], list[Trial]]:
     """
     Return the friction and offsets without given values that stand, and the first trials of all.
 
@@ -377,7 +402,7 @@ def _friction(
     assert base is not None
     named, start = [one.named for one in taken], Start([one.values for one in taken])
     fitted = fit(arm, named, evidence, base, start, question.nuisance_prior)
-    view = View.of(fitted, evidence)
+    view = LinearFit.of(fitted, evidence)
     where = {int(column): k for k, column in enumerate(base.independent)}
     names = [(p.name, p.joint) for p in arm.parameters]
     values = _base_values(fitted, base)
@@ -391,7 +416,7 @@ def _friction(
     gone: list[int] = []
     tried: list[Trial] = []
     while True:
-        there: list[Accepted] = []
+        there: list[AcceptedCause] = []
         weak: list[tuple[tuple[float, float], int]] = []
         seen: list[Trial] = []
         for k, (effect, column, value) in enumerate(alive):
@@ -404,7 +429,7 @@ def _friction(
             total = again.power if whole[0] is None else whole[0]
             step = Step(again.trial, (), (again.trial,), total, whole[1], least)
             if retrial.stands(step, again):
-                there.append(Accepted(Named(effect, (0,)), step, np.array([value])))
+                there.append(AcceptedCause(SelectedEffect(effect, (0,)), step, np.array([value])))
             else:
                 weak.append((doubtful(again.trial), k))
         tried = tried or seen

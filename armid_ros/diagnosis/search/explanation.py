@@ -21,8 +21,8 @@ from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.candidates import Question
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
-from armid_ros.diagnosis.search.held_out import as_change, widened
-from armid_ros.diagnosis.search.round import cost
+from armid_ros.diagnosis.search.held_out import as_change, with_jackknife_std
+from armid_ros.diagnosis.search.search_state import cost
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
@@ -102,7 +102,7 @@ class Explanation:
             Start([self.fitted.values[k] for k in keep], self.fitted.change),
             self.prior,
         )
-        fitted = widened(fitted, self.evidence, self.prior, self.by_chance)
+        fitted = with_jackknife_std(fitted, self.evidence, self.prior, self.by_chance)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def in_arm(self, question: Question) -> Explanation:

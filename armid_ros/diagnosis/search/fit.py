@@ -17,7 +17,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
-from armid_ros.diagnosis.search.trial import Named
+from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import noise_products
@@ -45,7 +45,7 @@ class Fitted:
     ----------
     arm : ArmModel
         The arm; the named effects are its last ones.
-    named : tuple of Named
+    named : tuple of SelectedEffect
         The named effects, with their fitted shapes.
     estimate : Estimate
         Of the parameters of the named effects, shapes included.
@@ -63,7 +63,7 @@ class Fitted:
     """
 
     arm: ArmModel
-    named: tuple[Named, ...]
+    named: tuple[SelectedEffect, ...]
     estimate: Estimate
     residual: tuple[FloatArray, ...]
     columns: tuple[FloatArray, ...]
@@ -103,7 +103,7 @@ class Start:
 
 def fit(
     arm: ArmModel,
-    named: Sequence[Named],
+    named: Sequence[SelectedEffect],
     evidence: Evidence,
     base: BaseParameters | None,
     start: Start | None = None,
@@ -116,7 +116,7 @@ def fit(
     ----------
     arm : ArmModel
         The arm without the named effects.
-    named : sequence of Named
+    named : sequence of SelectedEffect
         The named effects.
     evidence : Evidence
         The data, and the unit that each is weighted by.

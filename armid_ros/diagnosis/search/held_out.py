@@ -33,7 +33,7 @@ from armid_ros.diagnosis.data.rows import (
 )
 from armid_ros.diagnosis.data.trajectory import fold_rows
 from armid_ros.diagnosis.search.fit import Fitted
-from armid_ros.diagnosis.search.round import Before, Nuisance
+from armid_ros.diagnosis.search.search_state import BaselineRows, Nuisance
 from armid_ros.diagnosis.search.trial import Candidate, IDENTIFIABLE, Trial
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.normal_equations import (
@@ -140,7 +140,7 @@ def held_out(
         Held-out squares without any of them.
 
     """
-    return tried_beside(
+    return evaluate_candidates(
         products(problem, free, [one.columns for one in candidates]),
         problem,
         candidates,
@@ -149,7 +149,7 @@ def held_out(
     )
 
 
-def tried_beside(
+def evaluate_candidates(
     known: Products,
     problem: Problem,
     candidates: Sequence[Candidate],
@@ -226,7 +226,9 @@ def _held(
     return inverse, each_times(inverse, aim)
 
 
-def widened(fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: float) -> Fitted:
+def with_jackknife_std(
+    fitted: Fitted, evidence: Evidence, prior: Prior | None, chance: float
+) -> Fitted:
     """
     Widen standard deviations to the spread of values when folds are left out (jackknife).
 
@@ -349,7 +351,9 @@ def _moved_by_values_before(
     candidates = [Candidate(own.effect, slice(0), own.kept, robot) for own in fitted.named]
     every, first = range(len(today.vector)), len(there)
     nuisance = Nuisance(tuple(every), fitted.prior)
-    known = Before(baseline, prior, fitted.change).information(candidates, fitted.arm, nuisance)
+    known = BaselineRows(baseline, prior, fitted.change).information(
+        candidates, fitted.arm, nuisance
+    )
     whole = known + today.among([*(rank + k for k in there), *every])
     scale = np.concatenate([np.abs(fitted.estimate.values[there]), np.ones(len(every))])
     products = whole.matrix * np.outer(scale, scale)

@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.words import place_in, with_named
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.diagnosis.search.trial import Named
+from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters
@@ -34,7 +34,7 @@ class Patch:
     ----------
     arm : ArmModel
         The arm without the named effects, with the present values of its own parameters.
-    named : tuple of Named
+    named : tuple of SelectedEffect
         Effects, with their present shapes.
     values : tuple of ndarray
         All parameters of each effect.
@@ -44,7 +44,7 @@ class Patch:
     """
 
     arm: ArmModel
-    named: tuple[Named, ...]
+    named: tuple[SelectedEffect, ...]
     values: tuple[FloatArray, ...]
     change: FloatArray
 
@@ -83,7 +83,7 @@ class Patch:
                 shape = shape + np.clip(change[start : start + count], -limit, limit)
                 effect = effect.with_shape(np.clip(shape, low, high))
                 start += count
-            named.append(Named(effect, own.kept))
+            named.append(SelectedEffect(effect, own.kept))
         return Patch(arm, tuple(named), tuple(values), body.change)
 
     @property

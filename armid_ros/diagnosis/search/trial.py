@@ -33,7 +33,7 @@ ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class Named:
+class SelectedEffect:
     """
     A named effect, as it is fitted.
 
@@ -100,7 +100,7 @@ class Candidate:
         return int(self.columns.stop) - int(self.columns.start)
 
 
-def denies(cross: FloatArray, square: FloatArray) -> bool:
+def contradicts(cross: FloatArray, square: FloatArray) -> bool:
     """
     Return whether data deny a cause: they follow it no more than noise would.
 
@@ -294,10 +294,10 @@ class Step:
     misfit_share: float | None
 
 
-class Accepted(NamedTuple):
+class AcceptedCause(NamedTuple):
     """A named effect with its step, and the values of all its parameters."""
 
-    named: Named
+    named: SelectedEffect
     step: Step
     values: FloatArray
 

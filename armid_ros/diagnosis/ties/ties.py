@@ -22,14 +22,21 @@ from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.prepare import Prepared
 from armid_ros.diagnosis.search.candidates import candidates, Question
+from armid_ros.diagnosis.search.elimination import LinearFit
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.look import look_at
-from armid_ros.diagnosis.search.prune import View
-from armid_ros.diagnosis.search.round import Nuisance, Round
-from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Survey, Trial
+from armid_ros.diagnosis.search.screening import screen_candidates
+from armid_ros.diagnosis.search.search_state import Nuisance, SearchState
+from armid_ros.diagnosis.search.trial import (
+    AcceptedCause,
+    Candidate,
+    SelectedEffect,
+    Step,
+    Survey,
+    Trial,
+)
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
@@ -134,7 +141,7 @@ class Ties:
         gain = self._squares(taut) - self._squares(found)
         return found if gain > _LEAST_GAIN * noise else taut
 
-    def fitted(self, named: Sequence[Named], start: Sequence[FloatArray] = ()) -> Fitted:
+    def fitted(self, named: Sequence[SelectedEffect], start: Sequence[FloatArray] = ()) -> Fitted:
         """Fit the arm with named effects, from start values."""
         return fit(self.arm, named, self.evidence, self.base, Start(start))
 
@@ -142,7 +149,7 @@ class Ties:
         """Return the loss of each joint, shape (n,)."""
         return self.evidence.chi2_per_row(fitted.residual)
 
-    def surely(self, named: Sequence[Named]) -> Fitted:
+    def surely(self, named: Sequence[SelectedEffect]) -> Fitted:
         """Fit, and remove ties, the weakest first, until all are significant."""
         kept, sure = list(named), self.sure(0.0)
         while True:
@@ -159,14 +166,14 @@ class Ties:
             gone = min(weak)[1]
             kept = [own for k, own in enumerate(fitted.named) if k != gone]
 
-    def _plain(self, joint: str, kept: tuple[int, ...] = (0,)) -> Named:
-        return Named(self.partner.interaction.on(self.arm.robot, (joint,)), kept)
+    def _plain(self, joint: str, kept: tuple[int, ...] = (0,)) -> SelectedEffect:
+        return SelectedEffect(self.partner.interaction.on(self.arm.robot, (joint,)), kept)
 
-    def _loose(self, joint: str, slack: float) -> Named:
+    def _loose(self, joint: str, slack: float) -> SelectedEffect:
         strap = self.partner.slack.on(self.arm.robot, (joint,))
-        return Named(strap.with_shape([slack]), (0,))
+        return SelectedEffect(strap.with_shape([slack]), (0,))
 
-    def _start(self, named: Sequence[Named], stiffness: FloatArray) -> list[FloatArray]:
+    def _start(self, named: Sequence[SelectedEffect], stiffness: FloatArray) -> list[FloatArray]:
         sizes = [len(own.effect.parameters(self.arm.robot)) for own in named]
         rows = zip(stiffness, sizes, strict=True)
         return [np.array([max(k, 0.0), *np.zeros(size - 1)]) for k, size in rows]
@@ -260,7 +267,7 @@ def diagnose_ties(
         most = settings.thresholds.many_causes
         question = Question(arm, prepared.base, arm, prepared.base, (), most)
         rows = zip(fitted.named, found.steps, fitted.values, strict=True)
-        known = [Accepted(*row) for row in rows]
+        known = [AcceptedCause(*row) for row in rows]
         more = explain(question, found.evidence, settings, known)
         fitted = ties.surely(more.fitted.named)
         if not any(isinstance(own.effect, Tied) for own in fitted.named):
@@ -314,7 +321,7 @@ def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
     """Return the explanation with a step for each tie, tried jointly with the others."""
     reference = ties.fitted(())
     survey, rivals = _rivals(ties, reference, fitted)
-    view = View.of(fitted, ties.evidence)
+    view = LinearFit.of(fitted, ties.evidence)
     share = ties.settings.thresholds.misfit_share
     steps = []
     for k in range(len(fitted.named)):
@@ -350,8 +357,8 @@ def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tupl
     nuisance = Nuisance(free, reference.prior)
     trials, power = held_out(problem, free, [candidate], nuisance.prior)
     work = Workspace(memoized_arm(reference.arm), data)
-    here = Round(evidence, work, settings, problem, nuisance, float(power.sum()))
-    look = look_at(found.candidates, here)
+    here = SearchState(evidence, work, settings, problem, nuisance, float(power.sum()))
+    look = screen_candidates(found.candidates, here)
     step, survey = look.step(), look.survey
     survey = replace(survey, ranking=(*trials, *survey.ranking), tried=survey.tried + 1)
     if step is None or not trials:

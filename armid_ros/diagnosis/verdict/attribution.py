@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.elimination import columns_of, LinearFit
 from armid_ros.diagnosis.search.explanation import (
     as_bodies,
     Chosen,
@@ -23,8 +24,7 @@ from armid_ros.diagnosis.search.explanation import (
     in_model_as_given,
 )
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.prune import columns_of, View
-from armid_ros.diagnosis.search.trial import Candidate, denies
+from armid_ros.diagnosis.search.trial import Candidate, contradicts
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.motion import FloatArray
@@ -54,7 +54,7 @@ class Attribution:
     taken : ndarray, shape (K, B)
         Gain of each name, in the order of the explanation.
     denied : tuple of int
-        Names that the held-out data deny, last of the order first; see `denies`.
+        Names that the held-out data deny, last of the order first; see `contradicts`.
     predicted : bool
         Whether it is of held-out data, and not of folds of the data that names were fitted to.
     folds : Attribution or None
@@ -101,7 +101,7 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
 
 def _left_out(explanation: Explanation) -> Attribution:
     """Predict each fold from the others, adding the name with the largest gain at a time."""
-    view = View.of(explanation.fitted, explanation.evidence)
+    view = LinearFit.of(explanation.fitted, explanation.evidence)
     named = explanation.fitted.named
     arm = explanation.reference.arm
     columns = [view.columns(k)[0] for k in range(len(named))]
@@ -159,7 +159,7 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
         made = unseen.block_squares([before - after for before, after in steps])
         own = _acts(explanation, k, unseen)
         taken[k] = gain.sum(axis=1)
-        if denies((gain + made)[:, own].sum(axis=1) / 2.0, made[:, own].sum(axis=1)):
+        if contradicts((gain + made)[:, own].sum(axis=1) / 2.0, made[:, own].sum(axis=1)):
             denied.append(k)
     whole = squares[0].sum(axis=1)
     return Attribution(tuple(order), whole, taken, tuple(reversed(denied)), predicted=True)
@@ -296,7 +296,7 @@ def smallest(
     found = shares.folds or shares
     for k in sorted(range(len(explanation.steps)), key=lambda k: shares.share([k])):
         most = shares.share([k]) > settings.thresholds.open_share
-        if not most and may_be_nothing(explanation, k):
+        if not most and may_be_zero(explanation, k):
             return k
         small = max(shares.share([k]), found.share([k])) < least
         if small and not _opens(explanation.without(k), explanation, settings):
@@ -327,7 +327,7 @@ def shares_of(
     return replace(left_out, denied=seen.denied)
 
 
-def may_be_nothing(explanation: Explanation, name: int) -> bool:
+def may_be_zero(explanation: Explanation, name: int) -> bool:
     """
     Return whether the 95 % interval of every value of a name contains zero.
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.trial import Named, Step, Survey, Trial
+from armid_ros.diagnosis.search.trial import SelectedEffect, Step, Survey, Trial
 from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.diagnosis.verdict.words import Unnamed
@@ -27,7 +27,7 @@ _ALONG = 1e-6
 
 
 @dataclass(frozen=True)
-class _Said:
+class _NamedEffect:
     """One name of an explanation as an effect of the catalogue."""
 
     effect: Effect
@@ -94,7 +94,7 @@ def findings(
     return tuple(sorted(result, key=lambda one: -one.share))
 
 
-def _rows(parts: Sequence[_Said]) -> list[tuple[ParameterName, float, float]]:
+def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, float]]:
     """Return the parameters of effects of one name, each once, with values and deviations."""
     rows: dict[ParameterName, tuple[float, float]] = {}
     for part in parts:
@@ -188,7 +188,7 @@ def _can_be(trial: Trial, arm: ArmModel) -> bool:
     return not np.any(beyond & excludes_zero(trial.values, trial.std))
 
 
-def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
+def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect]]:
     """Return the effects of the catalogue that each name of an explanation stands for."""
     fitted = explanation.fitted
     covariance = fitted.estimate.covariance
@@ -199,7 +199,7 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
         if len(words) == 1 and words[0][0] is own.effect:
             result.append(
                 [
-                    _Said(
+                    _NamedEffect(
                         own.effect,
                         fitted.estimate.parameters[span],
                         fitted.estimate.values[span],
@@ -214,8 +214,8 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_Said]]:
 
 
 def _translated(
-    own: Named, values: FloatArray, covariance: FloatArray, arm: ArmModel
-) -> list[_Said]:
+    own: SelectedEffect, values: FloatArray, covariance: FloatArray, arm: ArmModel
+) -> list[_NamedEffect]:
     """Translate an effect into others of the catalogue, deviations by linear propagation."""
     effect, kept, parts = own.effect, list(own.kept), []
     inside = np.zeros((len(values), len(values)))
@@ -241,11 +241,11 @@ def _translated(
         if word.shape:
             names += word.shape_parameters(arm.robot)
             numbers, std = np.append(numbers, word.shape), np.append(std, of_shape)
-        parts.append(_Said(word, names, numbers, std))
+        parts.append(_NamedEffect(word, names, numbers, std))
     return parts
 
 
-def _determined(part: _Said) -> bool:
+def _determined(part: _NamedEffect) -> bool:
     """Return whether any value is three deviations from zero, and larger than is negligible."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     count = len(part.values) - len(part.effect.shape)

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.round import cost
+from armid_ros.diagnosis.search.search_state import cost
 from armid_ros.diagnosis.search.trial import Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.document import share_alone

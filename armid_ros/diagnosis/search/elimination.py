@@ -23,15 +23,15 @@ from armid_ros.diagnosis.search.acceptance import acceptable, beyond_chance, mat
 from armid_ros.diagnosis.search.candidates import Question
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
 from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.round import Nuisance, Round
-from armid_ros.diagnosis.search.trial import Accepted, Candidate, Named, Step, Trial
+from armid_ros.diagnosis.search.search_state import Nuisance, SearchState
+from armid_ros.diagnosis.search.trial import AcceptedCause, Candidate, SelectedEffect, Step, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 
 
-class Again(NamedTuple):
+class JointTrial(NamedTuple):
     """
     Trial of a fitted effect, as if it were a candidate now.
 
@@ -55,7 +55,7 @@ class Again(NamedTuple):
 
 
 @dataclass(frozen=True)
-class View:
+class LinearFit:
     """
     A fitted arm as a linear problem, from which names and nuisance columns can be removed again.
 
@@ -65,17 +65,19 @@ class View:
         All Jacobian columns of the fit, those of the base parameters first, and those of ``more``.
     fitted : Fitted
         The arm.
-    more : tuple of Named
+    more : tuple of SelectedEffect
         Effects that were not fitted, at values of zero.
 
     """
 
     problem: Problem
     fitted: Fitted
-    more: tuple[Named, ...] = ()
+    more: tuple[SelectedEffect, ...] = ()
 
     @classmethod
-    def of(cls, fitted: Fitted, evidence: Evidence, more: Sequence[Named] = ()) -> View:
+    def of(
+        cls, fitted: Fitted, evidence: Evidence, more: Sequence[SelectedEffect] = ()
+    ) -> LinearFit:
         """Make the problem of a fitted arm, and of further effects."""
         columns = [
             np.concatenate([own, *(columns_of(one, fitted.arm, part) for one in more)], axis=2)
@@ -144,7 +146,7 @@ class View:
         free = tuple(range(len(columns), len(columns) + len(others)))
         return moved, free, self.fitted.prior.among(others)
 
-    def dropped(self, column: int, value: float) -> View:
+    def dropped(self, column: int, value: float) -> LinearFit:
         """Return the view as if a column had a value of zero."""
         y = self.problem.y + self.problem.x[:, :, column] * value
         return replace(self, problem=replace(self.problem, y=y))
@@ -155,15 +157,15 @@ class View:
         columns: Sequence[int],
         values: Sequence[float],
         gone: Sequence[int] = (),
-    ) -> Again:
+    ) -> JointTrial:
         """Try fitted columns as if they belonged to a candidate now."""
         problem, free, prior = self.without(columns, values, gone)
         moved = replace(candidate, columns=slice(0, len(columns)))
         trials, power = held_out(problem, free, [moved], prior)
         trial = trials[0] if trials else None
-        return Again(trial, problem, Nuisance(free, prior), float(power.sum()))
+        return JointTrial(trial, problem, Nuisance(free, prior), float(power.sum()))
 
-    def trial_of(self, name: int) -> Again:
+    def trial_of(self, name: int) -> JointTrial:
         """Try a name as if it were a candidate now, jointly with those that were fitted."""
         own = (*self.fitted.named, *self.more)[name]
         columns, shapes = self.columns(name)
@@ -174,7 +176,7 @@ class View:
         return self.trial(candidate, columns, [self.value(c) for c in columns], gone)
 
 
-def columns_of(own: Named, arm: ArmModel, part: Trajectory) -> FloatArray:
+def columns_of(own: SelectedEffect, arm: ArmModel, part: Trajectory) -> FloatArray:
     """Return the columns of a name in rows, shape (M, n, p)."""
     return part.columns(arm, own.effect)[:, :, list(own.kept)]
 
@@ -185,7 +187,7 @@ def doubtful(trial: Trial | None) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Retrial:
+class BackwardElimination:
     """
     Tries each accepted cause again, jointly with the others, under the conditions of its step.
 
@@ -217,9 +219,9 @@ class Retrial:
     @cached_property
     def gap(self) -> float:
         """Held-out squares with nothing named."""
-        return float(View.of(self.reference, self.evidence).power.sum())
+        return float(LinearFit.of(self.reference, self.evidence).power.sum())
 
-    def stands(self, step: Step, again: Again) -> bool:
+    def stands(self, step: Step, again: JointTrial) -> bool:
         """
         Return whether a cause is significant, and material where it has to be.
 
@@ -229,7 +231,7 @@ class Retrial:
         """
         if again.trial is None:
             return False
-        here = Round(
+        state = SearchState(
             self.evidence,
             self.work,
             self.settings,
@@ -241,11 +243,11 @@ class Retrial:
             since=self.question.since,
         )
         if step.misfit_share is None:
-            return beyond_chance(again.trial, here)
-        gains = again.trial.joint_gains(*here.rows_of(again.trial.candidate))
-        return acceptable(again.trial, here) and material(gains, here, step.misfit_share)
+            return beyond_chance(again.trial, state)
+        gains = again.trial.joint_gains(*state.rows_of(again.trial.candidate))
+        return acceptable(again.trial, state) and material(gains, state, step.misfit_share)
 
-    def fitted(self, names: Sequence[Accepted], change: FloatArray | None) -> Fitted:
+    def fitted(self, names: Sequence[AcceptedCause], change: FloatArray | None) -> Fitted:
         """Fit all names jointly, from their values and a change of the base parameters on."""
         question, evidence = self.question, self.evidence
         return fit(
@@ -257,11 +259,11 @@ class Retrial:
             question.prior,
         )
 
-    def needless(self, fitted: Fitted, names: Sequence[Accepted]) -> int | None:
+    def least_significant(self, fitted: Fitted, names: Sequence[AcceptedCause]) -> int | None:
         """Return the name that is likeliest to be chance given the others; None if all stand."""
         if not names:
             return None
-        view = View.of(fitted, self.evidence)
+        view = LinearFit.of(fitted, self.evidence)
         judged = [view.trial_of(k) for k in range(len(names))]
         weak = [
             (doubtful(again.trial), k)
@@ -270,13 +272,13 @@ class Retrial:
         ]
         return max(weak)[1] if weak else None
 
-    def needed_after_all(
-        self, fitted: Fitted, dropped: Sequence[Accepted]
+    def significant_again(
+        self, fitted: Fitted, dropped: Sequence[AcceptedCause]
     ) -> tuple[int, FloatArray] | None:
         """Return the dropped name that gains most given those that stay, and its values."""
         if not dropped:
             return None
-        view = View.of(fitted, self.evidence, [one.named for one in dropped])
+        view = LinearFit.of(fitted, self.evidence, [one.named for one in dropped])
         found: dict[int, Trial] = {}
         for k, one in enumerate(dropped):
             again = view.trial_of(len(fitted.named) + k)
@@ -291,7 +293,7 @@ class Retrial:
 
 
 def pruned(
-    retrial: Retrial, taken: Sequence[Accepted], change: FloatArray | None = None
+    retrial: BackwardElimination, taken: Sequence[AcceptedCause], change: FloatArray | None = None
 ) -> tuple[tuple[Step, ...], Fitted]:
     """
     Fit all names jointly, and drop those that the others make needless.
@@ -307,20 +309,20 @@ def pruned(
         The arm with these names.
 
     """
-    alive, dropped = list(taken), list[Accepted]()
+    alive, dropped = list(taken), list[AcceptedCause]()
     back: list[Step] = []
     while True:
         fitted = retrial.fitted(alive, change)
         steps, change = tuple(one.step for one in alive), fitted.change
         rows = zip(fitted.named, steps, fitted.values, strict=True)
-        alive = [Accepted(*row) for row in rows]
-        needless = retrial.needless(fitted, alive)
-        if needless is not None:
-            gone = alive.pop(needless)
+        alive = [AcceptedCause(*row) for row in rows]
+        least_significant = retrial.least_significant(fitted, alive)
+        if least_significant is not None:
+            gone = alive.pop(least_significant)
             if not any(gone.step is step for step in back):
                 dropped.append(gone)
             continue
-        needed = retrial.needed_after_all(fitted, dropped)
+        needed = retrial.significant_again(fitted, dropped)
         if needed is None:
             return steps, fitted
         again = dropped.pop(needed[0])._replace(values=needed[1])

@@ -20,7 +20,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Leaving:
+class RemainingMisfit:
     """
     What is left of the data of an explanation, measured.
 

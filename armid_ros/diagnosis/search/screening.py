@@ -27,17 +27,17 @@ from armid_ros.diagnosis.search.acceptance import (
     without_echo,
 )
 from armid_ros.diagnosis.search.candidates import refine
-from armid_ros.diagnosis.search.held_out import tried_beside
-from armid_ros.diagnosis.search.round import (
+from armid_ros.diagnosis.search.held_out import evaluate_candidates
+from armid_ros.diagnosis.search.search_state import (
     beaten,
     closes,
     cost,
     Frequency,
     frequency,
-    likeliest,
+    is_redundant,
+    most_plausible,
     rarity,
-    Round,
-    says_no_more,
+    SearchState,
     worth,
 )
 from armid_ros.diagnosis.search.trial import Candidate, Key, Step, Survey, Trial
@@ -59,7 +59,7 @@ _SMALL_PRINT = 5
 
 
 @dataclass(frozen=True)
-class Look:
+class Screening:
     """
     Trials of all candidates jointly with the nuisance parameters; one may be accepted.
 
@@ -73,7 +73,7 @@ class Look:
         Whether each of them leaves no gap.
     ranking : tuple of Trial
         The best candidates, one per name and joints, best first.
-    here : Round
+    here : SearchState
         The round that was searched; columns of refined shapes come after all others.
 
     """
@@ -82,7 +82,7 @@ class Look:
     passing: tuple[Trial, ...]
     closing: dict[Key, bool]
     ranking: tuple[Trial, ...]
-    here: Round
+    state: SearchState
 
     def step(self) -> Step | None:
         """
@@ -91,31 +91,31 @@ class Look:
         A candidate that gains as much stays a rival of it, whether it has surely changed or not.
 
         """
-        here = self.here
-        ahead = list(takewhile(lambda trial: not changed(trial, here), self.passing))
+        state = self.state
+        ahead = list(takewhile(lambda trial: not changed(trial, state), self.passing))
         if len(ahead) == len(self.passing):
             return None
         passing = list(self.passing[len(ahead) :])
-        parts = _joint_by_joint(passing, self.ranking, here)
+        parts = _joint_by_joint(passing, self.ranking, state)
         if parts:
-            where = _touched(parts[0], here)
-            passing = [trial for trial in passing if _touched(trial, here) == where]
-            ahead = [trial for trial in ahead if _touched(trial, here) == where]
+            where = _touched(parts[0], state)
+            passing = [trial for trial in passing if _touched(trial, state) == where]
+            ahead = [trial for trial in ahead if _touched(trial, state) == where]
         first, *others = passing
-        behind = [trial for trial in others if not beaten(trial, first, here)]
-        able = [first, *(trial for trial in behind if changed(trial, here))]
-        winner = likeliest(able, self.closing, here)
-        tied = [*(trial for trial in ahead if not beaten(first, trial, here)), first, *behind]
+        behind = [trial for trial in others if not beaten(trial, first, state)]
+        able = [first, *(trial for trial in behind if changed(trial, state))]
+        winner = most_plausible(able, self.closing, state)
+        tied = [*(trial for trial in ahead if not beaten(first, trial, state)), first, *behind]
         rivals = [
             trial
             for trial in tied
             if trial is not winner
-            and not beaten(trial, winner, here)
-            and not says_no_more(trial, winner, here)
+            and not beaten(trial, winner, state)
+            and not is_redundant(trial, winner, state)
         ]
         best = {trial.candidate.effect.name: trial for trial in reversed(rivals)}
         likely = sorted(
-            best.values(), key=lambda t: (frequency(t, here) is Frequency.NEVER, rarity(t))
+            best.values(), key=lambda t: (frequency(t, state) is Frequency.NEVER, rarity(t))
         )
         return Step(
             winner,
@@ -123,40 +123,40 @@ class Look:
             self.ranking,
             self.survey.total,
             self.survey.tried,
-            _misfit_share(here),
+            _misfit_share(state),
         )
 
 
-def look_at(candidates: Sequence[Candidate], here: Round) -> Look:
+def screen_candidates(candidates: Sequence[Candidate], state: SearchState) -> Screening:
     """Try every candidate jointly with the nuisance parameters."""
-    nuisance = here.nuisance
-    known = products(here.problem, nuisance.free, [one.columns for one in candidates])
-    trials, power = tried_beside(known, here.problem, candidates, nuisance.prior)
-    total = float(power.sum()) if here.total is None else here.total
+    nuisance = state.nuisance
+    known = products(state.problem, nuisance.free, [one.columns for one in candidates])
+    trials, power = evaluate_candidates(known, state.problem, candidates, nuisance.prior)
+    total = float(power.sum()) if state.total is None else state.total
     if nuisance.discrepancy:
         places, values = zip(*nuisance.discrepancy, strict=True)
         alone, prior = set_to_zero(known, nuisance.prior, places, np.array(values))
-        _, power = tried_beside(alone, here.problem, (), prior)
-    here = replace(here, total=total, power=float(power.sum()), known=known)
-    seen = [t for t in trials if t.visible >= here.settings.thresholds.least_visible]
-    ranking = _best_per_key(seen, here)
-    here = replace(here, tried=max(len(seen), 1))
-    refined, here = _with_refined_shapes(ranking, here)
-    here = replace(here, tested=tested(refined[:_LOOKED_AT], here))
-    survey = _survey(candidates, ranking, here)
-    ranking, there, closing, here = _examined(refined, here)
-    passing = tuple(_passing(ranking, closing, here))
-    suspected = next((trial for trial in passing if may_have_changed(trial, here)), None)
-    first = ranking[0] if ranking and acceptable(ranking[0], here) else None
-    unproven = None if first is None or _changes([first], here) != [None] else first
+        _, power = evaluate_candidates(alone, state.problem, (), prior)
+    state = replace(state, total=total, power=float(power.sum()), known=known)
+    seen = [t for t in trials if t.visible >= state.settings.thresholds.least_visible]
+    ranking = _best_per_key(seen, state)
+    state = replace(state, tried=max(len(seen), 1))
+    refined, state = _with_refined_shapes(ranking, state)
+    state = replace(state, tested=tested(refined[:_LOOKED_AT], state))
+    survey = _survey(candidates, ranking, state)
+    ranking, there, closing, state = _examined(refined, state)
+    passing = tuple(_passing(ranking, closing, state))
+    suspected = next((trial for trial in passing if may_have_changed(trial, state)), None)
+    first = ranking[0] if ranking and acceptable(ranking[0], state) else None
+    unproven = None if first is None or _changes([first], state) != [None] else first
     there = there[:_SMALL_PRINT]
     survey = replace(survey, there=tuple(there), suspected=suspected, unproven=unproven)
-    return Look(survey, passing, closing, tuple(ranking), here)
+    return Screening(survey, passing, closing, tuple(ranking), state)
 
 
-def _best_per_key(trials: Sequence[Trial], here: Round) -> list[Trial]:
+def _best_per_key(trials: Sequence[Trial], state: SearchState) -> list[Trial]:
     best: dict[object, Trial] = {}
-    for trial in sorted(trials, key=lambda t: -worth(t, here)):
+    for trial in sorted(trials, key=lambda t: -worth(t, state)):
         best.setdefault(trial.candidate.key, trial)
     return list(best.values())
 
@@ -171,7 +171,7 @@ def _part(candidate: Candidate, possible: Sequence[int], first: int) -> Candidat
 
 
 def _joint_by_joint(
-    passing: Sequence[Trial], ranking: Sequence[Trial], here: Round
+    passing: Sequence[Trial], ranking: Sequence[Trial], state: SearchState
 ) -> list[Trial]:
     """
     Return candidates of single joints that together beat the best one, if it acts on several.
@@ -184,70 +184,74 @@ def _joint_by_joint(
 
     """
     first = passing[0]
-    if len(_touched(first, here)) < 2:
+    if len(_touched(first, state)) < 2:
         return []
     groups: defaultdict[str, dict[tuple[int, ...], Trial]] = defaultdict(dict)
     for trial in ranking[:_LOOKED_AT]:
-        where = _touched(trial, here)
-        if len(where) == 1 and acceptable(trial, here):
+        where = _touched(trial, state)
+        if len(where) == 1 and acceptable(trial, state):
             groups[trial.candidate.effect.name].setdefault(where, trial)
             if first.candidate.effect.traits.external:
                 groups[_ANY].setdefault(where, trial)
-    single = [trial for trial in passing if len(_touched(trial, here)) == 1]
-    able = [trial.candidate.key for trial in single if changed(trial, here)]
+    single = [trial for trial in passing if len(_touched(trial, state)) == 1]
+    able = [trial.candidate.key for trial in single if changed(trial, state)]
     found = [[*group.values()] for group in groups.values()]
     found = [group for group in found if any(trial.candidate.key in able for trial in group)]
     if not found:
         return []
-    parts = max(found, key=lambda group: sum(worth(trial, here) for trial in group))
+    parts = max(found, key=lambda group: sum(worth(trial, state) for trial in group))
     cross, square = (sum(getattr(t, name) for t in parts) for name in ('cross', 'square'))
     resolution = np.concatenate([trial.resolution for trial in parts])
     whole = replace(parts[0], cross=cross, square=square, resolution=resolution)
-    simpler = sum(cost(trial, here.settings) for trial in parts) <= cost(first, here.settings)
+    simpler = sum(cost(trial, state.settings) for trial in parts) <= cost(first, state.settings)
     simpler = simpler or first.candidate.effect.traits.common
-    if not (simpler and whole.gain > first.gain and beaten(first, whole, here)):
+    if not (simpler and whole.gain > first.gain and beaten(first, whole, state)):
         return []
-    return sorted(parts, key=lambda trial: (trial.candidate.key not in able, -worth(trial, here)))
+    return sorted(parts, key=lambda trial: (trial.candidate.key not in able, -worth(trial, state)))
 
 
-def _touched(trial: Trial, here: Round) -> tuple[int, ...]:
+def _touched(trial: Trial, state: SearchState) -> tuple[int, ...]:
     """Return the joints whose torque a candidate changes."""
-    return tuple(np.flatnonzero(np.any(here.own(trial.candidate), axis=(0, 2))).tolist())
+    return tuple(np.flatnonzero(np.any(state.own(trial.candidate), axis=(0, 2))).tolist())
 
 
-def _survey(candidates: Sequence[Candidate], ranking: Sequence[Trial], here: Round) -> Survey:
-    assert here.total is not None
+def _survey(
+    candidates: Sequence[Candidate], ranking: Sequence[Trial], state: SearchState
+) -> Survey:
+    assert state.total is not None
     visible = {trial.candidate.effect.said_as for trial in ranking}
     seen = {trial.candidate.key[:2] for trial in ranking}
     return Survey(
         tuple(ranking),
-        {trial.candidate.key: _least_sizes(trial, here) for trial in ranking},
+        {trial.candidate.key: _least_sizes(trial, state) for trial in ranking},
         frozenset(candidate.effect.said_as for candidate in candidates) - visible,
-        here.total,
-        here.tried,
+        state.total,
+        state.tried,
         tuple(dict.fromkeys(g.key[:2] for g in candidates if g.key[:2] not in seen)),
     )
 
 
-def _misfit_share(here: Round) -> float:
+def _misfit_share(state: SearchState) -> float:
     """Return the share of the misfit that a cause has to take: none where recordings tell."""
-    return here.settings.thresholds.misfit_share if here.tested is None else 0.0
+    return state.settings.thresholds.misfit_share if state.tested is None else 0.0
 
 
-def _least_sizes(trial: Trial, here: Round) -> FloatArray:
+def _least_sizes(trial: Trial, state: SearchState) -> FloatArray:
     """Return the sizes of values, (p,), from which on they are material, and have changed."""
-    least = material_sizes(trial, here, _misfit_share(here))
-    if here.tested is None:
+    least = material_sizes(trial, state, _misfit_share(state))
+    if state.tested is None:
         return least
-    beyond = material_sizes(trial, here, here.settings.thresholds.other_motion)
-    return np.maximum(least, np.minimum(here.tested.deviations * trial.std, beyond))
+    beyond = material_sizes(trial, state, state.settings.thresholds.other_motion)
+    return np.maximum(least, np.minimum(state.tested.deviations * trial.std, beyond))
 
 
-def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial], Round]:
+def _with_refined_shapes(
+    ranking: list[Trial], state: SearchState
+) -> tuple[list[Trial], SearchState]:
     """Refine shapes of the best candidates; return the ranking and a round with their columns."""
-    problem = here.problem
+    problem = state.problem
     best = max(
-        (worth(t, here) for t in ranking if not t.candidate.effect.traits.external), default=0.0
+        (worth(t, state) for t in ranking if not t.candidate.effect.traits.external), default=0.0
     )
     refined: list[Trial] = []
     found: list[FloatArray] = []
@@ -255,18 +259,18 @@ def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial]
     tried: Counter[str] = Counter()
     for trial in ranking[:_LOOKED_AT]:
         effect = trial.candidate.effect
-        promising = worth(trial, here) > _PROMISING * best and len(refined) < _REFINED
+        promising = worth(trial, state) > _PROMISING * best and len(refined) < _REFINED
         promising = promising and tried[effect.name] < _REFINED // 2
         if not (promising and trial.gain > 0.0):
             continue
         tried[effect.name] += 1
-        possible = [k for k, good in enumerate(inside(trial, here)) if good]
+        possible = [k for k, good in enumerate(inside(trial, state)) if good]
         if 0 < len(possible) < trial.candidate.size:
-            own = here.own(trial.candidate)[:, :, possible]
+            own = state.own(trial.candidate)[:, :, possible]
             candidate = _part(trial.candidate, possible, first)
             first += len(possible)
             found.append(own / np.where(problem.weight > 0.0, problem.weight, 1.0)[:, :, None])
-            bounded = _alone(candidate, own, here)
+            bounded = _alone(candidate, own, state)
             if bounded is None:
                 continue
             trial = replace(bounded, candidate=candidate)
@@ -274,23 +278,23 @@ def _with_refined_shapes(ranking: list[Trial], here: Round) -> tuple[list[Trial]
         if not effect.shapes:
             continue
         candidate, columns = refine(
-            problem, here.projection, trial.candidate, here.residual, here.work
+            problem, state.projection, trial.candidate, state.residual, state.work
         )
         span = slice(first, first + columns.shape[2])
         first = span.stop
         found.append(columns)
         weighted = columns * problem.weight[:, :, np.newaxis]
-        better = _alone(candidate, weighted, here)
+        better = _alone(candidate, weighted, state)
         moved = replace(candidate, columns=span)
         refined += [] if better is None else [replace(better, candidate=moved)]
     if found:
-        here = replace(here, problem=problem.with_columns(np.concatenate(found, axis=2)))
-    return _best_per_key([*ranking, *refined], here), here
+        state = replace(state, problem=problem.with_columns(np.concatenate(found, axis=2)))
+    return _best_per_key([*ranking, *refined], state), state
 
 
 def _examined(
-    ranking: Sequence[Trial], here: Round
-) -> tuple[list[Trial], list[Trial], dict[Key, bool], Round]:
+    ranking: Sequence[Trial], state: SearchState
+) -> tuple[list[Trial], list[Trial], dict[Key, bool], SearchState]:
     """
     Return the ranking, what is there, whether each that matters leaves no gap, and the round.
 
@@ -302,46 +306,48 @@ def _examined(
     that anything has changed, unless one of them does by itself.
 
     """
-    assert here.total is not None
-    least = 0.0 if here.before is None else here.settings.thresholds.headline * here.total
-    most = here.settings.thresholds.open_share
-    open_squares = _open_squares(here)
+    assert state.total is not None
+    least = 0.0 if state.before is None else state.settings.thresholds.headline * state.total
+    most = state.settings.thresholds.open_share
+    open_squares = _open_squares(state)
     there: list[Trial] = []
     large: list[tuple[Trial, Trial]] = []
     certain: list[Key] = []
     for trial in ranking[:_LOOKED_AT]:
-        if not acceptable(trial, here):
+        if not acceptable(trial, state):
             continue
-        (change,) = _changes([trial], here)
-        if change is None or not acceptable(change, here):
+        (change,) = _changes([trial], state)
+        if change is None or not acceptable(change, state):
             continue
-        takes = trial.joint_gains(*here.rows_of(trial.candidate))
-        size = _size(change, takes, here)
-        if here.tested is not None and material(size, here, here.settings.thresholds.other_motion):
+        takes = trial.joint_gains(*state.rows_of(trial.candidate))
+        size = _size(change, takes, state)
+        if state.tested is not None and material(
+            size, state, state.settings.thresholds.other_motion
+        ):
             certain.append(trial.candidate.key)
         there.append(change)
         matters = size.sum() >= least or bool(np.any(takes > most * open_squares))
-        if matters and material(size, here, _misfit_share(here)):
+        if matters and material(size, state, _misfit_share(state)):
             large.append((trial, change))
     best = [trial for trial, _ in large[:_COMPARED]]
     others = [trial for trial in ranking if not any(trial is one for one in best)]
-    compared = _compared(best, [change for _, change in large[:_COMPARED]], here)
+    compared = _compared(best, [change for _, change in large[:_COMPARED]], state)
     pairs = zip(compared, best, strict=True)
-    closing = {change.candidate.key: closes(trial, here) for change, trial in pairs}
-    result = sorted([*others, *compared], key=lambda t: -worth(t, here))
-    if here.tested is not None:  # what cannot be named, or is a misfit of all joints alike
+    closing = {change.candidate.key: closes(trial, state) for change, trial in pairs}
+    result = sorted([*others, *compared], key=lambda t: -worth(t, state))
+    if state.tested is not None:  # what cannot be named, or is a misfit of all joints alike
         able = [one.candidate.key for one in compared if not one.candidate.effect.traits.common]
-        here = replace(here, tested=here.tested.among(able, certain))
-    there = [change for change in there if changed(change, here)]
-    return result, sorted(there, key=lambda t: -worth(t, here)), closing, here
+        state = replace(state, tested=state.tested.among(able, certain))
+    there = [change for change in there if changed(change, state)]
+    return result, sorted(there, key=lambda t: -worth(t, state)), closing, state
 
 
-def _open_squares(here: Round) -> FloatArray:
+def _open_squares(state: SearchState) -> FloatArray:
     """Return the squares of every joint that has a gap; infinite where there is none, (n,)."""
-    return np.where(here.gaps(here.residual), np.sum(here.residual**2, axis=0), np.inf)
+    return np.where(state.gaps(state.residual), np.sum(state.residual**2, axis=0), np.inf)
 
 
-def _compared(trials: Sequence[Trial], alone: Sequence[Trial], here: Round) -> list[Trial]:
+def _compared(trials: Sequence[Trial], alone: Sequence[Trial], state: SearchState) -> list[Trial]:
     """
     Return the changes of candidates, jointly with all baseline values, on the scale of the gap.
 
@@ -351,11 +357,11 @@ def _compared(trials: Sequence[Trial], alone: Sequence[Trial], here: Round) -> l
     changes are those jointly with the own baseline value alone.
 
     """
-    if here.before is None or len(trials) < 2:
+    if state.before is None or len(trials) < 2:
         return list(trials)
-    found = _changes(trials, here)
+    found = _changes(trials, state)
     changes = [trial if one is None else one for trial, one in zip(trials, found, strict=True)]
-    if not any(acceptable(change, here) for change in changes):
+    if not any(acceptable(change, state) for change in changes):
         changes = list(alone)
     first = max(range(len(trials)), key=lambda k: changes[k].gain)
     if changes[first].gain <= 0.0:
@@ -364,58 +370,62 @@ def _compared(trials: Sequence[Trial], alone: Sequence[Trial], here: Round) -> l
     return [replace(one, cross=scale * one.cross, square=scale * one.square) for one in changes]
 
 
-def _alone(candidate: Candidate, own: FloatArray, here: Round) -> Trial | None:
+def _alone(candidate: Candidate, own: FloatArray, state: SearchState) -> Trial | None:
     """Try one candidate with weighted columns; None where nothing of it is visible."""
     candidate = replace(candidate, columns=slice(0, candidate.size))
-    assert here.known is not None
-    known = with_candidate(here.known, here.problem, here.free, own)
-    trials, _ = tried_beside(known, here.problem, [candidate], here.nuisance.prior)
+    assert state.known is not None
+    known = with_candidate(state.known, state.problem, state.free, own)
+    trials, _ = evaluate_candidates(known, state.problem, [candidate], state.nuisance.prior)
     return trials[0] if trials else None
 
 
-def _changes(trials: Sequence[Trial], here: Round) -> list[Trial | None]:
+def _changes(trials: Sequence[Trial], state: SearchState) -> list[Trial | None]:
     """
     Return the trials of changes since the baseline; None where nothing is visible.
 
     The values that all of these candidates had in the baseline are nuisance parameters of each.
 
     """
-    if here.before is None:
+    if state.before is None:
         return list(trials)
-    assert here.known is not None
-    problem = here.problem
-    held = here.before.information([one.candidate for one in trials], here.work.arm, here.nuisance)
-    own = np.concatenate([here.own(one.candidate) for one in trials], axis=2)
-    known = beside_themselves(with_candidate(here.known, problem, here.free, own))
+    assert state.known is not None
+    problem = state.problem
+    held = state.before.information(
+        [one.candidate for one in trials], state.work.arm, state.nuisance
+    )
+    own = np.concatenate([state.own(one.candidate) for one in trials], axis=2)
+    known = beside_themselves(with_candidate(state.known, problem, state.free, own))
     result: list[Trial | None] = []
     first = 0
     for trial in trials:
         size = trial.candidate.size
         candidate = replace(trial.candidate, columns=slice(0, size))
         whole = of_nuisance(known, slice(first, first + size))
-        found, _ = tried_beside(whole, problem, [candidate], held)
+        found, _ = evaluate_candidates(whole, problem, [candidate], held)
         result.append(replace(found[0], candidate=trial.candidate) if found else None)
         first += size
     return result
 
 
-def _size(change: Trial, takes: FloatArray, here: Round) -> FloatArray:
+def _size(change: Trial, takes: FloatArray, state: SearchState) -> FloatArray:
     """
     Return the squares of the torque of a change, at most the candidate's gain, by joint, (n,).
 
     The gain of a change jointly with the baseline values is less where these are hardly known.
 
     """
-    if here.before is None:
+    if state.before is None:
         return takes
-    made = np.sum((here.own(change.candidate) @ change.values) ** 2, axis=0)
+    made = np.sum((state.own(change.candidate) @ change.values) ** 2, axis=0)
     return np.asarray(np.minimum(takes, made))
 
 
-def _passing(ranking: Sequence[Trial], closing: dict[Key, bool], here: Round) -> list[Trial]:
+def _passing(
+    ranking: Sequence[Trial], closing: dict[Key, bool], state: SearchState
+) -> list[Trial]:
     """Return the candidates that may be accepted, best first."""
     result: list[Trial] = []
     for trial in ranking:
-        if trial.candidate.key in closing and acceptable(without_echo(trial, here), here):
+        if trial.candidate.key in closing and acceptable(without_echo(trial, state), state):
             result.append(trial)
     return result

@@ -58,7 +58,7 @@ class Nuisance:
 
 
 @dataclass(frozen=True)
-class Later:
+class UnseenRows:
     """
     Weighted recordings of the day in question that nothing is fitted to.
 
@@ -80,7 +80,7 @@ class Later:
     @classmethod
     def of(
         cls, evidence: Evidence, columns: Sequence[FloatArray], residual: Sequence[FloatArray]
-    ) -> Later:
+    ) -> UnseenRows:
         """Weight columns (M, n, f) and residuals (M, n) of trajectories."""
         free = [rows.reshape(-1, rows.shape[2]) for rows in evidence.weighted(columns)]
         rest = [rows.ravel() for rows in evidence.weighted(residual)]
@@ -95,7 +95,7 @@ class Later:
         flat = [part.reshape(-1, len(kept)) for part in self.evidence.weighted(rows)]
         return list(_by_recording(self.evidence.data, flat))
 
-    def and_columns(self, arm: ArmModel, candidate: Candidate) -> Later:
+    def and_columns(self, arm: ArmModel, candidate: Candidate) -> UnseenRows:
         """Return the same with a candidate among the nuisance parameters."""
         pairs = zip(self.free, self.own(arm, candidate), strict=True)
         return replace(self, free=tuple(np.concatenate(pair, axis=1) for pair in pairs))
@@ -113,7 +113,7 @@ def _by_recording(
 
 
 @dataclass(frozen=True)
-class Before:
+class BaselineRows:
     """
     The baseline under a fitted arm, and further recordings of the day in question.
 
@@ -125,7 +125,7 @@ class Before:
         Their information about the base parameters.
     change : ndarray, shape (r,)
         Change of the base parameters in the fit.
-    later : Later or None
+    later : UnseenRows or None
         Recordings of the day in question that nothing is fitted to.
 
     """
@@ -133,9 +133,9 @@ class Before:
     baseline: Baseline
     prior: Prior
     change: FloatArray
-    later: Later | None = None
+    later: UnseenRows | None = None
 
-    def and_columns(self, arm: ArmModel, candidate: Candidate) -> Before:
+    def and_columns(self, arm: ArmModel, candidate: Candidate) -> BaselineRows:
         """Return the same with a candidate among the nuisance parameters."""
         later = None if self.later is None else self.later.and_columns(arm, candidate)
         return replace(self, later=later)
@@ -165,7 +165,7 @@ class Before:
 
 
 @dataclass(frozen=True)
-class Round:
+class SearchState:
     """
     The state of a round of the search.
 
@@ -190,7 +190,7 @@ class Round:
         Whether what has changed is asked, and not what was always there.
     tried : int
         Candidates that were tried, every shape for itself.
-    before : Before or None
+    before : BaselineRows or None
         Recordings from when nothing was wrong.
     known : Products or None
         Products of the nuisance columns, common to all trials of the round.
@@ -206,7 +206,7 @@ class Round:
     nuisance: Nuisance
     total: float | None = None
     tried: int = 1
-    before: Before | None = None
+    before: BaselineRows | None = None
     known: Products | None = None
     power: float = 1.0
     since: bool = False
@@ -240,7 +240,7 @@ class Round:
         """Residual without its projection on the nuisance columns, shape (R, n)."""
         return self.projection.rest(self.problem.y)
 
-    def without(self, place: int, value: float) -> Round:
+    def without(self, place: int, value: float) -> SearchState:
         """Return the round without a nuisance column; its torque is added to the residual."""
         free = self.nuisance.free
         kept = [k for k in range(len(free)) if k != place]
@@ -265,10 +265,10 @@ class Round:
         return self.problem.chi2_per_row(residual) > self.evidence.limits(rows, self.settings)
 
 
-def worth(trial: Trial, here: Round) -> float:
+def worth(trial: Trial, state: SearchState) -> float:
     """Return the share of a trial less the price of its values."""
-    price = here.settings.thresholds.price * cost(trial, here.settings)
-    return trial.gain / here.currency - price
+    price = state.settings.thresholds.price * cost(trial, state.settings)
+    return trial.gain / state.currency - price
 
 
 def cost(trial: Trial, settings: DiagnosisSettings) -> float:
@@ -279,25 +279,25 @@ def cost(trial: Trial, settings: DiagnosisSettings) -> float:
     return trial.freedom + shapes + outside
 
 
-def beaten(other: Trial, first: Trial, here: Round) -> bool:
+def beaten(other: Trial, first: Trial, state: SearchState) -> bool:
     """
     Return whether one trial is so far behind another that it is no rival.
 
     A lead is what is left of it when the values of both are paid for.
 
     """
-    thresholds = here.settings.thresholds
+    thresholds = state.settings.thresholds
     gains, z = lead(first, other)
-    squares = (worth(first, here) - worth(other, here)) * here.currency
+    squares = (worth(first, state) - worth(other, state)) * state.currency
     z *= squares / gains if gains else 0.0
     if squares <= 0.0:
         return False
     often = (
-        frequency(other, here) is Frequency.OFTEN and not other.candidate.effect.traits.external
+        frequency(other, state) is Frequency.OFTEN and not other.candidate.effect.traits.external
     )
-    if frequency(first, here) > Frequency.OFTEN and often:
+    if frequency(first, state) > Frequency.OFTEN and often:
         return squares > thresholds.far * first.gain
-    if squares <= thresholds.tie * here.currency * 0.5 and squares <= thresholds.far * first.gain:
+    if squares <= thresholds.tie * state.currency * 0.5 and squares <= thresholds.far * first.gain:
         return False
     return z >= thresholds.rival_z or squares > thresholds.far * first.gain
 
@@ -308,16 +308,18 @@ class Frequency(IntEnum):
     OFTEN, SELDOM, NEVER = range(3)
 
 
-def frequency(trial: Trial, here: Round) -> Frequency:
+def frequency(trial: Trial, state: SearchState) -> Frequency:
     """Return how seldom a cause changes: a link never does, an inner one hardly has a load."""
     effect = trial.candidate.effect
-    if here.since and effect.traits.corrects:
+    if state.since and effect.traits.corrects:
         return Frequency.NEVER
-    seldom = here.since and effect.changes_body and not _usual(trial)
+    seldom = state.since and effect.changes_body and not _usual(trial)
     return Frequency.SELDOM if seldom else Frequency.OFTEN
 
 
-def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -> Trial:
+def most_plausible(
+    tied: Sequence[Trial], closing: Mapping[Key, bool], state: SearchState
+) -> Trial:
     """
     Return the simplest of the tied causes that leave no gap, or the best where each leaves one.
 
@@ -329,30 +331,30 @@ def likeliest(tied: Sequence[Trial], closing: Mapping[Key, bool], here: Round) -
 
     """
     of_arm = [
-        frequency(trial, here) for trial in tied if not trial.candidate.effect.traits.external
+        frequency(trial, state) for trial in tied if not trial.candidate.effect.traits.external
     ]
     least = min(of_arm, default=Frequency.NEVER)
-    first, *others = (trial for trial in tied if frequency(trial, here) <= least)
-    tied = [first, *(trial for trial in others if not beaten(trial, first, here))]
+    first, *others = (trial for trial in tied if frequency(trial, state) <= least)
+    tied = [first, *(trial for trial in others if not beaten(trial, first, state))]
     if len(tied) == 1:
         return first
     able = [trial for trial in tied if closing[trial.candidate.key]]
     if able:
-        return simplest(able, here)
-    return simplest([t for t in tied if t.gain >= (1.0 - ROUNDING) * first.gain], here)
+        return simplest(able, state)
+    return simplest([t for t in tied if t.gain >= (1.0 - ROUNDING) * first.gain], state)
 
 
 def _usual(trial: Trial) -> bool:
     return trial.candidate.effect.in_usual_place(trial.candidate.robot)
 
 
-def closes(trial: Trial, here: Round) -> bool:
+def closes(trial: Trial, state: SearchState) -> bool:
     """Return whether the held-out residual with a candidate has no gap."""
-    _, rest = trial.left_out(*here.rows_of(trial.candidate))
-    return not here.gaps(rest).any()
+    _, rest = trial.left_out(*state.rows_of(trial.candidate))
+    return not state.gaps(rest).any()
 
 
-def simplest(tied: Sequence[Trial], here: Round) -> Trial:
+def simplest(tied: Sequence[Trial], state: SearchState) -> Trial:
     """
     Return the cause of least cost.
 
@@ -360,10 +362,10 @@ def simplest(tied: Sequence[Trial], here: Round) -> Trial:
     first in the catalogue, which goes from the common to the rare.
 
     """
-    least = min(cost(trial, here.settings) for trial in tied)
-    simple = [t for t in tied if cost(t, here.settings) < least + 0.5]
+    least = min(cost(trial, state.settings) for trial in tied)
+    simple = [t for t in tied if cost(t, state.settings) < least + 0.5]
     most = max(trial.gain for trial in simple)
-    close = (1.0 - here.settings.thresholds.tie) * most
+    close = (1.0 - state.settings.thresholds.tie) * most
     return min((t for t in simple if t.gain >= close), key=rarity)
 
 
@@ -374,7 +376,7 @@ def rarity(trial: Trial) -> float:
     return place + (0.0 if _usual(trial) else _ELSEWHERE)
 
 
-def contains(big: Trial, small: Trial, here: Round) -> bool:
+def contains(big: Trial, small: Trial, state: SearchState) -> bool:
     """
     Return whether a cause has more freedom than another and reproduces its torque.
 
@@ -385,19 +387,19 @@ def contains(big: Trial, small: Trial, here: Round) -> bool:
     """
     if not big.candidate.effect.joints and small.candidate.effect.joints:
         return False
-    columns, others = (here.projection.rest(here.own(one.candidate)) for one in (big, small))
+    columns, others = (state.projection.rest(state.own(one.candidate)) for one in (big, small))
     flat, target = columns.reshape(-1, big.candidate.size), (others @ small.values).ravel()
-    thresholds, squares = here.settings.thresholds, float(target @ target)
+    thresholds, squares = state.settings.thresholds, float(target @ target)
     apart = np.sum((flat @ big.values - target) ** 2)
     if apart < thresholds.same * squares or _same_body(big, small):
-        if not here.since:
+        if not state.since:
             return False
         if (
             small.candidate.effect.traits.comes_and_goes
             and not big.candidate.effect.traits.comes_and_goes
         ):
             return True  # links do not change; a description of them may be off
-    if cost(big, here.settings) <= cost(small, here.settings):
+    if cost(big, state.settings) <= cost(small, state.settings):
         return False
     fit = np.linalg.lstsq(flat, target, rcond=1e-6)[0]
     return bool(np.sum((target - flat @ fit) ** 2) < thresholds.tie * squares)
@@ -409,10 +411,10 @@ def _same_body(one: Trial, other: Trial) -> bool:
     return bool(added[0]) and added[0] == added[1]
 
 
-def says_no_more(big: Trial, small: Trial, here: Round) -> bool:
+def is_redundant(big: Trial, small: Trial, state: SearchState) -> bool:
     """Return whether a cause contains another one and is not worth significantly more."""
-    if not contains(big, small, here):
+    if not contains(big, small, state):
         return False
-    thresholds = here.settings.thresholds
-    more, (_, z) = worth(big, here) - worth(small, here), lead(big, small)
+    thresholds = state.settings.thresholds
+    more, (_, z) = worth(big, state) - worth(small, state), lead(big, small)
     return more <= 0.5 * thresholds.tie or z < thresholds.rival_z
