@@ -61,7 +61,7 @@ test-fast: lint  ## while you work: lint, types, layers, and the tests that a ch
 # Numbers agree to their tolerances whichever kernel of the BLAS the processor gets, in any order.
 has = $(shell grep -qsw $(1) /proc/cpuinfo && echo $(2))
 KERNELS ?= $(call has,avx,Sandybridge) $(call has,avx2,Haswell Zen) $(call has,avx512bw,SkylakeX)
-NUMERIC ?= $(addprefix tests/,arm diagnosis effects elastic identification model simulation)
+NUMERIC ?= $(addprefix tests/,arm diagnosis effects identification model papers/elastic simulation)
 SEED := $(or $(SEED),$(shell od -An -N2 -tu2 /dev/urandom | tr -d ' '))
 KERNEL_TESTS := $(foreach kernel,$(KERNELS),numeric-$(kernel)-1 numeric-$(kernel)-2)
 THIS_PYTHON = $(shell $(BIN)/python -c 'import sys; print(f"python3.{sys.version_info[1]}")')

@@ -9,7 +9,7 @@ from setuptools import find_packages, setup
 
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
-PLUG_INS = (Path(NAME, 'fleet'), *sorted(Path(NAME, 'papers').glob('*/')))
+PLUG_INS = (Path(NAME, 'fleet'), Path(NAME, 'view'), *sorted(Path(NAME, 'papers').glob('*/')))
 NODES = sorted(path.name for path in (HERE / 'scripts').iterdir() if path.name != 'armid')
 
 

@@ -13,10 +13,10 @@ from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.recorder import RecorderNode
-from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.papers.exo.nodes.interaction_identifier import InteractionIdentifierNode
 from armid_ros.papers.exo.nodes.simulated_pair import SimulatedPairNode
+from armid_ros.view.nodes.residual_markers import ResidualMarkersNode
 
 from docsite.markdown import cell, prose, table
 

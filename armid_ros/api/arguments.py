@@ -14,7 +14,9 @@ from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.tables import ColumnSettings
+from armid_ros.recording.contents import bag_contents
+from armid_ros.recording.ros1 import is_ros1
+from armid_ros.recording.tables import ColumnSettings, is_table
 from armid_ros.recording.tables.settings import numbers
 from armid_ros.robots import load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
@@ -119,7 +121,7 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
 def read_recording(
     path: str | Path,
-    robot: RobotLike | Sequence[str],
+    robot: RobotLike | Sequence[str] | None = None,
     *,
     topic: str | None = None,
     **columns: Any,
@@ -133,7 +135,8 @@ def read_recording(
         A rosbag2 directory, .mcap, .db3, .bag, .csv, .npz, .mat, .parquet, or the folder of a
         LeRobot dataset.
     robot : robot, model, name, path, or sequence of str
-        Whose joints; a sequence of names does too.
+        Whose joints; a sequence of names does too. By default all joints of a bag with one topic
+        of JointState, or of ``topic``.
     topic : str, optional
         JointState topic, where a bag has several.
     **columns
@@ -159,15 +162,30 @@ def read_recording(
     True
 
     """
-    if isinstance(robot, (Robot, ArmModel, str, Path)):
+    joints: Sequence[str]
+    slides: Sequence[bool] | None
+    if robot is None:
+        joints, slides = _joints_in(Path(path), topic), None
+    elif isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
-        joints: Sequence[str] = described.joints
-        slides: Sequence[bool] | None = [bool(one) for one in described.prismatic]
+        joints, slides = described.joints, [bool(one) for one in described.prismatic]
     else:
         joints, slides = tuple(robot), None
     return read_anything(
         path, joints=joints, slides=slides, topic=topic, columns=_settings(columns)
     )
+
+
+def _joints_in(path: Path, topic: str | None) -> tuple[str, ...]:
+    """Return the joints of the topic of a bag, or of its only one of JointState."""
+    if is_table(path) or is_ros1(path):
+        raise RecordingError(f'{path}: name the robot, or its joints as a list, to read it')
+    there = {one.name: one.joints for one in bag_contents(path) if one.joints}
+    found = [joints for name, joints in there.items() if topic in (None, name)]
+    if len(found) != 1:
+        names = ', '.join(there) or 'none'
+        raise RecordingError(f'{path}: topics of JointState: {names}; give one as topic')
+    return found[0]
 
 
 def _settings(columns: dict[str, Any]) -> ColumnSettings:

@@ -34,6 +34,7 @@ from armid_ros.diagnosis import (
     next_run,
 )
 from armid_ros.effects.tied import Partner
+from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
@@ -42,6 +43,7 @@ from armid_ros.identification.identified_from import identified_from, require_as
 from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
+from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import (
     DiagnosedRecordings,
     diagnosis_report,
@@ -59,6 +61,7 @@ from armid_ros.residual import (
 )
 from armid_ros.simulation.bodies import require_any_mass
 import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
@@ -132,6 +135,30 @@ class DiagnosisResult(Shown):
     def arm(self) -> ArmModel:
         """Return the model with what was found added, and with what was learned."""
         return self.core.arm if self.residual is None else self.residual.arm
+
+    def plot(self) -> npt.NDArray[np.object_]:
+        """
+        Draw the residual torque of each joint without and with the named effects.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes, shape (n,)
+
+        Raises
+        ------
+        IdentificationError
+            If the data were refused, so that there is no residual.
+
+        """
+        if self.core.gap is None:
+            raise IdentificationError(f'no residual to draw: {self.core.summary}')
+        shown = self.core.gap.overlays[0]
+        t = shown.trajectory.motion.t[shown.trajectory.rows]
+        curves = {
+            'without the named effects': (t, shown.measured - shown.before),
+            'with them': (t, shown.measured - shown.after),
+        }
+        return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
     def urdf(self, path: str | Path | None = None) -> str:
         """Return the description with what was found; write it where a path is given."""

@@ -46,8 +46,10 @@ from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording, write_joint_trajectory
+from armid_ros.recording.curves import draw_joints
 from armid_ros.robots import joints_beside_arms
 import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     import pandas
@@ -110,6 +112,13 @@ class ExcitationResult(Shown):
     def motion(self, rate: float = WAYPOINT_RATE) -> Motion:
         """Return positions, velocities and accelerations at a rate [Hz]."""
         return self.trajectory.motion(rate)
+
+    def plot(self) -> npt.NDArray[np.object_]:
+        """Draw the position of each joint; return its axes (matplotlib), shape (n,)."""
+        motion = self.motion()
+        return draw_joints(
+            motion.joints, {'position': (motion.t, motion.q)}, 'position [rad or m]'
+        )
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the waypoints as a pandas table: t, and q, dq, ddq of every joint."""

@@ -55,6 +55,9 @@ from armid_ros.identification.known_payload import (
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
+from armid_ros.recording.curves import draw_joints
+import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
@@ -158,6 +161,23 @@ class IdentificationResult(Shown):
     def predict(self, recordings: RecordingLike | Sequence[RecordingLike]) -> tuple[Fit, ...]:
         """Predict the torques of other recordings."""
         return self.core.predict(some_recordings_of(recordings, self.arm.robot))
+
+    def plot(self) -> npt.NDArray[np.object_]:
+        """
+        Draw measured and predicted torques of the first held-out recording, else of the training.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes, shape (n,)
+
+        """
+        fits = next(iter(self.validation.values()), self.core.training)
+        t = np.concatenate([fit.motion.t for fit in fits])
+        curves = {
+            'measured': (t, np.concatenate([fit.predicted + fit.residual for fit in fits])),
+            'predicted': (t, np.concatenate([fit.predicted for fit in fits])),
+        }
+        return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the parameters as a pandas table: name, joint, value, std, unit."""

@@ -13,7 +13,7 @@ import sys
 from typing import Any
 
 from armid_ros.cli.node import lacking
-from armid_ros.errors import ArmidError, visible
+from armid_ros.errors import ArmidError, meant, visible
 from armid_ros.plug_ins import load_plug_in, plug_ins
 from armid_ros.version import __version__
 import click
@@ -32,7 +32,6 @@ COMMANDS = {
     'diagnose': 'diagnose.command',
     'compare': 'compare',
     'recover': 'record',
-    'view': 'view',
     'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
@@ -56,6 +55,16 @@ class Commands(click.Group):
         if cmd_name in COMMANDS or cmd_name in plug_ins('commands'):
             return _imported(cmd_name)
         return None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; of one that does not exist the error names the nearest."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            near = meant(args[0], self.list_commands(ctx))
+            raise click.UsageError(error.message.rstrip('.') + near, ctx) from error
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with the first sentence of their help, whole."""

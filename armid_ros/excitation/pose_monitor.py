@@ -112,7 +112,7 @@ class PoseMonitor:
 
     @property
     def sources(self) -> int:
-        """Number of different lists of joints that were received."""
+        """Count the different lists of joints that were received."""
         return len(self._sources)
 
     def update(self, message: JointState, now: float) -> None:

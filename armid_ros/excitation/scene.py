@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bodies of an arm, its floor and its surroundings: what a motion must not touch."""
 
-from __future__ import annotations  # noqa: I001
+from __future__ import annotations
 
-from collections.abc import Sequence
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 

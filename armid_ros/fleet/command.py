@@ -9,7 +9,6 @@ from importlib.util import find_spec
 from typing import Any
 
 from armid_ros.cli import parameters as options
-from armid_ros.cli.late import done_by
 from armid_ros.errors import FleetError
 import click
 
@@ -96,18 +95,36 @@ def fleet() -> None:
 @click.option('--resume', is_flag=True, help='Leave out what earlier runs have done.')
 @options.reading
 @options.as_json
-@done_by('armid_ros.fleet.work')
-def identify() -> None:
+def identify(
+    globs: tuple[str, ...],
+    robot_source: str | None,
+    table: str | None,
+    out: str,
+    scheduler: str | None,
+    workers: int | None,
+    arm: str | None,
+    gravity: str,
+    joints: str | None,
+    as_json: bool,
+    **fit: Any,
+) -> None:
     """Identify every arm of a fleet from its bags."""
+    from armid_ros.fleet.work import ClusterOptions, FleetFitOptions, identify_bags, RobotOptions
+
+    robots = RobotOptions(robot_source, table, gravity, joints)
+    cluster = ClusterOptions(scheduler, workers)
+    identify_bags(globs, arm, robots, out, cluster, FleetFitOptions(**fit), as_json)
 
 
 @fleet.command(epilog='Example: armid fleet watch --out results')
 @_out
 @_alpha
 @options.as_json
-@done_by('armid_ros.fleet.work')
-def watch() -> None:
+def watch(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
+    from armid_ros.fleet.work import watch_arms
+
+    watch_arms(out, alpha, as_json)
 
 
 @fleet.command(epilog='Example: armid fleet diagnose --out results')
@@ -118,9 +135,11 @@ def watch() -> None:
 @click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
 @_alpha
 @options.as_json
-@done_by('armid_ros.fleet.work')
-def diagnose() -> None:
+def diagnose(**values: Any) -> None:
     """Name what has happened to arms, each with its own past as baseline."""
+    from armid_ros.fleet.work import diagnose_arms
+
+    diagnose_arms(**values)
 
 
 @fleet.command(epilog='Example: armid fleet report --out results --arm arm_7 --bag 2026-01-31')
@@ -134,6 +153,8 @@ def diagnose() -> None:
     help='As on the page of the arm, or a URL; those beside its change and the latest, if none.',
 )
 @options.as_json
-@done_by('armid_ros.fleet.work')
-def report() -> None:
+def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
     """Make the reports of bags of an arm, and link them on its page."""
+    from armid_ros.fleet.work import report_bags
+
+    report_bags(out, arm, bags, as_json)

@@ -11,7 +11,6 @@ import time
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import options
-from armid_ros.cli.groups import gathered
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import FleetError
 from armid_ros.files import json_text
@@ -112,8 +111,7 @@ def _place_of_results() -> Iterator[None]:
 
 
 @_place_of_results()
-@gathered(robots=RobotOptions, cluster=ClusterOptions, fit=FleetFitOptions)
-def identify(
+def identify_bags(
     globs: tuple[str, ...],
     arm: str | None,
     robots: RobotOptions,
@@ -218,7 +216,7 @@ def _print(outcome: FleetOutcome, out: str, seconds: float, as_json: bool) -> No
 
 
 @_place_of_results()
-def watch(out: str, alpha: float, as_json: bool) -> None:
+def watch_arms(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
     from armid_ros.fleet.pages import write_pages
     from armid_ros.fleet.store import Store
@@ -248,7 +246,7 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
 
 
 @_place_of_results()
-def diagnose(
+def diagnose_arms(
     out: str,
     scheduler: str | None,
     workers: int | None,
@@ -292,7 +290,7 @@ def diagnose(
 
 
 @_place_of_results()
-def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
+def report_bags(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
     """Make the reports of bags of an arm, and link them on its page."""
     from armid_ros.fleet.bag_reports import asked_bags, write_reports
     from armid_ros.fleet.pages import write_arm_page

@@ -10,11 +10,13 @@ from typing import Literal
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, read_only
+from armid_ros.recording.curves import draw_joints
 from armid_ros.recording.partner_motion import PartnerMotion
 import numpy as np
 import numpy.typing as npt
 
 Clock = Literal['header', 'receive']
+_UNITS = {'q': '[rad or m]', 'dq': '[rad/s or m/s]', 'tau': '[N m or N]'}
 
 
 @dataclass(frozen=True)
@@ -272,6 +274,31 @@ class Recording:
     def period(self) -> float:
         """Median time between samples [s]."""
         return float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0
+
+    def plot(self, quantity: Literal['q', 'dq', 'tau'] = 'tau') -> npt.NDArray[np.object_]:
+        """
+        Draw a quantity of each joint over time.
+
+        Parameters
+        ----------
+        quantity : {'q', 'dq', 'tau'}
+            What is drawn.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes, shape (n,)
+
+        Raises
+        ------
+        RecordingError
+            If it was not recorded.
+
+        """
+        values = getattr(self, quantity)
+        if values is None:
+            raise RecordingError(f'{self.source or "recording"}: {quantity} was not recorded')
+        label = {'q': 'position', 'dq': 'velocity', 'tau': 'torque'}[quantity]
+        return draw_joints(self.joints, {label: (self.t, values)}, f'{label} {_UNITS[quantity]}')
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
         """Return the recording at some of its samples, on the same time base."""

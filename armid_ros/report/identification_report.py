@@ -113,6 +113,7 @@ def identification_report(
     if grade is None:
         grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
+    sentences = (*grade.reasons, *judgement.sentences)
     quality = [
         *(RecordingQuality.of(r, 'training', training.get(r.source, ())) for r in recordings),
         *(
@@ -121,11 +122,8 @@ def identification_report(
         ),
     ]
     sections: list[Section] = [
-        VerdictSection(
-            grade.word, TONES[grade.word], _first(grade, judgement.sentences), judgement.beware
-        ),
-        Asked(_asked(result, robot, list(training), list(validation))),
-        DataQuality(quality, arm.robot),
+        VerdictSection(grade.word, TONES[grade.word], sentences, judgement.beware),
+        NextSteps(judgement.next_steps),
         FitSection(arm.robot, training, validation, torque_reach(result, shown)),
         *_forward(result, verification),
         Residuals(arm.robot, shown, role),
@@ -142,7 +140,8 @@ def identification_report(
         WhitenessSection(arm.robot, shown, role),
         *_noise(result, verification),
         *assessment.sections,
-        NextSteps(judgement.next_steps),
+        DataQuality(quality, arm.robot),
+        Asked(_asked(result, robot, list(training), list(validation))),
         Origin(provenance or Provenance()),
     ]
     subtitle = (
@@ -150,13 +149,6 @@ def identification_report(
         f'{counted(len(validation), "held-out recording")}'
     )
     return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()
-
-
-def _first(grade: Grade, found: Sequence[str]) -> tuple[str, ...]:
-    """Return what is said first: what a person would stop at, or what was found."""
-    if grade.word == 'good':
-        return (*found, *grade.reasons[1:])
-    return (*grade.reasons, *found)
 
 
 def _forward(result: Identification, verification: Verification | None) -> list[Section]:

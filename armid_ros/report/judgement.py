@@ -45,7 +45,7 @@ class Judgement:
     Attributes
     ----------
     sentences : tuple of str
-        What was identified, and how well it predicts.
+        What was identified, and how exactly it moves.
     beware : tuple of str
         What the reader should not overlook.
     next_steps : tuple of str
@@ -95,7 +95,7 @@ def judge(
         steps = ['The model can be used within the range of the held-out data.']
     return Judgement(
         sentences=(
-            *_sentences(result, training, held_out, len(validation)),
+            _what(result),
             *_simulated(verification),
         ),
         beware=tuple(finding.text for finding in findings if finding.text),
@@ -112,9 +112,7 @@ def _notes(result: Identification) -> list[str]:
     return [note for note in result.notes if note not in said]
 
 
-def _sentences(
-    result: Identification, training: Score, held_out: Score | None, n_held_out: int
-) -> tuple[str, ...]:
+def _what(result: Identification) -> str:
     robot = result.arm.robot
     effects = [
         effect.name.replace('_', ' ').replace('coulomb', 'Coulomb')
@@ -124,21 +122,11 @@ def _sentences(
     count = counted(result.base.rank, 'parameter')
     if result.base.rank < result.theory.rank:
         count = f'{result.base.rank} of the {counted(result.theory.rank, "parameter")}'
-    what = (
+    return (
         f'{count} of {robot.name} '
         f'({counted(robot.n_joints, "joint")}; rigid body'
         + ''.join(f', {effect}' for effect in effects)
         + f') identified from {time:.0f} s of motion.'
-    )
-    if held_out is None:
-        return what, (
-            f'The torque error is {digits(training.relative_error_percent)} % on the training '
-            'data. No data were held out, so the error on other motions is unknown.'
-        )
-    return what, (
-        f'The torque error is {digits(held_out.relative_error_percent)} % on '
-        f'{counted(n_held_out, "held-out recording")} '
-        f'({digits(training.relative_error_percent)} % on the training data).'
     )
 
 

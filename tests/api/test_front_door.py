@@ -243,3 +243,31 @@ def test_a_trajectory_is_a_table(excitation):
     joint = 'shoulder_pitch'
     assert list(table.columns[:4]) == ['t', f'q_{joint}', f'dq_{joint}', f'ddq_{joint}']
     assert table.t.iloc[-1] == pytest.approx(excitation.duration, abs=0.05)
+
+
+def test_a_recording_a_plan_and_results_are_drawn_joint_by_joint(
+    monkeypatch, excitation, runs, model, loaded
+):
+    monkeypatch.setenv('MPLBACKEND', 'agg')
+    from matplotlib import pyplot as plt
+
+    found = ar.diagnose(model.arm, loaded, baseline=runs[:1])
+    counts = {}
+    for drawn in (runs[0], excitation, model, found):
+        axes = drawn.plot()
+        assert axes.shape == (6,)
+        assert [axis.get_title(loc='left') for axis in axes] == list(model.arm.robot.joints)
+        counts[type(drawn).__name__] = len(axes[0].lines)
+        plt.close(axes[0].figure)
+    assert list(counts.values()) == [1, 1, 2, 2]
+    with pytest.raises(ar.ArmidError, match='dq'):
+        ar.Recording(joints=('a',), t=[0.0, 1.0], q=np.zeros((2, 1))).plot('dq')
+
+
+def test_a_bag_is_read_without_a_robot(tmp_path, runs):
+    ar.write_recording(tmp_path / 'run', runs[0])
+    read = ar.read_recording(tmp_path / 'run')
+    assert read.joints == runs[0].joints
+    np.testing.assert_array_equal(read.tau, runs[0].tau)
+    with pytest.raises(ar.ArmidError, match='/joint_states'):
+        ar.read_recording(tmp_path / 'run', topic='/other')

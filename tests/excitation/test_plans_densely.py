@@ -57,6 +57,9 @@ def geometry(path, model, driven):
         model, str(path), pin.GeometryType.COLLISION, package_dirs=roots
     )
     bodies.addAllCollisionPairs()
+    excluded = path.parents[1] / 'srdf' / f'{path.stem}.srdf'  # by the vendor, as they never meet
+    if excluded.is_file():
+        pin.removeCollisionPairs(model, bodies, str(excluded))
     still = bodies.createData()
     pin.computeCollisions(model, model.createData(), bodies, still, pin.neutral(model), False)
     touching = [k for k, result in enumerate(still.collisionResults) if result.isCollision()]

@@ -32,7 +32,7 @@ def run(command, folder):
 
 @pytest.fixture(scope='module')
 def workspace(root, tmp_path_factory):
-    """Lay out a workspace as the README says: the clone, and a link to the package within it."""
+    """Lay out a workspace as docs/howto/install.md says: the clone, and a link within it."""
     folder = tmp_path_factory.mktemp('workspace')
     shutil.copytree(root, folder / 'src' / 'armid_ros', ignore=LEFT_BEHIND)
     (folder / 'src' / 'armid_msgs').symlink_to('armid_ros/msg_schemas')

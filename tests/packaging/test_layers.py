@@ -12,12 +12,12 @@ import tomllib
 import pytest
 
 LAYERS = (
-    ('fleet', 'papers'),
+    ('fleet', 'papers', 'view'),
     ('cli',),
     ('nodes',),
     ('live',),
     ('api',),
-    ('report', 'view'),
+    ('report',),
     ('residual',),
     ('diagnosis', 'inspection'),
     ('identification',),

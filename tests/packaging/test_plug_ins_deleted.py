@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The fleet and each paper can be deleted by deleting its folder; the core does not know them."""
+"""Fleet, view and each paper can be deleted with their folders; the core knows none of them."""
 
 import os
 import shutil
@@ -10,7 +10,7 @@ import sys
 import pytest
 
 #: Folders of plug-ins; each brings the command of its name.
-PLUG_INS = ('fleet', 'papers/elastic', 'papers/exo', 'papers/lunar')
+PLUG_INS = ('fleet', 'papers/elastic', 'papers/exo', 'papers/lunar', 'view')
 #: Lists the commands, and asks for one that is not there.
 ASK = """
 import sys
@@ -66,7 +66,7 @@ def test_the_other_commands_stay(root, tmp_path, plug_in):
     assert done.returncode == 2, done.stderr
     assert f"No such command '{command}'" in done.stderr
     listed = {line.split()[0] for line in done.stdout.splitlines() if line.startswith('  ')}
-    assert {'identify', 'fleet', 'elastic', 'exo', 'lunar'} - {command} <= listed
+    assert {'identify', 'fleet', 'elastic', 'exo', 'lunar', 'view'} - {command} <= listed
     assert command not in listed
 
 

@@ -28,15 +28,15 @@ import pytest
 
 HOSTILE = '<script>alert(1)</script>'
 TITLES = [
-    'What was asked',
-    'Data quality',
+    'What to do next',
     'Fit',
     'Residual by variable',
     'Parameters',
     'Correlations',
     'Excitation',
     'Whiteness',
-    'What to do next',
+    'Data quality',
+    'What was asked',
     'Provenance',
 ]
 
@@ -162,7 +162,7 @@ def test_sections_are_in_order(page):
 
 def test_verdict_comes_first_and_is_a_sentence(page):
     assert page.text.index('of motion.') < page.text.index('What was asked\n', 600)
-    assert re.search(r'torque error is [0-9.]+ % on 1 held-out recording', page.text)
+    assert page.text.index('held out') < page.text.index('of motion.')
 
 
 def test_everything_asked_for_is_there(case, page):
@@ -296,7 +296,9 @@ def test_residual_at_rest_is_drawn_apart(case):
     informative[10:20, 2] = False
     resting = replace(fits[0], informative=informative)
     section = FitSection(case.result.arm.robot, {}, {source: (resting,)}, np.zeros(6))
-    still, moving = section.shown[0].joints[2].residual.series
+    name = case.result.arm.robot.joints[2]
+    drawn = next(one for one in section.shown[0].joints if one.name == name)
+    still, moving = drawn.residual.series
     residual = resting.residual[:, 2]
     np.testing.assert_array_equal(still.y[10:20], residual[10:20])
     assert np.isnan(moving.y[10:20]).all() and np.isnan(still.y).sum() == len(residual) - 10
@@ -305,7 +307,7 @@ def test_residual_at_rest_is_drawn_apart(case):
 
 def test_without_held_out_data_the_report_says_so(case):
     text = report_of(case, validation={}, validation_recordings=())
-    assert 'No data were held out' in text
+    assert 'halves of the data' in text
 
 
 def test_prose_knows_one_from_many(case, page):

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 #: Files that a folder to be filled may hold already, from a demo before.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
 
-#: What is written beside the story.
-_FILES = 'bag, excitation.yaml, model.yaml, identification.json, report.html'
-
 
 @click.command(epilog='Example: armid demo --gravity earth --out demo')
 @click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
@@ -29,13 +26,13 @@ _FILES = 'bag, excitation.yaml, model.yaml, identification.json, report.html'
     '--hide',
     default='',
     metavar='E@joint',
-    help='What is hidden in the arm in the end, to be found; drawn, and told last, by default.',
+    help='Effect that is hidden in the arm and has to be found; random by default.',
 )
 @parameters.folder
 @parameters.seed
 @parameters.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
-    """Excite, move, identify online and offline; then find what was hidden in the arm."""
+    """Excite, move, identify online and offline; then find a hidden change of the arm."""
     from armid_ros.arm import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.cli.demo import steps
@@ -116,8 +113,8 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     if as_json:
         click.echo(json_text(document))
     else:
-        show_story(told, out / 'story')
-        say(f'{out}: {_FILES}')
+        show_story(told)
+        say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
 
 
 def _tell(
@@ -126,10 +123,10 @@ def _tell(
     say(f'online:  {online.sentence()}')
     say(f'offline: {offline.sentence()}')
     say(
-        f'relative error {training:.2f} % with the noise, {document["held_out"]:.2f} % of the '
-        'true torque in a motion that was never run'
+        f'relative error of the torque {training:.2f} % (noise included); '
+        f'{document["held_out"]:.2f} % against the true torque of another motion'
     )
     say(
-        f'the bag played back gives the online estimate again, to '
-        f'{document["replay_difference"]:.1g}'
+        'playing the bag back repeats the online estimate (largest difference '
+        f'{document["replay_difference"]:.1g})'
     )

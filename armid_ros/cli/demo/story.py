@@ -18,7 +18,6 @@ from typing import Any
 from armid_ros.api.diagnosis import diagnose
 from armid_ros.api.table import ResultOrigin
 from armid_ros.arm import ArmModel
-from armid_ros.cli.diagnose.command import show
 from armid_ros.cli.terminal import progress, say
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.effects import CATALOGUE, Effect, make_effect, parse_effect
@@ -42,6 +41,8 @@ _RATE = 100.0
 #: Draws until one shows.
 _DRAWS = 50
 _RUNS = ('after_1', 'after_2', 'unused')
+#: Values of the hidden effect that are printed.
+_SHOWN = 4
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,15 @@ class Hidden:
     values: FloatArray
 
     def sentence(self, arm: ArmModel) -> str:
-        """Say what it is, values that are zero left out."""
+        """Return effect, joint and the largest values that are not zero."""
         names = self.effect.parameters(arm.robot)
-        shown = ', '.join(
+        shown = [
             f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
             for name, value in zip(names, self.values, strict=True)
             if value
-        )
+        ]
         where = ', '.join(self.effect.joints) or 'the whole arm'
-        return f'{self.effect.name.replace("_", " ")} in {where} ({shown})'
+        return f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:_SHOWN])})'
 
 
 @dataclass(frozen=True)
@@ -174,21 +175,21 @@ def tell_story(
     return ToldStory(hidden, found.core)
 
 
-def show_story(told: ToldStory, out: Path) -> None:
-    """Print what was found, what it did for a run that was not used, and what was hidden."""
-    say('Something was hidden in the arm, and three runs recorded. The diagnosis of two of them:')
-    show(told.diagnosis)
-    gap, arm = told.diagnosis.gap, told.diagnosis.arm
+def show_story(told: ToldStory) -> None:
+    """Print the diagnosis, what it did for the held-out run, and what was hidden."""
+    found = told.diagnosis
+    say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
+    say(f'{found.verdict.replace("_", " ").upper()}: {found.summary}')
+    gap, arm = found.gap, found.arm
     if gap is not None:
         worst = int(np.argmax(gap.chi2_before))
         say(
-            f'in the run that was not used, the error of {arm.robot.joints[worst]} was '
-            f'{digits(float(gap.before[worst]))} N m and is {digits(float(gap.after[worst]))} N m '
-            f'with the patched model'
+            f'Held-out run: the error of {arm.robot.joints[worst]} is '
+            f'{digits(float(gap.before[worst]))} N m, and {digits(float(gap.after[worst]))} N m '
+            'with the named effect.'
         )
-    say(f'What was hidden: {told.hidden.sentence(arm)}.')
-    say('It was found.' if told.found else 'The diagnosis did not rank it first.')
-    say(f'{out}: {", ".join(_RUNS)}, diagnosis.json, model.yaml, report.html')
+    rank = 'The diagnosis found it.' if told.found else 'The diagnosis did not rank it first.'
+    say(f'Hidden was: {told.hidden.sentence(arm)}. {rank}')
 
 
 def draw_hidden(

@@ -89,13 +89,12 @@ class Agreement:
         return self.lower <= self.distance <= self.upper
 
     def sentence(self) -> str:
-        """Say how many agree, how many should, and what all of them say together."""
-        luck = '' if self.holds else '; another seed shows whether that is luck'
+        """Return how many parameters agree with the truth, and chi-squared of all."""
+        chance = '' if self.holds else '; repeat it with another --seed'
         return (
-            f'{self.within} of {self.parameters} within two standard deviations of the truth '
-            f'({self.expected:.0f} expected); squared distance of all together '
-            f'{self.distance:.0f}, in 95 of 100 experiments {self.lower:.0f} to '
-            f'{self.upper:.0f}{luck}'
+            f'{self.within} of {self.parameters} parameters within 2 sigma of the truth '
+            f'({self.expected:.0f} expected); chi-squared {self.distance:.0f}, 95 % range '
+            f'{self.lower:.0f} to {self.upper:.0f}{chance}'
         )
 
     def document(self) -> dict[str, Any]:

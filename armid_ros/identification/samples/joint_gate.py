@@ -11,6 +11,9 @@ import numpy.typing as npt
 #: Resolution at best, of a position and a velocity [rad or m, and a second], and of a torque as a
 #: share of its limit: an encoder of 22 bits, a torque sensor of 17.
 _FINEST = {'q': 1e-6, 'v': 1e-5, 't': 1e-5}
+#: Second derivative that each may have when an arm at rest begins to move, in the same units per
+#: second squared: 2 rad/s^2; a jerk of 50 rad/s^3; a torque of its limit that oscillates at 1 Hz.
+_ONSET = {'q': 2.0, 'v': 50.0, 't': 50.0}
 
 
 def joint_gate(
@@ -47,12 +50,18 @@ def joint_gate(
     limit = np.broadcast_to(np.asarray(torque_limit, dtype=float), turning.shape)
     known = limit[np.isfinite(limit)]
     scale = np.where(np.isfinite(limit), limit, known.min() if len(known) else 0.0)
-    finest = [_FINEST[one] * (scale if one == 't' else np.ones(len(turning))) for one in signals]
+    finest, onset = (
+        np.concatenate(
+            [known[one] * (scale if one == 't' else np.ones_like(scale)) for one in signals]
+        )
+        for known in (_FINEST, _ONSET)
+    )
     return SpikeGate(
         position & revolute,
         max_gap=max_gap,
         false_alarm_time=false_alarm_time,
         continuous=position,
         pulsing=kind == 't',
-        finest=np.concatenate(finest),
+        finest=finest,
+        onset=onset,
     )

@@ -47,6 +47,8 @@ class NoiseLevel:
         Most samples that are learned from before `settle`.
     finest : ndarray, shape (m,), or float
         Resolution of the signals at best.
+    onset : ndarray, shape (m,), or float
+        Second derivative that is usual before any motion was seen, per second squared.
 
     Attributes
     ----------
@@ -55,8 +57,14 @@ class NoiseLevel:
 
     """
 
-    def __init__(self, count: int, together: int = 1, finest: FloatArray | float = 0.0) -> None:
-        self._finest = finest
+    def __init__(
+        self,
+        count: int,
+        together: int = 1,
+        finest: FloatArray | float = 0.0,
+        onset: FloatArray | float = 0.0,
+    ) -> None:
+        self._finest, self._onset = finest, onset
         self.usual = Usual(np.inf, np.zeros(count), np.zeros(count))
         self._steps, self._most = np.full((SEEN, count), np.inf), np.zeros(count)
         self._sizes, self._shares = np.zeros((2, _REMEMBERED, count))
@@ -93,7 +101,7 @@ class NoiseLevel:
         self._most = np.maximum(self._most, np.max(np.abs([m.error for m in missed]), axis=0))
         if not self._seen:
             errors = np.array([m.error / max(m.noise, m.bend) for m in missed])
-            size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._resolution)
+            size = np.maximum(robust_scale(errors, _SHARE_FIRST), self._least(period))
             self.usual = Usual(period, size, share_of_noise(errors, size))
 
     def learn(self, missed: Missed, move: FloatArray) -> None:
@@ -115,7 +123,7 @@ class NoiseLevel:
         self.see_steps(moves)
         loudest = np.argmax(self._sizes, axis=0)[np.newaxis]
         size, noisy = (np.take_along_axis(x, loudest, 0)[0] for x in (self._sizes, self._shares))
-        self.usual = Usual(period, np.maximum(size, self._resolution), noisy)
+        self.usual = Usual(period, np.maximum(size, self._least(period)), noisy)
 
     def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
         place = self._seen % _REMEMBERED
@@ -128,12 +136,12 @@ class NoiseLevel:
         steps = np.concatenate([self._steps, np.where(steps > 0.0, steps, np.inf)])
         self._steps = np.partition(steps, SEEN - 1, axis=0)[:SEEN]
 
-    @property
-    def _resolution(self) -> FloatArray:
-        """Return the smallest step of every signal, at least the finest one."""
+    def _least(self, period: float) -> FloatArray:
+        """Return the smallest step of every signal, at least the finest one and an onset's."""
         # A signal that moves fast makes no small steps; but by its resolution it leaves any line.
         step = np.where(np.isfinite(self._steps[-1]), self._steps[-1], 0.0)
-        return np.maximum(np.minimum(self._most, step), self._finest)
+        least = np.maximum(self._finest, self._onset * period**2)
+        return np.maximum(np.minimum(self._most, step), least)
 
 
 @dataclass(frozen=True, eq=False)

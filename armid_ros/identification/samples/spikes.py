@@ -79,6 +79,9 @@ class SpikeGate:
     finest : array_like, shape (m,), optional
         Resolution of the signals at best, in their units. A simulation without noise and an arm
         at rest have less noise than that, and a limit that follows it would leave out sound data.
+    onset : array_like, shape (m,), optional
+        Second derivative of the signals that is usual before any motion was seen, per second
+        squared: an arm that was at rest so far begins to move.
 
     Attributes
     ----------
@@ -101,6 +104,7 @@ class SpikeGate:
         continuous: npt.ArrayLike = False,
         pulsing: npt.ArrayLike = False,
         finest: npt.ArrayLike = 0.0,
+        onset: npt.ArrayLike = 0.0,
     ) -> None:
         if not (max_gap >= 1 and false_alarm_time > 0.0):
             raise IdentificationError(
@@ -110,7 +114,7 @@ class SpikeGate:
         self._turn = np.where(np.asarray(turning, dtype=bool), 2.0 * np.pi, 0.0)
         self._continuous = np.broadcast_to(np.asarray(continuous, dtype=bool), self._turn.shape)
         self._pulsing = np.broadcast_to(np.asarray(pulsing, dtype=bool), self._turn.shape)
-        self._finest = np.broadcast_to(np.asarray(finest, dtype=float), self._turn.shape)
+        self._least_seen = tuple(np.broadcast_to(one, self._turn.shape) for one in (finest, onset))
         self._max_gap = max_gap
         self._false_alarm_time = false_alarm_time
         self.reset()
@@ -123,7 +127,7 @@ class SpikeGate:
         self._early: StreamSample | None = None
         count = len(self._turn)
         self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
-        self._level = NoiseLevel(count, self._max_gap + 1, self._finest)
+        self._level = NoiseLevel(count, self._max_gap + 1, *self._least_seen)
         self._least: tuple[Usual, float, FloatArray] | None = None
         self._restart([])
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli import parameters as options
-from armid_ros.cli.late import done_by
 import click
 
 
@@ -42,8 +41,19 @@ import click
 @options.reading
 @options.seed
 @options.as_json
-@done_by('armid_ros.papers.elastic.work')
-def elastic() -> None:
+def elastic(
+    bags: tuple[Path, ...],
+    steps: tuple[Path, ...],
+    demo: bool,
+    experiments: int,
+    robot_source: str,
+    start: str | None,
+    model: Path | None,
+    out: Path,
+    seed: int,
+    as_json: bool,
+    **drives: str | None,
+) -> None:
     """
     Identify elastic joints.
 
@@ -52,3 +62,14 @@ def elastic() -> None:
     are found joint by joint.
 
     """
+    from armid_ros.papers.elastic.work import (
+        DemoOptions,
+        DriveOptions,
+        ElasticData,
+        identify_elastic,
+    )
+
+    data, simulated = ElasticData(bags, steps), DemoOptions(demo, experiments, start)
+    identify_elastic(
+        data, simulated, robot_source, DriveOptions(**drives), model, out, seed, as_json
+    )

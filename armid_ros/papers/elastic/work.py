@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
-from armid_ros.cli.groups import gathered
 from armid_ros.cli.terminal import print_parameters, progress, say, Tick
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import json_text, Staged, write_file
@@ -137,8 +136,7 @@ class DriveOptions:
         return _Machine(robot, shipped, sensors, replace(shipped.parameters, gear=gear), loop)
 
 
-@gathered(data=ElasticData, demo=DemoOptions, drives=DriveOptions)
-def elastic(
+def identify_elastic(
     data: ElasticData,
     demo: DemoOptions,
     robot_source: str,

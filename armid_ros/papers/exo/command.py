@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from armid_ros.cli import parameters as options
-from armid_ros.cli.late import done_by
 import click
 
 #: What a leg and its exoskeleton do; `armid_ros.papers.exo.plant.exercises.EXERCISES`.
@@ -47,11 +47,21 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 @options.seed
 @options.reading
 @options.as_json
-@done_by('armid_ros.papers.exo.work')
-def exo() -> None:
+def exo(
+    bag: Path | None,
+    out: Path,
+    topics: str,
+    inertias: str,
+    seed: int,
+    as_json: bool,
+    **simulated: Any,
+) -> None:
     """
     Find what ties an exoskeleton to its wearer.
 
     Without a BAG the shipped pair walks, is recorded with noise, and its springs are found again.
 
     """
+    from armid_ros.papers.exo.work import identify_pair, SimulationOptions
+
+    identify_pair(bag, out, topics, inertias, SimulationOptions(**simulated), seed, as_json)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
-from armid_ros.cli.groups import gathered
 from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_rows, progress, say, Tick
 from armid_ros.errors import ModelError
@@ -97,8 +96,7 @@ class SimulationOptions:
                 write_joint_states(writer, topic, motion.joints, stamps, q, None, torque)
 
 
-@gathered(simulated=SimulationOptions)
-def exo(
+def identify_pair(
     bag: Path | None,
     out: Path,
     topics: str,

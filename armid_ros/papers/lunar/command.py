@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from armid_ros.cli import parameters as options
-from armid_ros.cli.late import done_by
 import click
 
 
@@ -13,6 +14,8 @@ import click
 @options.folder
 @options.seed
 @options.as_json
-@done_by('armid_ros.papers.lunar.work')
-def lunar() -> None:
+def lunar(out: Path, seed: int, as_json: bool) -> None:
     """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
+    from armid_ros.papers.lunar.work import repeat_paper
+
+    repeat_paper(out, seed, as_json)

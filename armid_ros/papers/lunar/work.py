@@ -20,7 +20,7 @@ import click
 OUTPUTS = ('lunar.json', 'report.html')
 
 
-def lunar(out: Path, seed: int, as_json: bool) -> None:
+def repeat_paper(out: Path, seed: int, as_json: bool) -> None:
     """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
     staged = options.stage(out, SCHEMA)
     with progress('designing the trajectory') as tick:

@@ -62,7 +62,7 @@ class JointErrors(Section):
 
     @property
     def bars(self) -> BarChart:
-        """Relative error of each joint, held-out and training."""
+        """Relative error of each joint, held-out and training, the worst joint first."""
         groups: list[tuple[Role, Mapping[str, Sequence[Fit]], str]] = [
             ('after', self.validation, 'held-out'),
             ('faint', self.training, 'training'),
@@ -74,7 +74,7 @@ class JointErrors(Section):
             if fits
         ]
         rows = []
-        for joint, name in enumerate(self.robot.joints):
+        for joint in _worst_first(scores[0][1]):
             unit = torque_unit(self.robot, joint)
             bars = [
                 Bar(
@@ -85,7 +85,7 @@ class JointErrors(Section):
                 )
                 for role, score in scores
             ]
-            rows.append((name, bars))
+            rows.append((self.robot.joints[joint], bars))
         return BarChart(rows, '%', roles)
 
 
@@ -144,13 +144,18 @@ class FitSection(JointErrors):
     def _joints(self, source: str, fits: Sequence[Fit], role: str) -> list[JointCurves]:
         score = Score.of(fits)
         drawn = []
-        for joint, name in enumerate(self.robot.joints):
-            unit = torque_unit(self.robot, joint)
+        for joint in _worst_first(score):
+            name, unit = self.robot.joints[joint], torque_unit(self.robot, joint)
             percent = digits(score.joint_relative_error_percent[joint])
             summary = f'residual {digits(score.rms[joint])} {unit} rms, {percent} %'
             torque, residual = fit_charts(fits, joint, unit, f'{role}-{joint}')
             drawn.append(JointCurves(name, summary, torque, residual))
         return drawn
+
+
+def _worst_first(score: Score) -> list[int]:
+    """Return the joints by falling relative error."""
+    return [int(joint) for joint in np.argsort(-score.joint_relative_error_percent)]
 
 
 def fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:

@@ -6,7 +6,13 @@ import pickle
 
 from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 from armid_ros.identification.fitting.least_squares import solve
-from armid_ros.identification.fitting.triangle import fit_scaled, fit_triangle, joint_std, Triangle
+from armid_ros.identification.fitting.triangle import (
+    fit_scaled,
+    fit_triangle,
+    joint_std,
+    Triangle,
+    TriangleFit,
+)
 from armid_ros.identification.online.recursive import RecursiveLeastSquares
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import Conditioning
@@ -103,3 +109,19 @@ def test_identify_is_the_fit_of_its_triangles(arm, structure):
     rows = regressions(structure, result.base.independent, bags, result.used)
     fit = fit_triangle(merged([Triangle.of([part]) for part in rows], 2))
     np.testing.assert_allclose(fit.values, result.estimate.values, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize('condition', [1e2, 1e10, 1e13])
+def test_a_covariance_is_positive_semi_definite_whatever_the_condition(condition):
+    """A short motion hardly determines some values; the products lose them to rounding."""
+    rng = np.random.default_rng(3)
+    axes = np.linalg.qr(rng.standard_normal((40, 40)))[0]
+    rows = rng.standard_normal((400, 40)) @ (np.geomspace(1.0, 1.0 / condition, 40) * axes).T
+    fit = TriangleFit(np.zeros(40), np.ones(1), np.linalg.qr(rows)[1])
+    found = fit.covariance(rows.T @ rows)
+    std = np.sqrt(np.diag(found))
+    correlations = found / np.outer(std, std)
+    assert np.all(std > 0.0) and np.abs(correlations).max() < 1.0 + 1e-12
+    assert np.linalg.eigvalsh(correlations).min() > -1e-12
+    if condition < 1e3:
+        np.testing.assert_allclose(found, np.linalg.inv(rows.T @ rows), rtol=1e-8)

@@ -14,13 +14,11 @@ from armid_ros.simulation import Reference, SimulatedArm
 import numpy as np
 import pytest
 
-REST = 0.6
 
-
-def clean(rate: float) -> tuple[np.ndarray, np.ndarray]:
+def clean(rate: float, rest: float = 0.6, move: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
     """Return stamps, and position and torque of a joint that stands still and then moves."""
     t = np.arange(0.0, 4.0, 1.0 / rate)
-    phase = np.clip((t - REST) / 3.0, 0.0, 1.0)
+    phase = np.clip((t - rest) / move, 0.0, 1.0)
     q = 1.2 + 0.8 * phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
     ddq = np.gradient(np.gradient(q, t), t)
     return t, np.column_stack([q, 2.0 * ddq + 5.0 * np.cos(q)])
@@ -28,8 +26,11 @@ def clean(rate: float) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize('rate', [100.0, 200.0, 500.0, 1000.0])
 @pytest.mark.parametrize('rounding', [0.0, 1e-12, 1e-8])
-def test_a_joint_that_begins_to_move_keeps_all_samples(rate: float, rounding: float) -> None:
-    t, signals = clean(rate)
+@pytest.mark.parametrize(('rest', 'move'), [(0.6, 3.0), (0.3, 1.0)])
+def test_a_joint_that_begins_to_move_keeps_all_samples(
+    rate: float, rounding: float, rest: float, move: float
+) -> None:
+    t, signals = clean(rate, rest, move)
     signals = signals + rounding * np.random.default_rng(0).standard_normal(signals.shape)
     gate = joint_gate([False], 'qt', torque_limit=[50.0])
     good = [one for at, x in zip(t, signals, strict=True) for one in gate.take(at, x)]

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from armid_msgs.msg import Diagnosis
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.residual_markers import ResidualMarkersNode
 from armid_ros.robots import load_robot
+from armid_ros.view.nodes.residual_markers import ResidualMarkersNode
 import numpy as np
 import pinocchio as pin
 import pytest

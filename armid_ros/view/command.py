@@ -62,7 +62,7 @@ def view(
         raise ArmidError('armid view shows a BAG, or with --live what is on the topics: name one')
     if bag is None:
         rerun()  # is it there at all?
-        from armid_ros.nodes.viewer import show_topics
+        from armid_ros.view.nodes.viewer import show_topics
 
         parameters_of_viewer = {
             'robot': robot_source if robot_source != '-' else '',

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.viewer import ViewerNode
 from armid_ros.robots import load_robot
+from armid_ros.view.nodes.viewer import ViewerNode
 from builtin_interfaces.msg import Time
 import rerun.chunk
 from sensor_msgs.msg import JointState

@@ -1,0 +1,50 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Curves of all joints below each other, for a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+
+def draw_joints(
+    joints: Sequence[str], curves: Mapping[str, tuple[FloatArray, FloatArray]], quantity: str
+) -> npt.NDArray[np.object_]:
+    """
+    Draw the curves of each joint in axes of their own.
+
+    Parameters
+    ----------
+    joints : sequence of str
+        The joints.
+    curves : mapping of str to (ndarray, ndarray)
+        By their label: times (N,) [s] and values (N, n).
+    quantity : str
+        What is drawn, with its unit.
+
+    Returns
+    -------
+    ndarray of matplotlib.axes.Axes, shape (n,)
+
+    """
+    from matplotlib import pyplot as plt
+
+    count = len(joints)
+    size = (8.0, 1.0 + 1.3 * count)
+    figure, axes = plt.subplots(
+        count, sharex=True, squeeze=False, figsize=size, layout='constrained'
+    )
+    for joint, (name, axis) in enumerate(zip(joints, axes[:, 0], strict=True)):
+        for label, (t, values) in curves.items():
+            axis.plot(t, values[:, joint], label=label, linewidth=1.0)
+        axis.set_title(name, loc='left', fontsize='medium')
+        axis.grid(True, alpha=0.3)
+    axes[-1, 0].set_xlabel('time [s]')
+    figure.supylabel(quantity)
+    if len(curves) > 1:
+        axes[0, 0].legend(loc='upper right')
+    return np.asarray(axes[:, 0])
