@@ -247,7 +247,7 @@ def test_a_page_has_the_period_of_the_recording_and_not_of_its_rows(case):
     recording = Recording(joints=robot.joints, t=t, q=np.sin(angle) + 0.4 * np.sin(3.0 * angle))
     rest = np.zeros_like(recording.q[::11])
     rows = Motion(robot.joints, t[::11], recording.q[::11], rest, rest, rest)
-    fit = Fit('run', rows, rest, np.ones(rest.shape, dtype=bool))
+    fit = Fit('run', rows, np.ones(rest.shape, dtype=bool), rest)
     quality = RecordingQuality.of(recording, 'training', [fit])
     assert quality.repeatability.period == pytest.approx(8.0, abs=1e-3)
     html = DataQuality([quality], robot).html()

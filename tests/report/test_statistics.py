@@ -24,7 +24,7 @@ def fit_with(residual):
     count = len(residual)
     zero = np.zeros((count, 1))
     motion = Motion(('joint',), 0.01 * np.arange(count), zero, zero, zero, residual[:, np.newaxis])
-    return Fit('bag', motion, zero, np.ones((count, 1), dtype=bool))
+    return Fit('bag', motion, np.ones((count, 1), dtype=bool), zero)
 
 
 def test_noise_goes_with_nothing():

@@ -87,10 +87,10 @@ class Prior:
         """Return the data as regressions in which the columns of `named` more values are zero."""
         return [
             Regression(
-                part.at_rows.with_torque(rest - rows @ change),
-                np.concatenate([rows, np.zeros((*rest.shape, named))], axis=2),
-                part.informative,
                 part.source,
+                part.at_rows.with_torque(rest - rows @ change),
+                part.informative,
+                np.concatenate([rows, np.zeros((*rest.shape, named))], axis=2),
             )
             for part, rows, rest in zip(self.data, self.rows, self.rest, strict=True)
         ]

@@ -17,10 +17,10 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import rigid_rows
 from armid_ros.effects import Effect
-from armid_ros.identification.assess.data_faults import Stretch
 from armid_ros.identification.rows.checks import check_stamps, moving
 from armid_ros.identification.rows.decimation import check_decimation
 from armid_ros.identification.rows.period import find_period
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,

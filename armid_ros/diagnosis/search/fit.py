@@ -361,7 +361,7 @@ def _covariance(
     precision[: len(described), : len(described)] = described
     rows = zip(evidence.data, evidence.weighted(columns), evidence.weighted(residual), strict=True)
     problem = [
-        Regression(part.at_rows.with_torque(own), block, part.informative, part.source)
+        Regression(part.source, part.at_rows.with_torque(own), part.informative, block)
         for part, block, own in rows
     ]
     problem += more

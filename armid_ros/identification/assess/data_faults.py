@@ -11,7 +11,6 @@ explains any gap. Names, signs and units are those that identification tells; se
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
@@ -40,9 +39,10 @@ from armid_ros.identification.rows.checks import (
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.rows.stamps import uneven_stamps
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 import numpy as np
@@ -54,33 +54,6 @@ _BEYOND = 1.5
 _CLIPPED = 0.02
 #: A step of a position at this multiple of the highest velocity is none of the arm.
 _IMPOSSIBLE = 10.0
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """
-    An unbroken stretch of a recording in rows.
-
-    Attributes
-    ----------
-    source : str
-        The recording.
-    motion : Motion
-        Filtered motion with the measured torque, M rows.
-    informative : ndarray, shape (M, n)
-        False where a joint rests or turns round.
-
-    """
-
-    source: str
-    motion: Motion
-    informative: npt.NDArray[np.bool_]
-
-    @property
-    def torque(self) -> FloatArray:
-        """Measured torque, shape (M, n) [N m]."""
-        assert self.motion.tau is not None
-        return self.motion.tau
 
 
 def check_data(
@@ -149,7 +122,7 @@ def check_data(
     for one in recordings:
         faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
     if alone and not faults:  # another machine that an arm is tied to may drive it
-        moved, torques = [part.motion for part in data], [part.torque for part in data]
+        moved, torques = [part.motion for part in data], [part.tau for part in data]
         driven = driven_by_friction(arm.robot, moved, torques)
         faults += [wrong_sign(driven)] if driven else []
     notes = [note for one in recordings for note in _extremes(arm.robot, one)]

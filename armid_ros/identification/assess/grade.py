@@ -328,7 +328,7 @@ def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) ->
 
     """
     told = np.concatenate([fit.informative for fit in fits])
-    torque = told * np.concatenate([_torque(fit) for fit in fits])
+    torque = told * np.concatenate([fit.tau for fit in fits])
     rows = np.maximum(np.count_nonzero(told, axis=0), 1)
     size = np.sqrt(np.sum(torque**2, axis=0) / rows)
     noise = np.divide(torque_noise(fits, used), size, out=np.zeros_like(size), where=size > 0.0)
@@ -345,7 +345,7 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     friction steps in few of them.
 
     """
-    parts = [np.abs(np.diff(_torque(fit), 2, axis=0)) for fit in fits]
+    parts = [np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits]
     differences = np.concatenate(parts)
     if not len(differences):
         return np.zeros(fits[0].motion.n_joints)
@@ -357,8 +357,3 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
         for lag in (0, step, 2 * step)
     )
     return np.asarray(deviation / np.sqrt((6.0 * own - 8.0 * next_one + 2.0 * after) / own))
-
-
-def _torque(fit: Fit) -> FloatArray:
-    assert fit.motion.tau is not None
-    return fit.motion.tau

@@ -100,7 +100,7 @@ class FittedValues:
     def fits(self) -> tuple[Fit, ...]:
         """Return how the model predicts the data that it was fitted to."""
         return tuple(
-            Fit(part.source, part.motion, torque, part.informative)
+            Fit(part.source, part.motion, part.informative, torque)
             for part, torque in zip(self.problem, self.predicted, strict=True)
         )
 

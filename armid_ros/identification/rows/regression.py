@@ -39,41 +39,53 @@ REST_TIME = 0.2
 
 
 @dataclass(frozen=True)
-class Regression:
+class Stretch:
     """
-    One unbroken stretch of motion as a linear problem, filtered and decimated on both sides.
+    One unbroken stretch of a recording in rows, filtered and decimated.
 
     Attributes
     ----------
-    motion : Motion
-        Decimated motion of M samples with the filtered torque.
-    columns : ndarray, shape (M, n, r)
-        Filtered columns of the chosen parameters.
-    informative : ndarray of bool, shape (M, n)
-        False where a joint that dry friction may hold is at rest: its torque says nothing.
     source : str
         The recording it comes from.
+    motion : Motion
+        Decimated motion of M samples with the filtered measured torque.
+    informative : ndarray of bool, shape (M, n)
+        False where a joint that dry friction may hold is at rest, where any torque is right.
+
+    """
+
+    source: str
+    motion: Motion
+    informative: npt.NDArray[np.bool_]
+
+    @property
+    def tau(self) -> FloatArray:
+        """Return the filtered measured torque, shape (M, n) [N m]."""
+        assert self.motion.tau is not None
+        return self.motion.tau
+
+
+@dataclass(frozen=True)
+class Regression(Stretch):
+    """
+    A stretch as a linear problem, filtered alike on both sides.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (M, n, r)
+        Filtered columns of the chosen parameters.
     constant : ndarray, shape (M, n), or None
         Filtered torque that the linear model has where all values are zero; None for none, as of
         a model that is linear in all its parameters.
 
     """
 
-    motion: Motion
     columns: FloatArray
-    informative: npt.NDArray[np.bool_]
-    source: str
     constant: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Freeze the columns."""
         object.__setattr__(self, 'columns', read_only(self.columns))
-
-    @property
-    def tau(self) -> FloatArray:
-        """Return the filtered measured torque, shape (M, n)."""
-        assert self.motion.tau is not None
-        return self.motion.tau
 
     @property
     def target(self) -> FloatArray:
@@ -145,32 +157,23 @@ def regressions(
         for motion in segments(recording, used):
             decimated, informative = _rows(arm, motion, used)
             stacked = filtered_columns(arm, columns, motion, used, tick)
-            result.append(Regression(decimated, stacked, informative, recording.source))
+            result.append(Regression(recording.source, decimated, informative, stacked))
     return result
 
 
 @dataclass(frozen=True)
-class Fit:
+class Fit(Stretch):
     """
-    How a model predicts one unbroken stretch of a recording.
+    How a model predicts a stretch.
 
     Attributes
     ----------
-    source : str
-        The recording.
-    motion : Motion
-        Filtered and decimated motion with measured torque, M samples.
     predicted : ndarray, shape (M, n)
         Torque of the model, filtered alike [N m].
-    informative : ndarray of bool, shape (M, n)
-        False where a joint is held at rest by friction, where any torque is right.
 
     """
 
-    source: str
-    motion: Motion
     predicted: FloatArray
-    informative: npt.NDArray[np.bool_]
 
     def __repr__(self) -> str:
         """Return what it is, and how far off, in a line."""
@@ -180,8 +183,7 @@ class Fit:
     @property
     def residual(self) -> FloatArray:
         """Measured minus predicted torque, shape (M, n) [N m]."""
-        assert self.motion.tau is not None
-        return self.motion.tau - self.predicted
+        return self.tau - self.predicted
 
 
 @dataclass(frozen=True)
@@ -212,7 +214,7 @@ class Score:
         """Score one or more stretches together."""
         used = np.concatenate([fit.informative for fit in fits])
         residual = used * np.concatenate([fit.residual for fit in fits])
-        tau = used * np.concatenate([fit.motion.tau for fit in fits if fit.motion.tau is not None])
+        tau = used * np.concatenate([fit.tau for fit in fits])
         lengths, count = np.linalg.norm(tau, axis=0), np.maximum(used.sum(axis=0), 1)
         return Score(
             float(100.0 * np.linalg.norm(residual) / np.linalg.norm(tau)),
@@ -239,7 +241,7 @@ def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioni
         for motion in segments(recording, used):
             rows, informative = _rows(arm, motion, used)
             torque = filtered_torque(arm, motion, used)
-            found.append(Fit(recording.source, rows, torque, informative))
+            found.append(Fit(recording.source, rows, informative, torque))
     return found
 
 

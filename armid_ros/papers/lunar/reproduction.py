@@ -251,8 +251,8 @@ def _repeat(
         Fit(
             'held out',
             tests[0].with_torque(torques[0]),
-            shown,
             np.ones(torques[0].shape, dtype=bool),
+            shown,
         ),
     )
 

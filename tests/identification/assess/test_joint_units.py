@@ -7,13 +7,14 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
-from armid_ros.identification.assess.data_faults import check_data, Stretch
+from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.joint_units import (
     factors_apart,
     knows,
     units_beside_model,
     units_beyond_drives,
 )
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.model import regressor
 from armid_ros.motion import Motion

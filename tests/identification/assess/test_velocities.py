@@ -7,8 +7,9 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
-from armid_ros.identification.assess.data_faults import check_data, Stretch
+from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_ratio
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.inspection import inspect
 from armid_ros.robots import load_robot

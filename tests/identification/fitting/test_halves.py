@@ -13,7 +13,7 @@ def problem(columns, tau):
     informative = np.ones(tau.shape, np.bool_)
     still = np.zeros((len(tau), tau.shape[1]))
     motion = Motion(('a', 'b'), np.arange(len(tau)), still, still, still, tau)
-    return [Regression(motion, columns, informative, 'drawn')]
+    return [Regression('drawn', motion, informative, columns)]
 
 
 def test_data_without_noise_that_cannot_tell_two_parameters_apart_predict_themselves():

@@ -71,7 +71,7 @@ def recording(rng, values, source, columns=None):
     tau = own @ np.asarray(values) + NOISE * rng.normal(size=(LONG, 2))
     still = np.zeros((LONG, 2))
     motion = Motion(('a', 'b'), np.arange(LONG), still, still, still, tau)
-    return Regression(motion, own, np.ones(tau.shape, np.bool_), source)
+    return Regression(source, motion, np.ones(tau.shape, np.bool_), own)
 
 
 def fitted(problem):

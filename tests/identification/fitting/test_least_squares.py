@@ -23,7 +23,7 @@ def problem(rng, n_samples=400, noise=None, colour=0.0):
     tau = columns @ TRUTH + coloured * (SCALE if noise is None else noise)
     zero = np.zeros((n_samples, 2))
     motion = Motion(('a', 'b'), t, zero, zero, zero, tau)
-    return Regression(motion, columns, np.ones((n_samples, 2), dtype=bool), 'bag')
+    return Regression('bag', motion, np.ones((n_samples, 2), dtype=bool), columns)
 
 
 @pytest.mark.parametrize('method', ['ols', 'wls', 'irls'])
@@ -89,7 +89,7 @@ def test_outliers_do_not_pull():
     data = problem(np.random.default_rng(1), noise=np.full(2, 0.05))
     tau = data.tau.copy()
     tau[::40] += 30.0
-    spoiled = Regression(data.motion.with_torque(tau), data.columns, data.informative, 'bag')
+    spoiled = Regression('bag', data.motion.with_torque(tau), data.informative, data.columns)
     robust, plain = solve([spoiled], 'irls'), solve([spoiled], 'wls')
     assert np.abs(robust.values - TRUTH).max() < 0.03
     assert np.abs(plain.values - TRUTH).max() > 0.1
@@ -101,7 +101,7 @@ def test_rows_that_say_nothing_are_not_used():
     tau, used = data.tau.copy(), np.ones(data.tau.shape, dtype=bool)
     tau[:100, 0] = 7.0
     used[:100, 0] = False
-    partial = Regression(data.motion.with_torque(tau), data.columns, used, 'bag')
+    partial = Regression('bag', data.motion.with_torque(tau), used, data.columns)
     np.testing.assert_allclose(solve([partial]).values, TRUTH, atol=0.01)
 
 
@@ -110,7 +110,7 @@ def test_two_stretches_are_one_problem():
 
     def part(samples):
         return Regression(
-            data.motion.select(samples), data.columns[samples], data.informative[samples], 'bag'
+            'bag', data.motion.select(samples), data.informative[samples], data.columns[samples]
         )
 
     halves = solve([part(slice(0, 500)), part(slice(500, 1000))])
@@ -142,7 +142,7 @@ def test_noise_that_the_fit_takes_is_made_up_for():
     for _ in range(200):
         noise = lfilter([1.0], [1.0, -0.9], rng.normal(size=(1400, 1)), axis=0)[200:]
         motion = Motion(('a',), t, zero, zero, zero, noise)
-        solution = solve([Regression(motion, columns, used, 'bag')])
+        solution = solve([Regression('bag', motion, used, columns)])
         values.append(solution.values)
         stated.append(np.diag(solution.covariance))
     ratio = np.sqrt(np.mean(stated, axis=0)) / np.std(values, axis=0)

@@ -295,7 +295,7 @@ def test_a_real_arm_is_identified_online_as_well_as_offline(real_data):
     assert not online.rejected and not online.restarts
     problem = regressions(arm, online.base.independent, [recording], offline.used)
     values = online.estimate().values
-    fits = [Fit(p.source, p.motion, p.columns @ values, p.informative) for p in problem]
+    fits = [Fit(p.source, p.motion, p.informative, p.columns @ values) for p in problem]
     error = Score.of(fits).relative_error_percent
     assert error <= 6.6
     assert error <= 1.1 * Score.of(offline.training).relative_error_percent

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import grade, IdentificationSettings, identify
-from armid_ros.identification.assess.data_faults import check_data, Stretch
+from armid_ros.identification.assess.data_faults import check_data
+from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
 from armid_ros.identification.rows.stamps import uneven_stamps
 import numpy as np
