@@ -77,7 +77,7 @@ def measured(plan: TablePlan) -> Recording:
         out_of_order=counts['out_of_order'],
         restarted=counts['restarted'],
         nan=int((~kept & stamped).sum()),
-        unstamped=int((~stamped).sum()),
+        unstamped=int((~stamped).sum()) + counts['unstamped'],
         not_finite=culprits,
         gaps=gaps(time),
         absent=plan.absent,
