@@ -112,8 +112,8 @@ class WatchedArm:
     refused : tuple of dict
         Rows of the table ``refused``.
     units : dict or None
-        Of two bags that follow each other, of which torques of one are in another unit: a row of
-        the table ``changes``, with the median factor less 1 as the size.
+        A row of ``changes`` where torques of a bag are in another unit than those before; its
+        size is the median factor less 1.
 
     """
 
@@ -228,12 +228,7 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """
-    Return the changes that an arm is named for, the least probable first.
-
-    Torques in another unit are the only one: they make all values change.
-
-    """
+    """Return the changes that an arm is named for, the least probable first; units alone."""
     if arm.units is not None:
         return [arm.units]
     rows = []
@@ -352,12 +347,12 @@ def _units(
             ]
         )
         if factors:
-            row: dict[str, Any] = dict.fromkeys(CHANGES.names, 0.0)
-            row |= dict.fromkeys(('joint', 'unit'), '')
-            return row | {
+            return dict.fromkeys(CHANGES.names, 0.0) | {
                 'arm': after['arm'],
                 'kind': 'units',
                 'name': 'torque',
+                'joint': '',
+                'unit': '',
                 'last_day': day_text(before['start_ns'] / _DAY_NS),
                 'first_day': day_text(after['start_ns'] / _DAY_NS),
                 'bag': after['bag'],

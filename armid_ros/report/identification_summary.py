@@ -115,7 +115,9 @@ def summary(
     estimate = result.estimate
     known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
     lines = [
-        f'{one.source}: {one.report.describe()}' for one in recordings if not one.report.unharmed
+        f'{one.source}: {one.report.describe()}'
+        for one in recordings
+        if one.report.unwrapped or not one.report.unharmed
     ]
     total = len(estimate.parameters)
     text = f'{known} of {counted(total, "parameter")} differ from zero'
