@@ -51,7 +51,7 @@ def export_mjcf(
     text : str
         MJCF; files of meshes have absolute paths.
     left_out : tuple of str
-        What of the description is not in it; a comment says so too.
+        What of the description is not in it; a comment lists it too.
 
     Raises
     ------
