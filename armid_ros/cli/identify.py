@@ -153,7 +153,7 @@ def _print(
     """Print grade, a row for each joint and the next step; with verbose, everything."""
     from armid_ros.report.identification_summary import headline, joint_table, summary
 
-    for line in headline(found.graded, found.core, found.validation):
+    for line in headline(found.graded, found.core, found.validation, found.verification):
         say(line)
     for line in found.gains.sentences() if found.gains else ():
         say(line)

@@ -9,7 +9,7 @@ from rest to rest.
 
 """
 
-from armid_ros.excitation.design import Design, design, design_speeds, DesignProgress, evaluate
+from armid_ros.excitation.design import Design, design, DesignProgress, evaluate
 from armid_ros.excitation.ending import Ending
 from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
@@ -25,7 +25,6 @@ from armid_ros.excitation.joint_limits import with_joint_limits
 from armid_ros.excitation.limits import (
     check_limits,
     Limits,
-    require_within,
     SPEED_CLASSES,
     used_shares,
     Violation,
@@ -82,7 +81,6 @@ __all__ = [
     'Violation',
     'check_limits',
     'design',
-    'design_speeds',
     'evaluate',
     'excitation_faults',
     'find_floor',
@@ -95,7 +93,6 @@ __all__ = [
     'obstacles_alone',
     'plan_run',
     'random_feasible',
-    'require_within',
     'save_excitation',
     'slowed',
     'tracking_fault',

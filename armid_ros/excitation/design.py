@@ -4,21 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from copy import deepcopy
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.limits import Limits, SPEED_CLASSES, used_shares
+from armid_ros.excitation.limits import Limits, used_shares
 from armid_ros.excitation.placing import placed
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import Information
 from armid_ros.excitation.search.local import exact_cost, Found
-from armid_ros.excitation.search.parallel import INTERRUPTED, search_all, Task
+from armid_ros.excitation.search.parallel import search_all, Task
 from armid_ros.excitation.settings import DesignSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
@@ -154,52 +153,6 @@ def design(
     outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch)
     excitation = placed(problem, outcome.found.trajectory, clearance)
     return evaluate(problem, excitation, prior, stopped=outcome.stopped)
-
-
-def design_speeds(
-    arm: ArmModel,
-    settings: DesignSettings,
-    rng: np.random.Generator,
-    *,
-    speeds: Sequence[str | float] = tuple(SPEED_CLASSES),
-    collision: CollisionModel | None = None,
-    prior_information: FloatArray | None = None,
-    rival: ArmModel | None = None,
-    progress: Callable[[str | float, DesignProgress], None] | None = None,
-) -> dict[str | float, Design]:
-    """
-    Design one trajectory for every speed class, each as `design` finds it on its own.
-
-    Returns
-    -------
-    dict
-        A design for every speed, in the order given; KeyboardInterrupt leaves out those that were
-        not begun.
-
-    """
-    if settings.limits is not None:
-        raise TrajectoryError(
-            'speed classes are shares of the limits of the robot; give no limits'
-        )
-    designs: dict[str | float, Design] = {}
-    for speed in speeds:
-
-        def tell(step: DesignProgress, speed: str | float = speed) -> None:
-            if progress is not None:
-                progress(speed, step)
-
-        designs[speed] = design(
-            arm,
-            replace(settings, speed=speed),
-            deepcopy(rng),
-            collision=collision,
-            prior_information=prior_information,
-            rival=rival,
-            progress=tell,
-        )
-        if designs[speed].stopped == INTERRUPTED:
-            break
-    return designs
 
 
 def evaluate(

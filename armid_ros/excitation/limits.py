@@ -225,13 +225,6 @@ def check_limits(
     return tuple(_violations(limits, motion, torque))
 
 
-def require_within(limits: Limits, motion: Motion, torque: FloatArray | None = None) -> None:
-    """Raise a TrajectoryError that lists every limit the motion exceeds."""
-    violations = check_limits(limits, motion, torque)
-    if violations:
-        raise TrajectoryError('; '.join(str(violation) for violation in violations))
-
-
 def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
     """
     Say how much of every limit a motion uses.

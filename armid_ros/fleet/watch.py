@@ -87,44 +87,6 @@ ARMS = pa.schema(
 
 
 @dataclass(frozen=True, eq=False)
-class UnitChange:
-    """
-    Torques of an arm that are in another unit from one bag to the next.
-
-    Attributes
-    ----------
-    before, after : dict
-        Rows of the table ``bags``.
-    factors : mapping of str to float
-        By which the torques of each joint changed.
-
-    """
-
-    before: dict[str, Any]
-    after: dict[str, Any]
-    factors: Mapping[str, float]
-
-    def row(self, arm: str) -> dict[str, Any]:
-        """Return it as a row of the table ``changes``; its size is the median factor, less 1."""
-        return {
-            'arm': arm,
-            'kind': 'units',
-            'name': 'torque',
-            'joint': '',
-            'unit': '',
-            'last_day': day_text(self.before['start_ns'] / _DAY_NS),
-            'first_day': day_text(self.after['start_ns'] / _DAY_NS),
-            'bag': self.after['bag'],
-            'level': 1.0,
-            'size': float(np.median(list(self.factors.values()))) - 1.0,
-            'std': 0.0,
-            'p': 0.0,
-            'adjusted_p': 0.0,
-            'text': tell_units(self.before['bag'], self.after['bag'], self.factors),
-        }
-
-
-@dataclass(frozen=True, eq=False)
 class WatchedArm:
     """
     An arm over time.
@@ -149,8 +111,9 @@ class WatchedArm:
         Parameter furthest from that of its siblings, and by how much.
     refused : tuple of dict
         Rows of the table ``refused``.
-    units : UnitChange or None
-        Two bags that follow each other, of which torques of one are in another unit.
+    units : dict or None
+        A row of ``changes`` where torques of a bag are in another unit than those before; its
+        size is the median factor less 1.
 
     """
 
@@ -163,7 +126,7 @@ class WatchedArm:
     named: tuple[HistoryChange, ...]
     unlike: tuple[str, float]
     refused: tuple[dict[str, Any], ...]
-    units: UnitChange | None = None
+    units: dict[str, Any] | None = None
 
     @property
     def health(self) -> str:
@@ -265,14 +228,9 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """
-    Return the changes that an arm is named for, the least probable first.
-
-    Torques in another unit are the only one: they make all values change.
-
-    """
+    """Return the changes that an arm is named for, the least probable first; units alone."""
     if arm.units is not None:
-        return [arm.units.row(arm.arm)]
+        return [arm.units]
     rows = []
     for change in arm.named:
         series = change.series
@@ -372,8 +330,8 @@ def _judged(
 
 def _units(
     series: Sequence[ParameterHistory], bags: Sequence[dict[str, Any]]
-) -> UnitChange | None:
-    """Return the first two bags of which torques of one are in another unit."""
+) -> dict[str, Any] | None:
+    """Return the first change of the unit of torques, as a row of the table ``changes``."""
     of_bag: dict[float, dict[ParameterName, tuple[float, float]]] = {}
     for one in (s for s in series if s.name != RESIDUAL):
         parameter = ParameterName(one.name, one.joint, one.unit)
@@ -389,7 +347,19 @@ def _units(
             ]
         )
         if factors:
-            return UnitChange(before, after, factors)
+            return dict.fromkeys(CHANGES.names, 0.0) | {
+                'arm': after['arm'],
+                'kind': 'units',
+                'name': 'torque',
+                'joint': '',
+                'unit': '',
+                'last_day': day_text(before['start_ns'] / _DAY_NS),
+                'first_day': day_text(after['start_ns'] / _DAY_NS),
+                'bag': after['bag'],
+                'level': 1.0,
+                'size': float(np.median(list(factors.values()))) - 1.0,
+                'text': tell_units(before['bag'], after['bag'], factors),
+            }
     return None
 
 

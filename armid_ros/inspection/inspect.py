@@ -193,6 +193,8 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
         yield Remark('doubt', rounded)
     elif lost or report.malformed or report.unstamped or report.incomplete:
         yield Remark('doubt', report.describe())
+    if report.unwrapped:
+        yield Remark('note', f'jumps by whole turns undone: {", ".join(report.unwrapped)}')
     if sampling.gaps:
         yield Remark(
             'doubt',

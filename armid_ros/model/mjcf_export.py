@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from armid_ros.model.pseudo_inertia import require_consistent
 from armid_ros.motion import FloatArray
 from armid_ros.robots import held_joints, Robot
-from armid_ros.robots.geometry import Shape, shapes_of
+from armid_ros.robots.geometry import LinkShape, shapes_of
 import numpy as np
 import pinocchio as pin
 
@@ -51,7 +51,7 @@ def export_mjcf(
     text : str
         MJCF; files of meshes have absolute paths.
     left_out : tuple of str
-        What of the description is not in it; a comment says so too.
+        What of the description is not in it; a comment lists it too.
 
     Raises
     ------
@@ -82,15 +82,7 @@ def export_mjcf(
             {'name': robot.links[index]} | _place(model.jointPlacements[identity]),
         )
         bodies[identity] = body
-        inertia = model.inertias[identity]
-        tensor = inertia.inertia
-        ElementTree.SubElement(
-            body,
-            'inertial',
-            pos=_numbers(inertia.lever),
-            mass=repr(float(inertia.mass)),
-            fullinertia=_numbers(tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
-        )
+        ElementTree.SubElement(body, 'inertial', _inertial(model.inertias[identity]))
         ElementTree.SubElement(body, 'joint', _joint(robot, index))
         for key, table in (
             ('damping', damping),
@@ -142,7 +134,7 @@ def _shapes(
     return list(left_out)
 
 
-def _size(shape: Shape) -> dict[str, str]:
+def _size(shape: LinkShape) -> dict[str, str]:
     """Return the attribute of a geom with halves of its edges and lengths."""
     if shape.kind in ('box', 'sphere'):
         return {'size': _numbers([(0.5 if shape.kind == 'box' else 1.0) * x for x in shape.size])}
@@ -152,6 +144,15 @@ def _size(shape: Shape) -> dict[str, str]:
 def _place(placement: pin.SE3) -> dict[str, str]:
     x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
     return {'pos': _numbers(placement.translation), 'quat': _numbers([w, x, y, z])}
+
+
+def _inertial(inertia: pin.Inertia) -> dict[str, str]:
+    tensor = inertia.inertia
+    return {
+        'pos': _numbers(inertia.lever),
+        'mass': repr(float(inertia.mass)),
+        'fullinertia': _numbers(tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]),
+    }
 
 
 def _joint(robot: Robot, index: int) -> dict[str, str]:

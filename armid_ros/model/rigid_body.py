@@ -23,7 +23,7 @@ import pinocchio as pin
 #: origin of the joint frame.
 LINK_PARAMETERS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
 _LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
-#: Random states beyond which no more is told: each has a row for every joint.
+#: Random states that suffice for an arm of any length: each has a row for every joint.
 _MOST_STATES = 560
 
 

@@ -30,10 +30,10 @@ from armid_ros.recording.series import (
     merged,
     not_finite,
     ordered,
-    unwrapped,
 )
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray, Topic
+from armid_ros.recording.turns import unwrapped
 import numpy as np
 
 # More samples than this part being not finite is no glitch but a fault of the recording.

@@ -19,10 +19,17 @@ _FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 
 def headline(
-    graded: Grade, result: Identification, validation: Mapping[str, Sequence[Fit]]
+    graded: Grade,
+    result: Identification,
+    validation: Mapping[str, Sequence[Fit]],
+    verification: Verification | None = None,
 ) -> list[str]:
     """Return the grade with its reasons, and what the residual still depends on."""
     first, *others = graded.reasons
+    for line in () if verification is None else verification.left_out[::-1]:
+        _, failed, reason = line.partition(': not simulated: ')
+        if failed:  # of all recordings alike
+            others = [f'The model cannot be simulated: {reason}.', *graded.reasons[1:]]
     shown = [fit for fits in validation.values() for fit in fits] or result.training
     trends = residual_trends(result.arm.robot.joints, shown).values()
     return [f'{graded.word}: {first}', *others, *trends]
@@ -108,7 +115,9 @@ def summary(
     estimate = result.estimate
     known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
     lines = [
-        f'{one.source}: {one.report.describe()}' for one in recordings if not one.report.unharmed
+        f'{one.source}: {one.report.describe()}'
+        for one in recordings
+        if one.report.unwrapped or not one.report.unharmed
     ]
     total = len(estimate.parameters)
     text = f'{known} of {counted(total, "parameter")} differ from zero'

@@ -28,7 +28,7 @@ _SIZES = {
 }
 
 
-class Shape(NamedTuple):
+class LinkShape(NamedTuple):
     """
     One <visual> or <collision> of a link.
 
@@ -68,7 +68,7 @@ def shapes_of(
     tag: Literal['visual', 'collision'],
     other: Literal['visual', 'collision'] | None = None,
     progress: Callable[[float], None] | None = None,
-) -> Iterator[Shape]:
+) -> Iterator[LinkShape]:
     """
     Yield the shapes of a robot.
 
@@ -110,7 +110,7 @@ def shapes_of(
                     f'sphere, cylinder, capsule or mesh with its numbers'
                 ) from None
             path = find_mesh(mesh, robot.path) if kind == 'mesh' else None
-            yield Shape(name, frames[name], number, placement, kind, size, mesh, path)
+            yield LinkShape(name, frames[name], number, placement, kind, size, mesh, path)
 
 
 def collision_geometry(
@@ -151,7 +151,7 @@ def collision_geometry(
     return geometry, notes
 
 
-def _bodies(shape: Shape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
+def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
     """Return the bodies of a shape, and how far along its z axis each is."""
     if shape.kind == 'box':
         return [(coal.Box(*shape.size), 0.0)]

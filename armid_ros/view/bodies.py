@@ -16,7 +16,7 @@ from pathlib import Path
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
-from armid_ros.robots.geometry import Shape, shapes_of
+from armid_ros.robots.geometry import LinkShape, shapes_of
 from armid_ros.robots.sticks import sticks
 import coal
 import numpy as np
@@ -77,7 +77,7 @@ def bodies(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
     return tuple(found) or _bars(robot), tuple(notes)
 
 
-def _triangles(shape: Shape) -> FloatArray:
+def _triangles(shape: LinkShape) -> FloatArray:
     """Return the triangles of a shape in its own frame."""
     if shape.path is not None:
         return _mesh(shape.path, np.array(shape.size))

@@ -11,7 +11,6 @@ from armid_ros.excitation import (
     check_limits,
     ClearanceModel,
     design,
-    design_speeds,
     DesignProblem,
     DesignSettings,
     evaluate,
@@ -161,19 +160,6 @@ def test_error_in_a_process_of_its_own_is_raised_here(two_link_arm, quick):
     rngs = np.random.default_rng(0).spawn(2)
     with pytest.raises(TrajectoryError, match=r'shoulder.*2 N m'):
         search_all(task, rngs, lambda done, found: None)
-
-
-def test_speed_classes_come_from_one_call(two_link_arm, quick):
-    settings = replace(quick, starts=1, iterations=10)
-    designs = design_speeds(two_link_arm, settings, np.random.default_rng(0))
-    assert list(designs) == ['slow', 'medium', 'fast']
-    fastest = [
-        np.abs(d.excitation.trajectory.one_period(500).dq / d.limits.velocity).max()
-        for d in designs.values()
-    ]
-    assert max(fastest) <= 1.0
-    log_dets = [d.information.log_det for d in designs.values()]
-    assert log_dets == sorted(log_dets)
 
 
 def test_design_after_a_recording_adds_what_it_lacks(two_link_arm, quick):

@@ -8,9 +8,11 @@ import re
 
 from armid_ros.identification import (
     Fit,
+    Grade,
     IdentificationSettings,
     identify,
     PhysicalSettings,
+    Verification,
     verify,
 )
 from armid_ros.identification.assess.consistency import NoiseCheck
@@ -18,6 +20,7 @@ from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.report import hash_files, identification_report, Provenance, versions
 from armid_ros.report.identification_report import Assessment
+from armid_ros.report.identification_summary import headline
 from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.assessment import EncoderNoise
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
@@ -399,3 +402,18 @@ def test_print_shows_what_is_folded_and_folds_it_again(browser, first_plot):
     assert shown == folds > before == browser.run(count)
     assert len(sheet) > 100_000
     assert browser.complaints == []
+
+
+def test_the_terminal_says_below_the_grade_that_the_model_cannot_be_simulated(case):
+    reasons = ('It predicts.', 'But not that.')
+    failed = Verification(
+        None, (), ('a.mcap: not simulated: no body', 'b.mcap: not simulated: no')
+    )
+    lines = headline(Grade('good', reasons), case.result, {}, failed)
+    assert lines[:3] == [
+        'good: It predicts.',
+        'The model cannot be simulated: no body.',
+        'But not that.',
+    ]
+    unasked = Verification(None, (), ('not simulated: no recording was held out',))
+    assert headline(Grade('good', reasons), case.result, {}, unasked)[1] == 'But not that.'

@@ -180,6 +180,7 @@ class TestRefused:
         [
             ('<robot name="r">\n<link name="a">\n</robot>', 'malformed XML at line 3'),
             ('<mujoco/>', 'root element is <mujoco>, not <robot>'),
+            ('<mujocoinclude/>', 'load the MJCF that includes it'),
             ('<robot name="r"/>', 'it has no links'),
             (robot(link('base', ''), link('base', '')), "two links are named 'base'"),
             (robot(ARM, joint('shoulder', 'base', 'upper')), "two joints are named 'shoulder'"),
@@ -201,6 +202,10 @@ class TestRefused:
     def test_by_name(self, text: str, message: str) -> None:
         with pytest.raises(RobotError, match=message):
             robot_from_urdf(text)
+
+    def test_a_prefix_that_is_not_declared_is_no_fault(self) -> None:
+        text = robot(ARM).replace('<limit ', '<limit drake:acceleration="2" ')
+        assert robot_from_urdf(text).upper == [2.0]
 
     def test_a_joint_that_moves_nothing_is_noted(self) -> None:
         arm = robot_from_urdf(robot(ARM, link('lower', ''), joint('elbow', 'upper', 'lower')))

@@ -15,12 +15,12 @@ from armid_ros.recording.series import (
     JointSamples,
     longest_in_order,
     not_finite,
-    unwrapped,
 )
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
+from armid_ros.recording.turns import unwrapped
 import numpy as np
 import numpy.typing as npt
 
@@ -77,7 +77,7 @@ def measured(plan: TablePlan) -> Recording:
         out_of_order=counts['out_of_order'],
         restarted=counts['restarted'],
         nan=int((~kept & stamped).sum()),
-        unstamped=int((~stamped).sum()),
+        unstamped=int((~stamped).sum()) + counts['unstamped'],
         not_finite=culprits,
         gaps=gaps(time),
         absent=plan.absent,
