@@ -6,9 +6,3 @@ A recording to look at: the moving arm, measured and predicted torque, what is l
 ``make_scene`` computes, ``log_scene`` hands it to rerun, which is installed by the extra ``view``.
 
 """
-
-from armid_ros.view.bodies import bodies, Body
-from armid_ros.view.rerun_log import log_scene, open_stream, rerun, shown
-from armid_ros.view.scene import make_scene, Scene
-
-__all__ = ['Body', 'Scene', 'bodies', 'log_scene', 'make_scene', 'open_stream', 'rerun', 'shown']

@@ -56,7 +56,8 @@ def view(
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
-    from armid_ros.view import log_scene, make_scene, open_stream, rerun
+    from armid_ros.view.rerun_log import log_scene, open_stream, rerun
+    from armid_ros.view.scene import make_scene
 
     if live == (bag is not None):
         raise ArmidError('armid view shows a BAG, or with --live what is on the topics: name one')
@@ -99,7 +100,7 @@ def view(
 def _save(scene: Scene, out: Path) -> None:
     """Write a file beside its place and move it there, so that it is whole or absent."""
     from armid_ros.errors import OutputError
-    from armid_ros.view import log_scene, open_stream
+    from armid_ros.view.rerun_log import log_scene, open_stream
 
     beside = out.with_name(f'.{out.name}.part')
     try:

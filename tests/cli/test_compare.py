@@ -60,25 +60,6 @@ def test_a_change_is_said_in_words_and_on_a_page(tmp_path):
     assert 'http' not in page.split('<main>')[1].split('<script>')[0]
 
 
-def test_json_is_for_programs(tmp_path):
-    first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
-    file = second / 'identification.json'
-    result = armid('compare', first, file, '--out', tmp_path / 'out', '--json')
-    document = json.loads(result.output)
-    assert document['schema'] == 'armid/comparison/1'
-    assert [row['changed'] for row in document['parameters']] == [True, False]
-    assert document == json.loads((tmp_path / 'out' / 'comparison.json').read_text())
-
-
-def test_bad_input_is_one_line_and_code_2(tmp_path):
-    first = identified(tmp_path / 'a', 0.08)
-    result = armid('compare', first, tmp_path / 'nothing', '--out', tmp_path / 'out')
-    assert result.exit_code == 2
-    assert 'nothing' in result.output
-    assert len(result.output.strip().splitlines()) == 1
-    assert not (tmp_path / 'out').exists()
-
-
 def test_an_escape_sequence_in_a_name_does_not_reach_the_terminal(tmp_path):
     first, second = identified(tmp_path / 'a', 0.08), identified(tmp_path / 'b', 0.1)
     for folder in (first, second):
@@ -145,15 +126,6 @@ def test_models_of_other_effects_leave_other_residuals(tmp_path):
     file.write_text(json.dumps(document))
     result = armid('compare', first, second, '--out', tmp_path / 'out')
     assert '30 times' in result.output and 'different effects' in result.output
-
-
-def test_one_result_given_twice_is_refused(tmp_path):
-    first = identified(tmp_path / 'a', 0.08)
-    copy = identified(tmp_path / 'b', 0.08)
-    for second in (first, first / 'identification.json', copy):
-        result = armid('compare', first, second, '--out', tmp_path / 'out')
-        assert result.exit_code == 2
-        assert 'given twice' in result.stderr and len(result.stderr.splitlines()) == 1
 
 
 def test_what_is_not_compared_is_counted(tmp_path):

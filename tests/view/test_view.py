@@ -13,8 +13,11 @@ import sys
 
 import armid_ros as ar
 from armid_ros.cli import main
-from armid_ros.view import bodies, log_scene, make_scene, open_stream, rerun_log
+from armid_ros.view import rerun_log
+from armid_ros.view.bodies import bodies
 from armid_ros.view.live import LiveLog
+from armid_ros.view.rerun_log import log_scene, open_stream
+from armid_ros.view.scene import make_scene
 from click.testing import CliRunner
 import numpy as np
 import pinocchio as pin
