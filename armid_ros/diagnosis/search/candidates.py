@@ -21,15 +21,17 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import EXCITED, excited, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import Problem, Projection
+from armid_ros.diagnosis.data.rows import make_problem, Problem, Projection
 from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspace
 from armid_ros.diagnosis.search.fit import Fitted
+from armid_ros.diagnosis.search.search_state import Nuisance
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE, Effect, Kind, Shape
 from armid_ros.effects.friction import friction_level
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -378,3 +380,26 @@ def _line_search(
         options={'maxiter': _EVALUATIONS},
     )
     return at(found.x) if -found.fun > gain(shape) else shape
+
+
+def nuisance_of(
+    found: Candidates, current: Fitted, evidence: Evidence
+) -> tuple[Problem, Nuisance]:
+    """
+    Return the problem of all candidates, and its nuisance parameters, whose columns come last.
+
+    The prior of the shapes of names is as precise as all data determine them: one fold alone may
+    hardly determine where a strap is fixed, and would predict the others by that.
+
+    """
+    pairs = zip(found.columns, current.columns, strict=True)
+    columns = [np.concatenate(pair, axis=2) for pair in pairs]
+    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
+    size = problem.x.shape[2]
+    free = tuple(range(size - current.columns[0].shape[2], size))
+    shaped = np.zeros(len(free))
+    first = len(free) - len(current.estimate.values)
+    shapes = [first + k for _, own in current.places for k in own]
+    shaped[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
+    held = NormalEquations(np.diag(shaped), np.zeros(len(shaped)))
+    return problem, Nuisance(free, current.prior + held)

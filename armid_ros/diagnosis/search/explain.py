@@ -18,15 +18,19 @@ from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, Problem
 from armid_ros.diagnosis.data.trajectory import Workspace
-from armid_ros.diagnosis.search.candidates import Candidates, candidates, Question
+from armid_ros.diagnosis.search.candidates import (
+    Candidates,
+    candidates,
+    nuisance_of,
+    Question,
+)
 from armid_ros.diagnosis.search.elimination import BackwardElimination, doubtful, LinearFit, pruned
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
 from armid_ros.diagnosis.search.held_out import with_jackknife_std
 from armid_ros.diagnosis.search.screening import screen_candidates, Screening
-from armid_ros.diagnosis.search.search_state import BaselineRows, Nuisance, SearchState, UnseenRows
+from armid_ros.diagnosis.search.search_state import BaselineRows, SearchState, UnseenRows
 from armid_ros.diagnosis.search.trial import (
     AcceptedCause,
     Candidate,
@@ -37,7 +41,6 @@ from armid_ros.diagnosis.search.trial import (
 )
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
-from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -438,26 +441,3 @@ def _friction(
         _, column, value = alive.pop(max(weak)[1])
         view = view.dropped(column, value)
         gone.append(column)
-
-
-def nuisance_of(
-    found: Candidates, current: Fitted, evidence: Evidence
-) -> tuple[Problem, Nuisance]:
-    """
-    Return the problem of all candidates, and its nuisance parameters, whose columns come last.
-
-    The prior of the shapes of names is as precise as all data determine them: one fold alone may
-    hardly determine where a strap is fixed, and would predict the others by that.
-
-    """
-    pairs = zip(found.columns, current.columns, strict=True)
-    columns = [np.concatenate(pair, axis=2) for pair in pairs]
-    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
-    size = problem.x.shape[2]
-    free = tuple(range(size - current.columns[0].shape[2], size))
-    shaped = np.zeros(len(free))
-    first = len(free) - len(current.estimate.values)
-    shapes = [first + k for _, own in current.places for k in own]
-    shaped[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
-    held = NormalEquations(np.diag(shaped), np.zeros(len(shaped)))
-    return problem, Nuisance(free, current.prior + held)
