@@ -100,10 +100,11 @@ def at_one_kilohertz(seconds, folder):
             'executor:=events',
         )  # fmt: skip
         excitation = process(
-            context, 'excitation_publisher', f'robot:={panda()}', f'file:={folder / "run.yaml"}'
+            context, 'excitation_publisher', f'robot:={panda()}', f'file:={folder / "run.yaml"}',
+            'floor:=none',
         )
         arm = process(context, 'simulated_arm', f'robot:={panda()}', 'executor:=events')
-        with recorder, excitation:
+        with recorder, excitation as moving:
             with arm:
                 while not node.received:
                     executor.spin_once(timeout_sec=0.1)
@@ -111,6 +112,7 @@ def at_one_kilohertz(seconds, folder):
                 end = time.monotonic() + seconds
                 while time.monotonic() < end:
                     executor.spin_once(timeout_sec=0.1)
+                assert moving.poll() is None, 'the excitation_publisher refuses the run'
             for _ in range(1000):
                 executor.spin_once(timeout_sec=0.001)
         missing = lost(first, node.last_stamp_ns, node.received)
