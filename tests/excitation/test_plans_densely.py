@@ -25,8 +25,9 @@ ARMS = (
     'ur3_robot', 'ur5_robot', 'ur10_robot', 'ur3_joint_limited_robot', 'ur5_joint_limited_robot',
     'ur10_joint_limited_robot', 'panda', 'z1', 'xarm7', 'so100', 'so101', 'talos_left_arm',
 )  # fmt: skip
-#: Height at which the floor itself is, without the clearance that plans keep [m].
-FLOOR = 0.0
+#: Height at which the floor itself is, without the clearance that plans keep [m]: that of the
+#: base, but for an arm that hangs from a torso.
+FLOORS = dict.fromkeys(ARMS, 0.0) | {'talos_left_arm': -1.1}
 
 
 def shipped(name):
@@ -38,7 +39,8 @@ def shipped(name):
 
 def planned(path):
     robot = load_robot(path)
-    arm, scene = ArmModel(robot), CollisionScene.of(robot, 0.01)
+    floor = FLOORS[path.stem]
+    arm, scene = ArmModel(robot), CollisionScene.of(robot, 0.01, str(floor) if floor else None)
     settings = DesignSettings(
         period=4.0, harmonics=3, samples=60, n_periods=1, run_in=1.0, speed='fast', starts=1,
         iterations=2, time_budget=60.0, processes=1,
@@ -71,7 +73,7 @@ def geometry(path, model, driven):
         )
         if one == other or int(model.parents[max(one, other)]) == min(one, other):
             bodies.removeCollisionPair(pair)
-    half = coal.Halfspace(np.array([0.0, 0.0, 1.0]), FLOOR)
+    half = coal.Halfspace(np.array([0.0, 0.0, 1.0]), FLOORS[path.stem])
     floor = bodies.addGeometryObject(pin.GeometryObject('floor', 0, 0, pin.SE3.Identity(), half))
     first = model.getJointId(driven[0])
     for k, body in enumerate(bodies.geometryObjects):
