@@ -100,7 +100,10 @@ def at_one_kilohertz(seconds, folder):
             'executor:=events',
         )  # fmt: skip
         excitation = process(
-            context, 'excitation_publisher', f'robot:={panda()}', f'file:={folder / "run.yaml"}',
+            context,
+            'excitation_publisher',
+            f'robot:={panda()}',
+            f'file:={folder / "run.yaml"}',
             'floor:=none',
         )
         arm = process(context, 'simulated_arm', f'robot:={panda()}', 'executor:=events')
