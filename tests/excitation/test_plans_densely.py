@@ -23,7 +23,7 @@ import pytest
 
 ARMS = (
     'ur3_robot', 'ur5_robot', 'ur10_robot', 'ur3_joint_limited_robot', 'ur5_joint_limited_robot',
-    'ur10_joint_limited_robot', 'panda', 'z1', 'xarm7', 'so100', 'so101', 'talos_left_arm',
+    'ur10_joint_limited_robot', 'panda', 'z1', 'xarm7', 'so100', 'ur5_gripper', 'talos_left_arm',
 )  # fmt: skip
 #: Height at which the floor itself is, without the clearance that plans keep [m]: that of the
 #: base, but for an arm that hangs from a torso.
