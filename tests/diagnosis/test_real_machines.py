@@ -18,16 +18,10 @@ import numpy as np
 import pytest
 
 from benchmarks.real_diagnosis import answered, known_arm, Machines, Question
-from benchmarks.real_recordings import emps, tx40
+from benchmarks.real_recordings import emps, tx40, ur10
 from benchmarks.two_encoders import kr300, named
 
 pytestmark = pytest.mark.real_data
-
-
-@pytest.fixture(scope='module')
-def machines(real_data, tmp_path_factory):
-    """Return recordings and models of real machines, read once."""
-    return Machines(real_data, tmp_path_factory.mktemp('machines'))
 
 
 def look(machine, effects=()):
@@ -71,15 +65,18 @@ def test_the_coupled_wrist_of_a_tx40(real_data, tmp_path):
     assert {'joint_5', 'joint_6'} <= set(wrist.joints)
 
 
-@pytest.mark.parametrize('name', ['coulomb_friction', 'asymmetric_friction'])
-def test_a_term_taken_out_of_the_model_of_a_positioning_system_is_named(machines, name):
+@pytest.mark.parametrize('name', ['viscous_friction', 'coulomb_friction', 'asymmetric_friction'])
+def test_a_term_taken_out_of_the_model_of_a_positioning_system_is_named(real_data, tmp_path, name):
+    machines = Machines(real_data, tmp_path)
     question = Question('emps', 'without', name)
     assert answered(question, machines.ask(question)) in ('first', 'named')
 
 
-def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(machines):
+def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(
+    real_data, tmp_path
+):
     """What is named beside the wrist is there: the second half agrees with the first."""
-    bare, recording = machines.bare('tx40')
+    bare, recording = Machines(real_data, tmp_path).bare('tx40')
     arm = known_arm(bare, 'tx40', None)
     settings = DiagnosisSettings()
     used = choose_filters(arm, [recording], (), settings, np.random.default_rng(0))
@@ -111,19 +108,29 @@ def test_the_twist_of_a_kr300_is_named(real_data, axis, names):
     assert named(fit_transmission(kr300(real_data, axis), np.random.default_rng(0))) == names
 
 
-def test_a_torque_added_to_that_of_a_ur10_is_named(machines):
-    question = Question('ur10', 'with', 'joint_spring', 'wrist_2_joint', 3.0)
+def test_friction_of_a_ur10(real_data):
+    found = look(ur10(real_data))
+    assert {'viscous_friction', 'coulomb_friction'} <= set(names(found))
+
+
+@pytest.mark.parametrize(
+    ('name', 'joint'), [('rotor_inertia', 'elbow_joint'), ('joint_spring', 'wrist_2_joint')]
+)
+def test_a_torque_added_to_that_of_a_ur10_is_named(real_data, tmp_path, name, joint):
+    machines = Machines(real_data, tmp_path)
+    question = Question('ur10', 'with', name, joint, 3.0)
     assert answered(question, machines.ask(question)) in ('first', 'named')
 
 
-def test_friction_taken_out_of_the_model_of_a_ur10_is_named_in_all_joints(machines):
-    found = machines.ask(Question('ur10', 'without', 'viscous_friction'))
+def test_friction_taken_out_of_the_model_of_a_ur10_is_named_in_all_joints(real_data, tmp_path):
+    found = Machines(real_data, tmp_path).ask(Question('ur10', 'without', 'viscous_friction'))
     assert found.findings[0].name == 'viscous_friction'
     assert len(found.findings[0].joints) == 6
 
 
-def test_a_ripple_of_a_ur10_is_named_and_no_link(machines):
+def test_a_ripple_of_a_ur10_is_named_and_no_link(real_data, tmp_path):
     """Nothing repeats in this recording: its noise is assumed, and excuses no wrong body."""
+    machines = Machines(real_data, tmp_path)
     question = Question('ur10', 'with', 'torque_ripple', 'wrist_2_joint', 3.0)
     found = machines.ask(question)
     assert answered(question, found) in ('first', 'named')

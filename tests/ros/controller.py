@@ -56,6 +56,8 @@ class Faults:
         Age of the joint states that are published [s].
     lost : int
         Every so many joint states get lost; 0: none.
+    silent : bool
+        Whether no joint states come any more.
     torque : float
         Factor on the torques.
     lag : float
@@ -70,6 +72,7 @@ class Faults:
     deaf: bool = False
     late: float = 0.0
     lost: int = 0
+    silent: bool = False
     torque: float = 1.0
     lag: float = 0.0
     overdue: bool = False
@@ -158,16 +161,30 @@ class Controller:
         Accepted goals.
     ends : list of str
         How goals ended: 'succeed', 'abort' or 'canceled'.
+    active : bool
+        Whether the controller is active; JTC.on_deactivate.
+    from_desired : bool
+        The parameter interpolate_from_desired_state: a trajectory begins at the last command
+        instead of the measured state.
+    scaling : float
+        The state interface of speed scaling.
+    interfaces : set of str
+        State interfaces of the hardware.
+    path_tolerance, goal_tolerance, goal_time_tolerance : float
+        The parameters constraints.<joint>.trajectory and .goal [rad] and .goal_time [s].
 
     """
 
     def __init__(self, bench, robot, q, quality=STREAM, *, action=False, now=99.4):
         self.faults = Faults()
         self.accepted, self.refused, self.goals, self.ends = [], [], [], []
+        self.active, self.from_desired, self.scaling = True, False, 1.0
+        self.interfaces = {'position', 'velocity', 'effort'}
+        self.path_tolerance = self.goal_tolerance = self.goal_time_tolerance = 0.0
         self.now, self.q = now, np.array(q, dtype=float)
         self._bench, self._robot, self._model = bench, robot, ArmModel(robot)
         self._course, self._count, self._goal = None, 0, None
-        self._held = True
+        self._begun, self._held, self._behind = self.now, True, 0.0
         self._tolerances = (np.zeros(len(self.q)), np.zeros(len(self.q)), 0.0)
         self._results, self._replaced, self._monitored = [], [], self.now
         self._publisher = bench.probe.create_publisher(JointState, 'joint_states', 10)
@@ -186,6 +203,19 @@ class Controller:
                 cancel_callback=self._on_cancel,
             )
 
+    def restart(self):
+        """Forget the trajectory, and hold the arm where it is; JTC.on_activate."""
+        self._hold()
+        self._goal, self.active = None, True
+
+    def deactivate(self):
+        """Abort the goal, and take nothing any more; JTC.on_deactivate."""
+        self.active = False
+        self._hold()
+        if self._goal is not None:
+            self._end('abort', Result.INVALID_GOAL, 'cancelled during deactivate transition')
+            self._monitor()
+
     def leave(self):
         """Take the action away, as a controller that is unloaded does."""
         if self._server is not None:
@@ -199,7 +229,7 @@ class Controller:
         if self._course is None:
             rows = [self.q, *2 * [np.zeros(len(self.q))]]
         else:
-            rows = self._course.sample(t)
+            rows = self._course.sample(t - self._behind)
         return Motion(self._robot.joints, [t], *(row[None] for row in rows))
 
     def run(self, until, step=0.1):
@@ -207,6 +237,8 @@ class Controller:
         self._bench.spin_until(self._publisher.get_subscription_count, 'a subscriber')
         while self.now < until - 1e-9:
             self.now = round(self.now + step, 6)
+            # JTC.update: the time of the trajectory advances by the period times the scaling
+            self._behind += (1.0 - self.scaling) * step
             self._bench.tick(round(self.now * SECOND))
             self._publish()
             self._watch()
@@ -218,7 +250,7 @@ class Controller:
         """Publish a joint state; JSB.update."""
         self._count += 1
         self.q = self._where(self.now, self.q)
-        if self.faults.lost and self._count % self.faults.lost == 0:
+        if self.faults.silent or (self.faults.lost and self._count % self.faults.lost == 0):
             return
         t = self.now - self.faults.late
         state, q = self.state(t - self.faults.lag), self._where(t, self.q)
@@ -232,7 +264,9 @@ class Controller:
         order = np.argsort(self._robot.joints)
         message = JointState(name=[self._robot.joints[k] for k in order])
         for name, value in values.items():
-            setattr(message, name, value[order].tolist())
+            # JSB.get_value: what has no state interface is not a number
+            has = name in self.interfaces
+            setattr(message, name, (value[order] if has else np.full(len(q), np.nan)).tolist())
         message.header.stamp = stamp_of(t)
         self._publisher.publish(message)
 
@@ -255,7 +289,7 @@ class Controller:
             return
         path, goal, goal_time = self._tolerances
         error = self.state(self.now).q[0] - self.q
-        past_end = self.now - self._course.t[-1]
+        past_end = self.now - self._behind - self._course.t[-1]
         allowed = path if past_end < 0.0 else goal
         # tolerances: zero is not enforced
         outside = (np.abs(error) > allowed) & (allowed > 0.0)
@@ -301,7 +335,7 @@ class Controller:
             goal.send()
 
     def _on_goal(self, goal):
-        if self.faults.deaf or not self._valid(goal.trajectory):
+        if self.faults.deaf or not self.active or not self._valid(goal.trajectory):
             self.refused.append(goal.trajectory)
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
@@ -323,7 +357,11 @@ class Controller:
     def _resolved(self, request):
         """Return the tolerances of a goal; tolerances.get_segment_tolerances."""
         joints = list(self._robot.joints)
-        default = (np.zeros(len(joints)), np.zeros(len(joints)), 0.0)
+        default = (
+            np.full(len(joints), self.path_tolerance),
+            np.full(len(joints), self.goal_tolerance),
+            self.goal_time_tolerance,
+        )
         path, goal = default[0].copy(), default[1].copy()
         asked = [
             (into, joints.index(t.name) if t.name in joints else None, t.position)
@@ -333,7 +371,7 @@ class Controller:
             )
             for t in tolerances
         ]
-        time = np.zeros(1)
+        time = np.array([self.goal_time_tolerance])
         asked.append((time, 0, seconds_of(request.goal_time_tolerance)))
         for into, k, value in asked:
             if k is None or (value < 0.0 and value != -1.0):
@@ -355,7 +393,7 @@ class Controller:
 
     def _on_trajectory(self, message):
         """Take a trajectory of the topic; JTC.topic_callback, which ends no goal."""
-        if self.faults.deaf or not self._valid(message):
+        if self.faults.deaf or not self.active or not self._valid(message):
             self.refused.append(message)
         else:
             self._take(message)
@@ -379,9 +417,14 @@ class Controller:
     def _take(self, message):
         """Begin a trajectory instead of the one before; JTC.update and Trajectory.update."""
         self.accepted.append(message)
-        before = [self.q, self._velocity(self.now)]
+        if self.from_desired and self._course is not None:
+            before = self._course.sample(self.now - self._behind)
+        else:
+            before = [self.q]
+            if 'velocity' in self.interfaces:
+                before.append(self._velocity(self.now))
         self._course = Course.of(message, self._robot, self.now, before)
-        self._held = False
+        self._held, self._behind = False, 0.0
 
 
 def seconds_of(stamp):

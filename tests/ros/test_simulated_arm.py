@@ -82,6 +82,29 @@ def test_it_says_what_it_is_and_holds_its_pose(bench):
     assert tuple(states[-1].name) == ROBOT.joints
 
 
+def test_it_follows_a_trajectory_to_its_end_and_holds_there(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    goal = HOME + 0.1
+    send(bench, trajectory(goal))
+    last = step_to_rest(bench, arm, states)
+    np.testing.assert_allclose(last.position, goal, atol=1e-4)
+    for _ in range(20):
+        arm.step()
+    bench.settle()
+    np.testing.assert_allclose(states[-1].position, goal, atol=1e-4)
+    np.testing.assert_allclose(states[-1].velocity, 0.0, atol=1e-3)
+
+
+def test_joints_are_matched_by_name(bench):
+    arm = still_arm(bench)
+    states = bench.listen(JointState, 'joint_states')
+    goal = HOME + 0.02 * np.arange(6)
+    send(bench, trajectory(goal[::-1], joints=ROBOT.joints[::-1]))
+    last = step_to_rest(bench, arm, states)
+    np.testing.assert_allclose(last.position, goal, atol=1e-4)
+
+
 def test_a_stamped_trajectory_begins_at_its_stamp(bench):
     arm = still_arm(bench)
     states = bench.listen(JointState, 'joint_states')
@@ -99,12 +122,22 @@ def spoil(what):
     message = trajectory(HOME + 0.1)
     if what == 'unknown joint':
         message.joint_names[0] = 'tail'
+    elif what == 'missing joint':
+        message = trajectory((HOME + 0.1)[1:], joints=ROBOT.joints[1:])
     elif what == 'wrong length':
         message.points[0].positions = [0.0, 0.0]
+    elif what == 'nan':
+        message.points[0].positions[2] = float('nan')
+    elif what == 'position limit':
+        message.points[0].positions[1] = float(ROBOT.upper[1]) + 0.2
     elif what == 'velocity limit':
         message.points[0].time_from_start = Duration(nanosec=10_000_000)
+    elif what == 'no points':
+        message.points = []
     elif what == 'no positions':
         message.points[0].positions = []
+    elif what == 'time':
+        message.points.append(message.points[0])
     elif what == 'another time':
         message.header.stamp = Time(sec=7)
     elif what == 'moving end':
@@ -116,9 +149,14 @@ def spoil(what):
     ('what', 'words'),
     [
         ('unknown joint', "'tail'"),
-        ('wrong length', '2 positions'),
+        ('missing joint', f"'{ROBOT.joints[0]}' is missing"),
+        ('wrong length', 'has 2 positions, but there are 6 joint names'),
+        ('nan', f"'{ROBOT.joints[2]}'"),
+        ('position limit', f"'{ROBOT.joints[1]}' reaches"),
         ('velocity limit', 'velocity limit'),
+        ('no points', 'no points'),
         ('no positions', 'no positions'),
+        ('time', 'time has to increase'),
         ('another time', '93 s ago'),
         ('moving end', 'ends with'),
     ],
@@ -212,12 +250,30 @@ def test_who_falls_behind_real_time_says_so_and_goes_on_in_time(bench, factor, m
         assert arm.stamp_ns - before < SECOND
         return
     assert arm.stamp_ns - before > 9 * SECOND
-    assert float(re.match(r'(\d+\.\d) s ', said)[1]) > 9.0
-    assert 'real_time_factor' in said
+    found = re.fullmatch(
+        r'(\d+\.\d) s of real time were skipped: lower its rate, or set a smaller '
+        'real_time_factor, with use_sim_time on the other nodes',
+        said,
+    )
+    assert found and float(found[1]) > 9.0
     before = arm.stamp_ns
     assert arm.set_parameters([Parameter('rate', value=50.0)])[0].successful
     assert not arm.condition()[0]
     assert arm.stamp_ns == before
+
+
+def test_of_a_trajectory_that_is_refused_it_says_what_the_arm_does(bench):
+    arm = still_arm(bench)
+    send(bench, spoil('velocity limit'))
+    arm.step()
+    assert arm.complaints.latest.endswith('; it is refused, and the arm stays where it is')
+    send(bench, trajectory(HOME + 0.1))
+    arm.step()
+    send(bench, spoil('velocity limit'))
+    arm.step()
+    assert arm.complaints.latest.endswith(
+        '; it is refused, and the arm goes on with the one before'
+    )
 
 
 def test_gravity_and_effects_are_parameters(bench):
@@ -241,10 +297,10 @@ def test_gravity_and_effects_are_parameters(bench):
     [
         ({'robot': 'r2d2'}, 'humanoid_arm'),
         ({'gravity': 'mars'}, 'moon'),
-        ({'effects': ['stickiness']}, 'viscous_friction'),
-        ({'torque_noise': [0.1, 0.2]}, '6 joints'),
-        ({'start': '0.1,x'}, 'numbers'),
-        ({'rate': 300.0}, '300 Hz'),
+        ({'effects': ['stickiness']}, 'the catalogue has'),
+        ({'torque_noise': [0.1, 0.2]}, 'one for each of 6 joints'),
+        ({'start': '0.1,x'}, 'write numbers'),
+        ({'rate': 300.0}, 'does not fit the step'),
         ({'model': '/nowhere/model.yaml'}, 'model.yaml'),
     ],
 )
