@@ -103,7 +103,7 @@ lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, types
 bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side with the peers
 	$(BIN)/python -m benchmarks $(BENCH)
 
-endurance: $(STAMPS)/armid_ros $(STAMPS)/test $(STAMPS)/bench  ## kill recorders and armid at random, play and record for 30 min; about an hour
+endurance: $(STAMPS)/armid_ros $(STAMPS)/test $(STAMPS)/bench  ## kill recorders at random, play and record for 30 min; about an hour
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.endurance
 
 benchmark: $(STAMPS)/armid_ros $(STAMPS)/test  ## name the effects hidden in the locked set, about 30 min
