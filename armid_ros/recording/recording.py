@@ -16,7 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 Clock = Literal['header', 'receive']
-_UNITS = {'q': '[rad or m]', 'dq': '[rad/s or m/s]', 'tau': '[N m or N]'}
+_LABELS = {
+    'q': 'position [rad or m]',
+    'dq': 'velocity [rad/s or m/s]',
+    'tau': 'torque [N m or N]',
+}
 
 
 @dataclass(frozen=True)
@@ -297,8 +301,7 @@ class Recording:
         values = getattr(self, quantity)
         if values is None:
             raise RecordingError(f'{self.source or "recording"}: {quantity} was not recorded')
-        label = {'q': 'position', 'dq': 'velocity', 'tau': 'torque'}[quantity]
-        return draw_joints(self.joints, {label: (self.t, values)}, f'{label} {_UNITS[quantity]}')
+        return draw_joints(self.joints, {'measured': (self.t, values)}, _LABELS[quantity])
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
         """Return the recording at some of its samples, on the same time base."""
