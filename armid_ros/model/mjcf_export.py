@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 from xml.etree import ElementTree
 
 from armid_ros.model.pseudo_inertia import require_consistent
@@ -19,7 +20,7 @@ import pinocchio as pin
 _MESHES = ('.stl', '.obj', '.msh')
 #: Visuals touch nothing; collision bodies touch what is around the arm, and not each other, for
 #: links that are joined overlap.
-_CLASSES = {
+_CLASSES: dict[Literal['visual', 'collision'], dict[str, str]] = {
     'visual': {'contype': '0', 'conaffinity': '0', 'group': '2', 'mass': '0'},
     'collision': {'contype': '1', 'conaffinity': '0', 'group': '3', 'mass': '0'},
 }
@@ -116,7 +117,7 @@ def _shapes(
     left_out: dict[str, None] = {}
     files: dict[tuple[Path, tuple[float, ...]], str] = {}
     for of in _CLASSES:
-        for shape in shapes_of(robot, 'visual' if of == 'visual' else 'collision'):
+        for shape in shapes_of(robot, of):
             size = _size(shape)
             if shape.kind == 'mesh':
                 if shape.path is None or shape.path.suffix.lower() not in _MESHES:
