@@ -46,12 +46,7 @@ from armid_ros.identification import (
 from armid_ros.identification import identify as run
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
-from armid_ros.identification.known_payload import (
-    corrected,
-    drive_gains,
-    DriveGains,
-    payloads_of,
-)
+from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
@@ -332,7 +327,7 @@ def identify(
         Catalogue names with commas, for a robot without a model.
     method : {'ols', 'wls', 'irls', 'iv'}
         Least squares with all joints alike, weighted by their noise, or robust as well;
-        instrumental variables, closed-loop output error, extended Kalman filter.
+        instrumental variables against encoder noise.
     cutoff : float, optional
         Of the position filter [Hz]; from the noise by default.
     decimation : int, optional

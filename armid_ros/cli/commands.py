@@ -24,6 +24,7 @@ from click.shell_completion import CompletionItem
 COMMANDS = {
     'demo': 'demo.command',
     'convert': 'convert',
+    'check': 'inspect',
     'inspect': 'inspect',
     'excite': 'excite.command',
     'simulate': 'record',

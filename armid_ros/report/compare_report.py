@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 
-from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
 from armid_ros.identification.assess.load_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
@@ -164,7 +163,12 @@ def _why_left(comparison: Comparison) -> str:
 def _load(comparison: Comparison) -> str:
     load = comparison.load
     assert load is not None
-    joints = {_number(c.parameter): c.parameter.joint for c in comparison.changes}
+    joints = {
+        (
+            int(c.parameter.name.split(' ')[0].lstrip('Imxyz')) if c.parameter.rigid else 0
+        ): c.parameter.joint
+        for c in comparison.changes
+    }
     named = [
         f'the link of {joints[number]}' if number in joints else f'link {number}'
         for number in (load.link, *load.rivals)
@@ -180,11 +184,6 @@ def _load(comparison: Comparison) -> str:
         f'A load of {" ± ".join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))} kg {verb} '
         f'{named[0]}{where}. It explains every change of the inertial parameters{rivals}.'
     )
-
-
-def _number(name: ParameterName) -> int:
-    """Return the number of the link that leads a rigid parameter, 0 for others."""
-    return int(name.name.split(' ')[0].lstrip('Imxyz')) if name.rigid else 0
 
 
 def _together(group: GroupChange) -> str:

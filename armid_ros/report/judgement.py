@@ -83,7 +83,11 @@ def judge(
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
     findings = [
-        *_data_findings(recordings),
+        *[
+            Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
+            for recording in recordings
+            if not recording.report.unharmed
+        ],
         *_error_findings(result, training, held_out),
         *_residual_findings(result, fits or result.training),
         *_excitation_findings(result),
@@ -138,14 +142,6 @@ def _simulated(verification: Verification | None) -> list[str]:
     return [
         f'Driven by the recorded torques, its position error is at most {worst.after.worst} rms'
         f'{before}.'
-    ]
-
-
-def _data_findings(recordings: Sequence[Recording]) -> list[Caution]:
-    return [
-        Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
-        for recording in recordings
-        if not recording.report.unharmed
     ]
 
 

@@ -62,7 +62,11 @@ def next_steps(
     elif no_run:
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
-    steps += [_more(group) for group in by_cause(diagnosis.suspected)]
+    steps += [
+        'Record three more motions, and diagnose all recordings together: that tells whether '
+        f'{names_and_places(group)} changed.'
+        for group in by_cause(diagnosis.suspected)
+    ]
     unseen = _not_checked(diagnosis)
     if unseen:
         steps += unseen
@@ -90,14 +94,6 @@ def _not_checked(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.at_rest:
         steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
     return steps
-
-
-def _more(group: Sequence[Finding]) -> str:
-    """Say how to learn whether a cause is there that recordings hardly tell."""
-    return (
-        'Record three more motions, and diagnose all recordings together: that tells whether '
-        f'{names_and_places(group)} changed.'
-    )
 
 
 def _use(diagnosis: Diagnosis, model: str) -> str:

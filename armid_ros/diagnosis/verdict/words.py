@@ -23,6 +23,8 @@ Word = Literal[
 ]
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
+#: Nouns that take an article: a payload, but viscous friction.
+_COUNTED = {'payload', 'spring', 'offset', 'delay', 'tilt', 'limit', 'gain', 'coupling', 'change'}
 #: What a share is of, where something is named and where nothing is.
 _GAP, _LEFT = 'the gap', 'what is left'
 
@@ -293,23 +295,23 @@ def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
 
 def _subject(finding: Finding) -> str:
     """Return what a cause is, where, and its values."""
-    words = finding.name.replace('_', ' ')
-    article = 'An' if words[0] in 'aeiou' else 'A'
+    words = finding.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+    article = f'a{"n" if words[0] in "aeiou" else ""} ' if words.split()[-1] in _COUNTED else ''
+    subject = f'{article}{words}'[:1].upper() + f'{article}{words}'[1:]
     if finding.ties:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
-        return f'{words.capitalize()} at {where}'
+        return f'{subject} at {where}'
     if finding.weighs:
-        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{_put_down(finding)}'
+        return f'{subject} {_weight(finding)} on {finding.joints[0]}{_put_down(finding)}'
     many = _in_many(finding)
     if many:
-        return f'{words.capitalize()}{many}'
+        return f'{subject}{many}'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
-    shown = list(_values(finding))
-    if len(shown) > 3:
-        shown = [*shown[:2], f'and {len(shown) - 2} more']
+    shown = [] if len(finding.joints) > 1 else list(_values(finding))
+    shown = [shown[0], f'and {len(shown) - 1} more'] if len(shown) > 2 else shown
     meant = f': {finding.sign}' if finding.sign else ''
     numbers = f' ({", ".join(shown)}{meant})' if shown else ''
-    return f'{article} {words}{where}{numbers}'
+    return f'{subject}{where}{numbers}'
 
 
 def _in_many(finding: Finding) -> str:
