@@ -261,7 +261,7 @@ class CheckResult(Shown):
     --------
     >>> import armid_ros as ar
     >>> print(ar.check('my_arm.urdf', 'friday').finding)
-    The URDF is 0.3... ± 0... kg too light at elbow.
+    The URDF is 0.3... ± 0... kg too light at elbow, if the other links are right.
 
     """
 

@@ -33,12 +33,12 @@ _TURNS = 6.0 * np.pi
 _FASTEST, _LONGEST = 50.0, 10.0
 #: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
 _MATERIAL = 1.0
-#: Share of the weighted difference that a further link has to explain; share that may remain.
-_FURTHER, _REMAINS = 0.5, 0.01
+#: Share of the rest that a further link has to explain; chi-squared per row that may remain.
+_FURTHER, _REMAINS = 0.5, 10.0
 #: More wrong links than this cannot be told from a wrong model.
 _MOST = 3
 #: A standard deviation above this share of the prior's is no measurement.
-_DETERMINED = 0.3
+_DETERMINED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,16 +218,20 @@ def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Return the links that forward selection adds, the most important first."""
+    """Return the links of a forward selection, less one that the later ones make needless."""
     every = range(len(spread) // len(LINK_PARAMETERS))
     wrong: list[int] = []
     rest = total
-    while len(wrong) < min(_MOST, len(every)) and rest > _REMAINS * total:
+    while len(wrong) < min(_MOST, len(every)) and rest > _REMAINS * len(rows):
         left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
         best = min(left, key=left.__getitem__)
         if left[best] > (1.0 - _FURTHER) * rest:
             break
         wrong, rest = [*wrong, best], left[best]
+    for k in wrong[:-1]:
+        fewer = [one for one in wrong if one != k]
+        if _fit(rows, spread, fewer)[2] < max(rest / _FURTHER, _REMAINS * len(rows)):
+            return fewer
     return wrong
 
 

@@ -104,15 +104,19 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     elif found.explained < _MOSTLY:
         first = 'The URDF differs from the recording in more than three links.'
     else:
-        first = f'The URDF {", and ".join(_wrong(found, k) for k in found.wrong)}.'
+        known = [text for k in found.wrong if (text := _wrong_mass(found, k))]
+        others = [found.joints[k] for k in found.wrong if not _wrong_mass(found, k)]
+        if others:
+            known.append(f'has a wrong mass distribution at {" and ".join(others)}')
+        first = f'The URDF {" and ".join(known)}, if the other links are right.'
     return first, errors, values
 
 
-def _wrong(found: LinkCheck, k: int) -> str:
-    """Return what is wrong with a link: its mass, or else its centre or inertia."""
+def _wrong_mass(found: LinkCheck, k: int) -> str:
+    """Return by how much the mass of a link is wrong; empty where that is not determined."""
     change, reach = found.measured_mass[k] - found.mass[k], NORMAL * found.mass_std[k]
     if not abs(change) > reach:
-        return f'has a wrong centre or inertia at {found.joints[k]}'
+        return ''
     size, interval = measured(abs(float(change)), float(reach))
     word = 'light' if change > 0.0 else 'heavy'
     return f'is {size} ± {interval} kg too {word} at {found.joints[k]}'
