@@ -8,7 +8,7 @@ An arm model is a rigid body plus a list of effects. With ``import armid_ros as 
     arm = ar.ArmModel.of('ur10.urdf', effects='viscous_friction,coulomb_friction,torque_offset')
     model = ar.identify(arm, ['monday.mcap', 'tuesday.csv'], validate='wednesday.mcap')
     print(model)
-    found = ar.diagnose(model.arm, 'today.mcap')
+    found = ar.diagnose(model, 'today.mcap')
     print(found)
     found.report('found.html')
 

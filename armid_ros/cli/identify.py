@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     'payloads',
     multiple=True,
     metavar='BAG=KG@LINK[:X,Y,Z]',
-    help='What the arm is known to carry in a bag, with its centre in the frame of the link [m]; '
-    'fixes the gains of the drives where another bag is without it. May be given several times.',
+    help='Known load of a bag, with its centre in the frame of the link [m]. With a bag without '
+    'it, the gains of the drives are identified. May be given several times.',
 )
 @click.option(
     '--verify/--no-verify',

@@ -21,8 +21,8 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
 @click.argument('bag', type=click.Path(path_type=Path))
 @parameters.robot_described(
-    help='Shipped name, path of a URDF, or - for the one in the bag; limits and units are '
-    'checked with it, and an identification is tried.',
+    help='Shipped name, path of a URDF, or - for the one in the bag. With it, limits and units '
+    'are checked and an identification is tried.',
 )
 @click.option(
     '--out',

@@ -42,8 +42,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
     """
     sections = [
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
-        Asked(_asked(comparison)),
         Changes(comparison),
+        Asked(_asked(comparison)),
         Origin(provenance or Provenance()),
     ]
     robot = robot_label(comparison.after.robot)
@@ -70,6 +70,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         return (*(_unusable(one) for one in comparison.unusable), units)
     return (
         *(_unusable(one) for one in comparison.unusable),
+        *([] if comparison.load is None else [_load(comparison)]),
         _sum(comparison),
         *(_residual(one, comparison) for one in comparison.changed_residuals),
         *tell_not_compared(comparison),
@@ -116,8 +117,6 @@ def _details(comparison: Comparison) -> Sequence[str]:
         return [_least_visible(comparison.changes)]
     changed = comparison.changed
     told = [_together(group) for group in comparison.changed_together]
-    if comparison.load is not None:
-        told.insert(0, _load(comparison))
     apart = [c for c in changed if comparison.load is None or not c.parameter.rigid]
     told += [_sentence(change) for change in apart[:_TOLD]]
     if len(apart) > _TOLD:
@@ -254,5 +253,5 @@ def _asked(comparison: Comparison) -> list[tuple[str, str]]:
     for title, side in (('First', comparison.before), ('Second', comparison.after)):
         error = side.error_percent
         said = '' if error is None else f'; relative torque error {error:.2f} %'
-        facts.append((title, f'{side.source}: {side.robot}{said}'))
+        facts.append((title, f'{side.source}: {robot_label(side.robot)}{said}'))
     return facts

@@ -122,7 +122,6 @@ def excitation_report(
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     sections: list[Section] = [
         _verdict(design, arm.robot.links, shares, checked, collision.notes),
-        Asked(_asked(design, arm, robot, obstacles, after, run)),
         ArmPoses(
             draw_silhouettes(
                 whole,
@@ -136,6 +135,7 @@ def excitation_report(
         PlannedMotion(limits, motion, shares),
         PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
         Harmonics(excitation.trajectory),
+        Asked(_asked(design, arm, robot, obstacles, after, run)),
         Origin(provenance or Provenance()),
     ]
     subtitle = (

@@ -56,7 +56,12 @@ def inspection_report(
     doubt = any(remark.weight == 'doubt' for remark in found.remarks)
     grade, tone = ('unfit', 'bad') if bad else ('look', 'fair') if doubt else ('clean', 'good')
     sections = [
-        VerdictSection(grade, tone, [found.verdict], [remark.text for remark in found.remarks]),
+        VerdictSection(
+            grade,
+            tone,
+            [found.verdict.replace('`', '')],
+            [remark.text.replace('`', '') for remark in found.remarks],
+        ),
         ContentsSection(found),
         JointTable(found),
         RecordingCurves(found),

@@ -85,8 +85,8 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     '--residual',
     type=click.Choice(['gp']),
-    help='Learn what is left without a name, where the verdict is partial or unknown, as a map '
-    'with its uncertainty (gp: a Gaussian process of each joint), and suggest a law.',
+    help='Learn the unexplained residual where the verdict is partial or unknown. gp: a Gaussian '
+    'process of each joint.',
 )
 @click.option(
     '--strict',

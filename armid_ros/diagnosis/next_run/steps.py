@@ -128,7 +128,7 @@ def _centre(finding: Finding) -> str:
     if not (finding.weighs and mass and len(moments) == 3 and excludes_zero(*mass[0][1:])):
         return ''
     at = ', '.join(as_sure(value / mass[0][1], std / abs(mass[0][1])) for _, value, std in moments)
-    return f'; the load is centred at ({at}) m in the frame of that link'
+    return f'. The load is centred at ({at}) m in the frame of that link'
 
 
 def _first(looks: list[str]) -> list[str]:
@@ -173,7 +173,7 @@ def _telling(finding: Finding, rival: Rival, run: NextRun | None) -> str:
     best = shown_best(finding.name, finding.joints, rival)
     if on_one_link(finding.name, finding.joints, rival):
         return (
-            f'No motion tells {names}, as they move as one body: weigh what the link carries, or '
+            f'No motion tells {names}, as they move as one body. Weigh what the link carries, or '
             f'record {best}.'
         )
     tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'

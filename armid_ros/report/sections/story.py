@@ -7,7 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.diagnosis import Diagnosis
+from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.verdict.words import by_cause
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
 from armid_ros.report.notation import digits, percent, torque_unit
 from armid_ros.report.page import render, Section
@@ -41,10 +42,10 @@ class Story(Section):
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints to be pointed out: those of the causes, or else the one with the gap."""
+        """Joints to be pointed out: those of the largest cause, or else the one with the gap."""
         robot = self.diagnosis.arm.robot
         if self.diagnosis.findings:
-            named = [joint for one in self.diagnosis.findings for joint in one.joints or ()]
+            named = {joint for one in self._headline for joint in one.joints}
             return tuple(joint for joint in robot.joints if joint in named)
         found = [place.joint for place in self.diagnosis.where] + [m.joint for m in self._maps]
         return tuple(found[:1])
@@ -52,7 +53,12 @@ class Story(Section):
     @property
     def whole_arm(self) -> bool:
         """Whether a cause is one of the whole arm."""
-        return any(not finding.joints for finding in self.diagnosis.findings)
+        return any(not finding.joints for finding in self._headline)
+
+    @property
+    def _headline(self) -> list[Finding]:
+        """Return the cause that explains most."""
+        return next(iter(by_cause(self.diagnosis.findings)), [])
 
     @property
     def picture(self) -> Markup:
@@ -66,7 +72,7 @@ class Story(Section):
     @property
     def caption(self) -> str:
         """Return what the drawing shows."""
-        names = ', '.join(one.name.replace('_', ' ') for one in self.diagnosis.findings)
+        names = ', '.join(one.name.replace('_', ' ') for one in self._headline)
         if self.whole_arm:
             return f'coloured: the whole arm ({names})'
         if not self.joints:
