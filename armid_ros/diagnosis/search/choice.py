@@ -50,12 +50,10 @@ _AS_EXACT = (
 )
 #: What would tell a change from a misfit, where there are no or too few recordings.
 _NO_BASELINE = (
-    'It may be the misfit of another motion: recordings from before, given as baseline, tell '
-    'that from a change.'
+    'It may be the model error of this motion. Recordings from before (--baseline) exclude that.'
 )
 _ONE_EACH = (
-    'It may be the misfit of another motion: more than one recording a day tells that from a '
-    'change.'
+    'It may be the model error of this motion. Record more than one motion a day to exclude that.'
 )
 
 
