@@ -166,9 +166,10 @@ def _verdict(
             f'{information.condition:.3g}: {_conditioning(information.condition)}).'
         ]
         worst = int(np.argmax(std / information.scale))
+        sure = int(np.sum(std <= 0.1 * np.abs(design.described)))
         sentences.append(
-            f'The least accurate will be {full_label(names[worst], links)}: '
-            f'± {digits(float(std[worst]))} '
+            f'{sure} of {len(names)} will be known to 10 % or better. The least accurate will be '
+            f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
     sentences.insert(0, _kept(shares, design.limits, checked))

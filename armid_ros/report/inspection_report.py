@@ -54,14 +54,13 @@ def inspection_report(
     recording = found.recording
     bad = any(remark.weight == 'bad' for remark in found.remarks)
     doubt = any(remark.weight == 'doubt' for remark in found.remarks)
-    grade, tone = ('unfit', 'bad') if bad else ('look', 'fair') if doubt else ('clean', 'good')
+    grade, tone = ('unfit', 'bad') if bad else ('doubtful', 'fair') if doubt else ('ready', 'good')
+    first = 2 if bad or doubt else 1
+    texts = [remark.text for remark in found.remarks]
+    texts.insert(first - 1, found.verdict)  # below the worst remark
+    sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections = [
-        VerdictSection(
-            grade,
-            tone,
-            [found.verdict.replace('`', '')],
-            [remark.text.replace('`', '') for remark in found.remarks],
-        ),
+        VerdictSection(grade, tone, sentences[:first], sentences[first:]),
         ContentsSection(found),
         JointTable(found),
         RecordingCurves(found),

@@ -364,8 +364,7 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
 
 def _shape(finding: Finding, parameter: ParameterName) -> Shape | None:
     """Return what the catalogue says of a shape; None for a quantity."""
-    kind = CATALOGUE.get(finding.name)
-    shapes = () if kind is None else kind.shapes
+    shapes = CATALOGUE[finding.name].shapes if finding.name in CATALOGUE else ()
     return next((shape for shape in shapes if shape.name == parameter.name), None)
 
 
@@ -406,10 +405,8 @@ def _mass(finding: Finding) -> tuple[float, float]:
 def _with_degrees(value: float, std: float, unit: str) -> str:
     """Return a value with its interval; an angle in degrees as well, to the same digits."""
     text = f'{as_sure(value, std)} {unit}'.strip()
-    if unit == 'rad':
-        degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
-        return f'{text}, {degrees} degrees'
-    return text
+    degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
+    return f'{text}, {degrees} degrees' if unit == 'rad' else text
 
 
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
@@ -438,8 +435,8 @@ def others_in_words(finding: Finding) -> str:
     words = []
     for rival in finding.rivals:
         place = f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else ''
-        same = rival.name == finding.name
-        words.append(('one' if same else rival.name.replace('_', ' ')) + place)
+        name = 'one' if rival.name == finding.name else rival.name.replace('_', ' ')
+        words.append(name + place)
     return ' or '.join(words)
 
 
