@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from armid_ros.api.diagnosis import diagnose, DiagnosisResult
     from armid_ros.api.excitation import design_excitation, ExcitationResult
     from armid_ros.api.identification import IdentificationResult, identify
-    from armid_ros.api.inspection import check, CheckResult, inspect, InspectionResult
+    from armid_ros.api.inspection import check, inspect, InspectionResult
     from armid_ros.api.simulation import simulate
     from armid_ros.arm import ArmModel, load_model, save_model
     from armid_ros.effects import Effect, make_effect, Quantity, register
@@ -69,7 +69,6 @@ _HOMES = {
     'diagnose': 'armid_ros.api.diagnosis',
     'DiagnosisResult': 'armid_ros.api.diagnosis',
     'check': 'armid_ros.api.inspection',
-    'CheckResult': 'armid_ros.api.inspection',
     'compare': 'armid_ros.api.comparison',
     'ComparisonResult': 'armid_ros.api.comparison',
     'simulate': 'armid_ros.api.simulation',
@@ -103,7 +102,6 @@ __all__ = [
     'diagnose',
     'DiagnosisResult',
     'check',
-    'CheckResult',
     'compare',
     'ComparisonResult',
     'simulate',
