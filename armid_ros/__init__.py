@@ -8,7 +8,7 @@ An arm model is a rigid body plus a list of effects. With ``import armid_ros as 
     arm = ar.ArmModel.of('ur10.urdf', effects='viscous_friction,coulomb_friction,torque_offset')
     model = ar.identify(arm, ['monday.mcap', 'tuesday.csv'], validate='wednesday.mcap')
     print(model)
-    found = ar.diagnose(model.arm, 'today.mcap')
+    found = ar.diagnose(model, 'today.mcap')
     print(found)
     found.report('found.html')
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from armid_ros.api.diagnosis import diagnose, DiagnosisResult
     from armid_ros.api.excitation import design_excitation, ExcitationResult
     from armid_ros.api.identification import IdentificationResult, identify
-    from armid_ros.api.inspection import inspect, InspectionResult
+    from armid_ros.api.inspection import check, inspect, InspectionResult
     from armid_ros.api.simulation import simulate
     from armid_ros.arm import ArmModel, load_model, save_model
     from armid_ros.effects import Effect, make_effect, Quantity, register
@@ -68,6 +68,7 @@ _HOMES = {
     'OnlineIdentifier': 'armid_ros.identification.online.identifier',
     'diagnose': 'armid_ros.api.diagnosis',
     'DiagnosisResult': 'armid_ros.api.diagnosis',
+    'check': 'armid_ros.api.inspection',
     'compare': 'armid_ros.api.comparison',
     'ComparisonResult': 'armid_ros.api.comparison',
     'simulate': 'armid_ros.api.simulation',
@@ -100,6 +101,7 @@ __all__ = [
     'OnlineIdentifier',
     'diagnose',
     'DiagnosisResult',
+    'check',
     'compare',
     'ComparisonResult',
     'simulate',

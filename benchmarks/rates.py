@@ -3,7 +3,7 @@
 """
 The page of success rates, made of the recorded results.
 
-    python -m benchmarks.rates        writes docs/reference/rates.md
+    python -m benchmarks.rates        writes benchmarks/rates.md
 
 `results/looks.jsonl` has each run on a locked set, `results/rates.json` the rates of other sets.
 
@@ -18,7 +18,7 @@ from typing import Any
 from benchmarks.looks import LOG
 from tests.hidden.scoring import wilson
 
-PAGE = Path(__file__).parents[1] / 'docs' / 'reference' / 'rates.md'
+PAGE = Path(__file__).with_name('rates.md')
 RATES = LOG.with_name('rates.json')
 
 _HEAD = """# How often the diagnosis is right

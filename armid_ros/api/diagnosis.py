@@ -229,7 +229,7 @@ class DiagnosisResult(Shown):
         if not self.held_out or self.core.gap is None:
             return self
 
-        def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
+        def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...], str]:
             used = conditioning(list(self.recordings), self.settings.signals)
             return simulate_held_out(
                 self.description, self.arm, used, self.held_out,
@@ -237,7 +237,7 @@ class DiagnosisResult(Shown):
             )  # fmt: skip
 
         found, why = _tried('simulation', simulated)
-        forward, left_out = found or ((), ())
+        forward, left_out, _ = found or ((), (), '')
         extras = replace(self.extras, forward=forward)
         return replace(self, extras=extras)._with_notes(*left_out, *why)
 

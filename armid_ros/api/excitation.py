@@ -11,14 +11,7 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.api.arguments import (
-    arm_of,
-    generator,
-    RecordingLike,
-    recordings_of,
-    Rng,
-    RobotLike,
-)
+from armid_ros.api.arguments import arm_of, generator, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError

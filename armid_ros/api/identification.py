@@ -44,14 +44,10 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
-from armid_ros.identification.known_payload import (
-    corrected,
-    drive_gains,
-    DriveGains,
-    payloads_of,
-)
+from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
 from armid_ros.identification.parameters_file import parameters_of
 from armid_ros.identification.rows.checks import check_held_out
 from armid_ros.recording import Recording, require_once
@@ -245,9 +241,6 @@ class IdentificationResult(Shown):
     def summary(self) -> Summary:
         """Return errors joint by joint, with the friction."""
         score = self.held_out_score or self.training
-        said = f'{self.training.relative_error_percent:.2f} % relative error'
-        if self.held_out_score is not None:
-            said += f', {self.held_out_score.relative_error_percent:.2f} % held out'
         robot = self.arm.robot
         rows = [
             (
@@ -260,12 +253,9 @@ class IdentificationResult(Shown):
             for k, joint in enumerate(robot.joints)
         ]
         count = len(self.estimate.parameters)
-        below = (
-            f'{count} parameters, condition number {self.core.condition_number:.4g}; ± is one '
-            'standard deviation'
-        )
+        below = f'{count} parameters, condition number {self.core.condition_number:.3g}; ± is 95 %'
         return Summary(
-            f'{robot.name}: {said}',
+            self.graded.reasons[0],
             self.grade,
             ('joint', 'residual', 'relative', 'viscous', 'Coulomb'),
             rows,
@@ -297,8 +287,8 @@ class IdentificationResult(Shown):
     def _value(self, name: str, joint: str) -> str:
         for k, parameter in enumerate(self.estimate.parameters):
             if (parameter.name, parameter.joint) == (name, joint):
-                value, std = self.estimate.values[k], self.estimate.std[k]
-                return f'{value:.3g} ± {std:.1g}' if abs(value) > 1.96 * std else '~ 0'
+                value, reach = self.estimate.values[k], HALF_WIDTH * self.estimate.std[k]
+                return f'{value:.3g} ± {reach:.1g}' if abs(value) > reach else '~ 0'
         return '-'
 
 
@@ -332,7 +322,7 @@ def identify(
         Catalogue names with commas, for a robot without a model.
     method : {'ols', 'wls', 'irls', 'iv'}
         Least squares with all joints alike, weighted by their noise, or robust as well;
-        instrumental variables, closed-loop output error, extended Kalman filter.
+        instrumental variables against encoder noise.
     cutoff : float, optional
         Of the position filter [Hz]; from the noise by default.
     decimation : int, optional

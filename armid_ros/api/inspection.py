@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a recording, and what is wrong with it."""
+"""What is in a recording, and what is wrong with it or with a description."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -17,11 +17,19 @@ from armid_ros.api.arguments import (
     robot_of,
     RobotLike,
 )
+from armid_ros.api.identification import identify
 from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
+from armid_ros.inspection import (
+    check_links,
+    description_remarks,
+    Inspection,
+    inspection_document,
+    LinkCheck,
+    Remark,
+)
 from armid_ros.inspection import inspect as look
-from armid_ros.inspection import Inspection, inspection_document
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.contents import bag_contents, TopicContent
@@ -36,9 +44,13 @@ from armid_ros.recording.tables import (
     plan,
     TablePlan,
 )
+from armid_ros.robots import Robot
 
 if TYPE_CHECKING:
     import pandas
+
+#: Of a check of a description.
+CHECK = 'armid/check/1'
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -229,3 +241,129 @@ def read_all_joints(
         chosen = max(there, key=lambda one: one.count)
         topic, joints = chosen.name, chosen.joints
     return read_anything(path, joints=list(joints), topic=topic, columns=said, settings=settings)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class CheckResult(Shown):
+    """
+    What is wrong with a description.
+
+    Attributes
+    ----------
+    robot : Robot
+        As described.
+    remarks : tuple of Remark
+        Impossible and doubtful values, the worst first.
+    links : LinkCheck or None
+        Masses and centres as described and as measured; None without a recording.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> print(ar.check('my_arm.urdf', 'friday').finding)
+    The URDF is 0.3... ± 0... kg too light at elbow, if the other links are right.
+
+    """
+
+    robot: Robot
+    remarks: tuple[Remark, ...]
+    links: LinkCheck | None
+
+    @property
+    def finding(self) -> str:
+        """Return what was found in one sentence."""
+        from armid_ros.report.inspection_report import headline
+
+        return headline(self.remarks, self.links)[0]
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a value is impossible, or a recording contradicts a link."""
+        impossible = any(one.weight == 'bad' for one in self.remarks)
+        return impossible or (self.links is not None and not self.links.agrees)
+
+    def document(self) -> dict[str, Any]:
+        """Return what ``armid check --json`` prints."""
+        links = None if self.links is None else asdict(self.links)
+        if links is not None:
+            arrays = {name: v.tolist() for name, v in links.items() if hasattr(v, 'tolist')}
+            links.update(arrays)
+        remarks = [asdict(one) for one in self.remarks]
+        finding, robot = self.finding, self.robot.name
+        return {
+            'schema': CHECK,
+            'robot': robot,
+            'finding': finding,
+            'remarks': remarks,
+            'check': links,
+        }
+
+    def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
+        """Return report.html with a table of the links."""
+        from armid_ros.report.inspection_report import description_check_report
+
+        name = origin.of(self.robot).robot
+        return description_check_report(name, self.remarks, self.links, origin.provenance)
+
+    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+        """Write check.json and report.html into a folder."""
+        document = self.document()
+        write_file(folder / 'check.json', json_text(document, indent=1))
+        write_file(folder / 'report.html', self.page(origin))
+        return document
+
+    def summary(self) -> Summary:
+        """Return the finding, and the links."""
+        from armid_ros.report.inspection_report import headline, HEADS, link_rows
+
+        rows = [] if self.links is None else link_rows(self.links)
+        first, *others = headline(self.remarks, self.links)
+        lines = [' '.join(others), *(one.text for one in self.remarks)]
+        heads = HEADS[:3] if rows else ()
+        return Summary(first, '', heads, [row[:3] for row in rows], lines)
+
+
+def check(
+    robot: RobotLike,
+    recordings: RecordingLike | Sequence[RecordingLike] = (),
+    *,
+    rng: Rng = 0,
+) -> CheckResult:
+    """
+    Find impossible values of a description, and links that a recording contradicts.
+
+    Parameters
+    ----------
+    robot : robot, model, name or path
+        The description.
+    recordings : recording or path, or several, optional
+        With torques; without, only the values of the description are checked.
+    rng : int or Generator
+        Seed, or source of randomness.
+
+    Returns
+    -------
+    CheckResult
+        Prints its finding; ``remarks``, ``links``, ``report``, ``save``.
+
+    Raises
+    ------
+    ArmidError
+        The description or a recording cannot be used; the message names it and what to do.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> ar.check('my_arm.urdf').wrong
+    False
+
+    """
+    described = robot_of(robot)
+    remarks = description_remarks(described)
+    order = ('bad', 'doubt', 'note')
+    remarks = tuple(sorted(remarks, key=lambda remark: order.index(remark.weight)))
+    read = recordings_of(recordings, described)
+    if not read:
+        return CheckResult(described, remarks, None)
+    found = identify(described, read, rng=rng)
+    return CheckResult(described, remarks, check_links(found.core, found.description, found.grade))

@@ -13,6 +13,7 @@ import sys
 from typing import Any
 
 from armid_ros.cli.node import lacking
+from armid_ros.cli.project import project_options
 from armid_ros.errors import ArmidError, meant, visible
 from armid_ros.plug_ins import load_plug_in, plug_ins
 from armid_ros.version import __version__
@@ -24,6 +25,7 @@ from click.shell_completion import CompletionItem
 COMMANDS = {
     'demo': 'demo.command',
     'convert': 'convert',
+    'check': 'inspect',
     'inspect': 'inspect',
     'excite': 'excite.command',
     'simulate': 'record',
@@ -59,12 +61,20 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command; of one that does not exist the error names the nearest."""
+        """
+        Find the command, and give it the options of the project.
+
+        Of one that does not exist the error names the nearest.
+
+        """
         try:
-            return super().resolve_command(ctx, args)
+            name, command, rest = super().resolve_command(ctx, args)
         except click.UsageError as error:
             near = meant(args[0], self.list_commands(ctx))
             raise click.UsageError(error.message.rstrip('.') + near, ctx) from error
+        if name and command and not {'-h', '--help'} & set(rest):
+            ctx.default_map = {name: project_options(name, command, rest)}
+        return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with the first sentence of their help, whole."""

@@ -15,7 +15,6 @@ import click
 if TYPE_CHECKING:
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.arm import ArmModel
-    from armid_ros.identification import PhysicalCertificate
 
 
 @click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
@@ -60,8 +59,8 @@ if TYPE_CHECKING:
     'payloads',
     multiple=True,
     metavar='BAG=KG@LINK[:X,Y,Z]',
-    help='What the arm is known to carry in a bag, with its centre in the frame of the link [m]; '
-    'fixes the gains of the drives where another bag is without it. May be given several times.',
+    help='Known load of a bag, with its centre in the frame of the link [m]. With a bag without '
+    'it, the gains of the drives are identified. May be given several times.',
 )
 @click.option(
     '--verify/--no-verify',
@@ -180,7 +179,18 @@ def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
     result, verification = found.core, found.verification
     print_parameters(document['parameters'])
     if result.physical is not None:
-        _print_certificate(result.physical)
+        rows = [
+            {
+                'link': link.link,
+                'mass [kg]': f'{link.mass:.4g}',
+                'eigenvalues of the pseudo-inertia': '  '.join(
+                    f'{v:.3g}' for v in link.eigenvalues
+                ),
+                'constraint': 'active' if link.link in result.physical.active else 'inactive',
+            }
+            for link in result.physical.links
+        ]
+        print_rows(rows, as_json=False, right=('mass [kg]',))
     for note in (*result.arm.robot.notes, *result.notes):
         say(f'note: {note}')
     unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
@@ -198,16 +208,3 @@ def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
     say(f'torque error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'torque error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
-
-
-def _print_certificate(certificate: PhysicalCertificate) -> None:
-    rows = [
-        {
-            'link': link.link,
-            'mass [kg]': f'{link.mass:.4g}',
-            'eigenvalues of the pseudo-inertia': '  '.join(f'{v:.3g}' for v in link.eigenvalues),
-            'constraint': 'active' if link.link in certificate.active else 'inactive',
-        }
-        for link in certificate.links
-    ]
-    print_rows(rows, as_json=False, right=('mass [kg]',))

@@ -1,9 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is in a recording, and what is wrong with it."""
+"""What is in a recording or a description, and what is wrong with it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from armid_ros.cli.terminal import print_rows, progress, say, wrapped
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.inspection import Inspection
+    from armid_ros.inspection import Inspection, Remark
 
 _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 
@@ -20,8 +21,8 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
 @click.argument('bag', type=click.Path(path_type=Path))
 @parameters.robot_described(
-    help='Shipped name, path of a URDF, or - for the one in the bag; limits and units are '
-    'checked with it, and an identification is tried.',
+    help='Shipped name, path of a URDF, or - for the one in the bag. With it, limits and units '
+    'are checked and an identification is tried.',
 )
 @click.option(
     '--out',
@@ -119,6 +120,77 @@ def _print(found: Inspection) -> None:
     for row in rows:
         del row['step']
     print_rows(rows, as_json=False, right=heads[1:], spare=('moving', heads[3]))
-    for remark in found.remarks:
-        say(wrapped(f'{_SIGNS[remark.weight]} {remark.text}', others='  '))
+    _print_remarks(found.remarks)
     say(wrapped(found.verdict))
+
+
+def _print_remarks(remarks: Sequence[Remark]) -> None:
+    for remark in remarks:
+        say(wrapped(f'{_SIGNS[remark.weight]} {remark.text}', others='  '))
+
+
+@click.command(epilog='Example: armid check ur10.urdf run.mcap')
+@click.argument('robot_source', metavar='R')
+@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    '--out',
+    type=parameters.OutPath(file_okay=False, path_type=Path),
+    help='Folder to put report.html and check.json into.',
+)
+@parameters.force
+@click.option('--strict', is_flag=True, help='End with code 3 if something is wrong.')
+@columns.options
+@parameters.topic
+@parameters.gravity
+@parameters.joints
+@parameters.seed
+@parameters.reading
+@parameters.as_json
+def check(
+    robot_source: str,
+    bags: tuple[Path, ...],
+    out: Path | None,
+    strict: bool,
+    topic: str | None,
+    gravity: str,
+    joints: str | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """
+    Check a URDF: alone, or against recordings.
+
+    Without a recording: impossible inertias, densities of links with shapes, units of limits. With
+    one: mass and centre of each link as described and as measured.
+
+    """
+    from armid_ros.api.inspection import CHECK
+    from armid_ros.api.inspection import check as run
+    from armid_ros.api.table import ResultOrigin
+    from armid_ros.cli import options
+    from armid_ros.cli.origin import provenance
+    from armid_ros.files import json_text
+    from armid_ros.report.inspection_report import headline, HEADS, link_rows
+
+    staged = None if out is None else options.stage(out, CHECK, robot_source)
+    robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
+    with progress('checking'):
+        found = run(robot, options.read(bags, robot, topic), rng=seed)
+    if staged is not None:
+        source = [path for path in (Path(robot_source), *bags) if path.exists()]
+        found.fill(staged.folder, ResultOrigin(robot_source, '', provenance(source, seed=seed)))
+        staged.keep()
+    if as_json:
+        click.echo(json_text(found.document()))
+    else:
+        for sentence in headline(found.remarks, found.links):
+            say(wrapped(sentence))
+        rows = () if found.links is None else link_rows(found.links)
+        if rows:
+            shown = [dict(zip(HEADS, row, strict=True)) for row in rows]
+            print_rows(shown, as_json=False, right=HEADS[1:], spare=HEADS[:2:-1])
+        _print_remarks(found.remarks)
+        if out is not None:
+            say(f'{out}: report.html, check.json')
+    if strict and found.wrong:
+        click.get_current_context().exit(3)

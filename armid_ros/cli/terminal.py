@@ -151,9 +151,11 @@ def print_rows(
         return
     console = Console()
     heads = list(rows[0]) if rows else []
+    left_out = []
     for head in spare:
         if _width(rows, heads) > console.width:
             heads.remove(head)
+            left_out.append(head)
     table = Table(box=None, header_style='bold')
     for head in heads:
         table.add_column(
@@ -165,6 +167,8 @@ def print_rows(
     for row in rows:
         table.add_row(*(Text(_cell(row[head])) for head in heads))
     console.print(table)
+    if left_out:
+        say(wrapped(f'no room in {console.width} columns for: {", ".join(left_out)}', ' ', '   '))
 
 
 def _width(rows: Sequence[dict[str, Any]], heads: Sequence[str]) -> int:

@@ -21,12 +21,7 @@ from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajector
 from armid_ros.diagnosis.doubt import doubt_as_it_is, doubt_of, doubt_of_names
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.choice import Explainer
-from armid_ros.diagnosis.search.explanation import (
-    as_bodies,
-    Chosen,
-    Explanation,
-    NOISE,
-)
+from armid_ros.diagnosis.search.explanation import as_bodies, Chosen, Explanation, NOISE
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Names
@@ -129,7 +124,9 @@ def diagnose(
             rng=rng,
             progress=tell,
         )
-        return _with_small_print(result, settings.thresholds.headline)
+        large = tuple(one for one in result.findings if one.share >= settings.thresholds.headline)
+        small = tuple(one for one in result.findings if one.share < settings.thresholds.headline)
+        return replace(result, findings=large, minor=(*small, *result.minor))
     tell(0.02, 'filtering')
     given, arm = arm, memoized_arm(arm)
     recordings, validate, baseline, repairs = mended(recordings, validate, baseline, settings)
@@ -195,13 +192,6 @@ def _apart(
     for one, own in zip(day, bad & sound.any(axis=0), strict=True):
         if own.any():
             yield one, own
-
-
-def _with_small_print(result: Diagnosis, least: float) -> Diagnosis:
-    """Return a result in which all was named, with findings of small share in the small print."""
-    large = tuple(one for one in result.findings if one.share >= least)
-    small = tuple(one for one in result.findings if one.share < least)
-    return replace(result, findings=large, minor=(*small, *result.minor))
 
 
 @dataclass(frozen=True)

@@ -22,13 +22,7 @@ from armid_ros.excitation.geometry.environment_file import load_environment
 from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
 from armid_ros.excitation.geometry.heights import LowestPoint
 from armid_ros.excitation.joint_limits import with_joint_limits
-from armid_ros.excitation.limits import (
-    check_limits,
-    Limits,
-    SPEED_CLASSES,
-    used_shares,
-    Violation,
-)
+from armid_ros.excitation.limits import check_limits, Limits, SPEED_CLASSES, used_shares, Violation
 from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible
@@ -38,13 +32,7 @@ from armid_ros.excitation.scene import CollisionScene
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import CRITERIA, Information
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
-from armid_ros.excitation.supervision import (
-    held,
-    jump_fault,
-    MeasuredPose,
-    slowed,
-    tracking_fault,
-)
+from armid_ros.excitation.supervision import held, jump_fault, MeasuredPose, slowed, tracking_fault
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [

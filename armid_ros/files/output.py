@@ -113,7 +113,10 @@ def result_folder(
     made = [one for one in (path, *path.parents) if not os.path.lexists(one)]
     try:
         with locked(path):
-            _try_to_write(path)
+            probe = path / '.armid-probe'
+            write_file(probe, b'0' * 4096)
+            with suppress(OSError):
+                probe.unlink()
             if not force:
                 _refuse_other_results(path, schema, robot)
                 refuse_foreign(path, schema, also)
@@ -155,14 +158,6 @@ def locked(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
-
-
-def _try_to_write(path: Path) -> None:
-    """Find out before the work, not after it, that a folder is read-only or full."""
-    probe = path / '.armid-probe'
-    write_file(probe, b'0' * 4096)
-    with suppress(OSError):
-        probe.unlink()
 
 
 def _refuse_other_results(path: Path, schema: str, robot: str) -> None:

@@ -87,7 +87,7 @@ def keep(store: Store, save: Callable[[str], Path], name: str) -> None:
 def _named(arm: WatchedArm, names: Sequence[str]) -> list[str]:
     found = []
     for name in names:
-        fitting = [str(row['bag']) for row in arm.bags if name in _names_of(row)]
+        fitting = [str(row['bag']) for row in arm.bags if name in (str(row['bag']), _last(row))]
         if not fitting:
             known = ', '.join(_last(row) for row in arm.bags[-5:])
             raise FleetError(f"{arm.arm}: has no bag '{name}'; the latest are {known}")
@@ -98,10 +98,6 @@ def _named(arm: WatchedArm, names: Sequence[str]) -> list[str]:
 def _usual(arm: WatchedArm) -> list[str]:
     beside = [arm.bag_at(arm.named[0], offset)['bag'] for offset in (-1, 0)] if arm.named else []
     return list(dict.fromkeys(map(str, [*beside, *(row['bag'] for row in arm.bags[-1:])])))
-
-
-def _names_of(row: dict[str, Any]) -> tuple[str, str]:
-    return str(row['bag']), _last(row)
 
 
 def _last(row: dict[str, Any]) -> str:

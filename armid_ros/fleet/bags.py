@@ -138,7 +138,9 @@ def _bags(
         if any(path.startswith(f'{folder}/') for folder in whole[-1:]):
             continue
         if info.get('type') == 'directory':
-            inside = [one for one in filesystem.ls(path, detail=True) if _is_part(one['name'])]
+            inside = [
+                one for one in filesystem.ls(path, detail=True) if one['name'].endswith(SUFFIXES)
+            ]
             if inside:
                 whole.append(path)
                 versions = [_version(one) for one in sorted(inside, key=lambda one: one['name'])]
@@ -146,10 +148,6 @@ def _bags(
                 yield path, size, _digest(*versions)
         elif path.endswith(SUFFIXES):
             yield path, int(info.get('size') or 0), _digest(_version(info))
-
-
-def _is_part(path: str) -> bool:
-    return path.endswith(SUFFIXES)
 
 
 def _version(info: Mapping[str, Any]) -> str:

@@ -21,14 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from armid_ros.fleet.scatter import (
-    FEWEST,
-    line_through,
-    ParameterHistory,
-    splits,
-    Spread,
-    spreads,
-)
+from armid_ros.fleet.scatter import FEWEST, line_through, ParameterHistory, splits, Spread, spreads
 import numpy as np
 from scipy import stats
 

@@ -134,7 +134,7 @@ def _verdict(found: Watch) -> VerdictSection:
         else f'None of {counted(len(found.arms), "arm")} changed.'
     )
     rate = f'{100.0 * found.alpha:g} %'
-    sentences = [first, f'Of the arms that are named, {rate} are healthy in the long run.']
+    sentences = [first, *([f'False discovery rate: {rate} of the named arms.'] if ill else [])]
     beware = []
     if counts['too few bags']:
         beware.append(f'{counted(counts["too few bags"], "arm")} with too few bags to be tested')

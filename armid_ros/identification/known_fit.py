@@ -88,10 +88,10 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
 def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
     """Say in words how far off the joint is that is predicted worst."""
     if not errors:
-        return f'The torque of the {data} is off by {overall:.3g} %.'
+        return f'Torque error on {data}: {overall:.3g} %.'
     joint = max(errors, key=lambda one: errors[one])
-    where = f' in {joint}, the most of all joints' if len(errors) > 1 else ''
-    return f'The torque of the {data} is off by {errors[joint]:.3g} %{where}.'
+    where = f' (worst joint: {joint})' if len(errors) > 1 else ''
+    return f'Torque error on {data}: {errors[joint]:.3g} %{where}.'
 
 
 def _pooled(scores: Sequence[Mapping[str, Any]], key: str) -> dict[str, float]:

@@ -89,9 +89,9 @@ class Inspection:
                 return 'Not fit for identification as it is.'
             return 'No fault found; add --robot to check limits and try a fit.'
         if self.trial.refused:
-            return '`armid identify` refuses this recording.'
+            return 'Refused by `armid identify`.'
         if self.trial.grade != 'good':
-            return f'`armid identify` grades this recording {self.trial.grade}{self._why}'
+            return f'Graded {self.trial.grade} by `armid identify`{self._why}'
         return (
             f'Ready for `armid identify`: {self.trial.rank} of {self.trial.theory} parameters are '
             f'distinguishable (quick fit: {self.trial.relative_error_percent:.1f} % error).'

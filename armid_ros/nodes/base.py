@@ -10,13 +10,7 @@ from typing import Any, ClassVar
 
 from armid_ros.errors import ArmidError
 from armid_ros.nodes.complaints import Complaints, FATAL, surviving
-from armid_ros.nodes.parameters.table import (
-    as_declared,
-    declare,
-    is_as,
-    NodeParameter,
-    unknown,
-)
+from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter, unknown
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType

@@ -15,12 +15,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.recording import (
-    Clock,
-    PositionRange,
-    ReadReport,
-    Recording,
-)
+from armid_ros.recording.recording import Clock, PositionRange, ReadReport, Recording
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,

@@ -4,7 +4,7 @@
 Reports: what was found, for a person to read.
 
 ``identification_report`` makes report.html. A `Page` of `Section`s is the frame of every report;
-`Chart` and `BarChart` draw in it; ``armid_ros.report.figures`` has the style of figure files.
+`Chart` and `BarChart` draw in it.
 
 """
 

@@ -27,6 +27,8 @@ _HEIGHT, _WIDTH, _EDGE = 250.0, 340.0, 30.0
 #: Height of a line of text and width of a letter [px].
 _LINE, _LETTER = 16.0, 8.5
 _VIEWS = tuple(Camera(float(azimuth), np.radians(14.0)) for azimuth in np.radians([-90, -55, -20]))
+#: Length of the arrow of gravity [px].
+_ARROW = 26.0
 #: Poses that are tried.
 _POSES = 12
 #: Points nearer to each other than this are one [m].
@@ -93,6 +95,8 @@ class ArmPicture:
         Where the arm is fixed [px].
     labels : tuple of (Dot, float, float)
         Joints to be pointed out, and where the name of each begins [px].
+    gravity : tuple of float
+        Direction of gravity in the picture [px]; zero without gravity.
 
     """
 
@@ -102,6 +106,7 @@ class ArmPicture:
     dots: tuple[Dot, ...]
     base: tuple[float, float]
     labels: tuple[tuple[Dot, float, float], ...]
+    gravity: tuple[float, float]
 
 
 def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -> ArmPicture:
@@ -122,8 +127,9 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
     if q is not None and len(q):
         chosen = np.linspace(0, len(q) - 1, min(_POSES, len(q))).astype(np.intp)
         poses = list(q[chosen])
-    seen = [_flat(robot, pose, view) for pose, view in product(poses, _VIEWS)]
-    lines = max(seen, key=_area)
+    seen = [(_flat(robot, pose, view), view) for pose, view in product(poses, _VIEWS)]
+    lines, view = max(seen, key=lambda one: _area(one[0]))
+    down = view.flat(robot.gravity / max(float(np.linalg.norm(robot.gravity)), _SAME))
     points = lines.reshape(-1, 2)
     low, size = points.min(axis=0), np.maximum(np.ptp(points, axis=0), _SAME)
     scale = min((_WIDTH - 2 * _EDGE) / size[0], (_HEIGHT - 2 * _EDGE) / size[1])
@@ -155,6 +161,7 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         tuple(sorted(dots, key=lambda dot: dot.marked)),
         place(origins[0]),
         tuple((dot, round(width, 1), y) for dot, y in zip(named, lines_at, strict=True)),
+        (round(_ARROW * float(down[0]), 1), round(-_ARROW * float(down[1]), 1)),
     )
 
 

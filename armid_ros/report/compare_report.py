@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 
-from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
 from armid_ros.identification.assess.load_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
@@ -43,8 +42,8 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
     """
     sections = [
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
-        Asked(_asked(comparison)),
         Changes(comparison),
+        Asked(_asked(comparison)),
         Origin(provenance or Provenance()),
     ]
     robot = robot_label(comparison.after.robot)
@@ -71,6 +70,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         return (*(_unusable(one) for one in comparison.unusable), units)
     return (
         *(_unusable(one) for one in comparison.unusable),
+        *([] if comparison.load is None else [_load(comparison)]),
         _sum(comparison),
         *(_residual(one, comparison) for one in comparison.changed_residuals),
         *tell_not_compared(comparison),
@@ -117,8 +117,6 @@ def _details(comparison: Comparison) -> Sequence[str]:
         return [_least_visible(comparison.changes)]
     changed = comparison.changed
     told = [_together(group) for group in comparison.changed_together]
-    if comparison.load is not None:
-        told.insert(0, _load(comparison))
     apart = [c for c in changed if comparison.load is None or not c.parameter.rigid]
     told += [_sentence(change) for change in apart[:_TOLD]]
     if len(apart) > _TOLD:
@@ -164,7 +162,12 @@ def _why_left(comparison: Comparison) -> str:
 def _load(comparison: Comparison) -> str:
     load = comparison.load
     assert load is not None
-    joints = {_number(c.parameter): c.parameter.joint for c in comparison.changes}
+    joints = {
+        (
+            int(c.parameter.name.split(' ')[0].lstrip('Imxyz')) if c.parameter.rigid else 0
+        ): c.parameter.joint
+        for c in comparison.changes
+    }
     named = [
         f'the link of {joints[number]}' if number in joints else f'link {number}'
         for number in (load.link, *load.rivals)
@@ -180,11 +183,6 @@ def _load(comparison: Comparison) -> str:
         f'A load of {" ± ".join(measured(abs(load.mass), HALF_WIDTH * load.mass_std))} kg {verb} '
         f'{named[0]}{where}. It explains every change of the inertial parameters{rivals}.'
     )
-
-
-def _number(name: ParameterName) -> int:
-    """Return the number of the link that leads a rigid parameter, 0 for others."""
-    return int(name.name.split(' ')[0].lstrip('Imxyz')) if name.rigid else 0
 
 
 def _together(group: GroupChange) -> str:
@@ -255,5 +253,5 @@ def _asked(comparison: Comparison) -> list[tuple[str, str]]:
     for title, side in (('First', comparison.before), ('Second', comparison.after)):
         error = side.error_percent
         said = '' if error is None else f'; relative torque error {error:.2f} %'
-        facts.append((title, f'{side.source}: {side.robot}{said}'))
+        facts.append((title, f'{side.source}: {robot_label(side.robot)}{said}'))
     return facts

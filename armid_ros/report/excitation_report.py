@@ -122,7 +122,6 @@ def excitation_report(
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     sections: list[Section] = [
         _verdict(design, arm.robot.links, shares, checked, collision.notes),
-        Asked(_asked(design, arm, robot, obstacles, after, run)),
         ArmPoses(
             draw_silhouettes(
                 whole,
@@ -136,6 +135,7 @@ def excitation_report(
         PlannedMotion(limits, motion, shares),
         PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
         Harmonics(excitation.trajectory),
+        Asked(_asked(design, arm, robot, obstacles, after, run)),
         Origin(provenance or Provenance()),
     ]
     subtitle = (
@@ -166,9 +166,10 @@ def _verdict(
             f'{information.condition:.3g}: {_conditioning(information.condition)}).'
         ]
         worst = int(np.argmax(std / information.scale))
+        sure = int(np.sum(std <= 0.1 * np.abs(design.described)))
         sentences.append(
-            f'The least accurate will be {full_label(names[worst], links)}: '
-            f'± {digits(float(std[worst]))} '
+            f'{sure} of {len(names)} will be known to 10 % or better. The least accurate will be '
+            f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
     sentences.insert(0, _kept(shares, design.limits, checked))

@@ -17,12 +17,7 @@ from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.assessment import (
-    EncoderNoise,
-    PhysicalSection,
-    WhitenessSection,
-)
-from armid_ros.report.sections.correlations import Correlations
+from armid_ros.report.sections.assessment import EncoderNoise, PhysicalSection, WhitenessSection
 from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
 from armid_ros.report.sections.excitation import ExcitationSection
 from armid_ros.report.sections.fit import FitSection
@@ -114,18 +109,20 @@ def identification_report(
         grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
     sentences = (*grade.reasons, *judgement.sentences)
+    read = {'training': (recordings, training), 'held-out': (validation_recordings, validation)}
     quality = [
-        *(RecordingQuality.of(r, 'training', training.get(r.source, ())) for r in recordings),
-        *(
-            RecordingQuality.of(r, 'held-out', validation.get(r.source, ()))
-            for r in validation_recordings
-        ),
+        RecordingQuality.of(one, name, fits.get(one.source, ()))
+        for name, (own, fits) in read.items()
+        for one in own
     ]
+    worst = directions(result.estimate, torque_scale(result))
+    physical = [PhysicalSection(result.physical, assessment.exports)] if result.physical else []
+    forward, noise = (verification.forward, verification.noise) if verification else ((), None)
     sections: list[Section] = [
         VerdictSection(grade.word, TONES[grade.word], sentences, judgement.beware),
         NextSteps(judgement.next_steps),
         FitSection(arm.robot, training, validation, torque_reach(result, shown)),
-        *_forward(result, verification),
+        *([Forward(arm.robot, forward)] if forward else []),
         Residuals(arm.robot, shown, role),
         ParameterSection(
             result.estimate,
@@ -134,11 +131,10 @@ def identification_report(
             arm.robot.links,
             assessment.reference,
         ),
-        *_physical(result, assessment.exports),
-        Correlations(result.estimate, arm.robot.links),
-        _excitation(result),
+        *physical,
+        ExcitationSection(result.condition_number, result.base.rank, worst, arm.robot.links),
         WhitenessSection(arm.robot, shown, role),
-        *_noise(result, verification),
+        *([] if noise is None else [EncoderNoise(arm.robot, noise)]),
         *assessment.sections,
         DataQuality(quality, arm.robot),
         Asked(_asked(result, robot, list(training), list(validation))),
@@ -149,29 +145,6 @@ def identification_report(
         f'{counted(len(validation), "held-out recording")}'
     )
     return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()
-
-
-def _forward(result: Identification, verification: Verification | None) -> list[Section]:
-    if verification is None or not verification.forward:
-        return []
-    return [Forward(result.arm.robot, verification.forward)]
-
-
-def _excitation(result: Identification) -> Section:
-    worst = directions(result.estimate, torque_scale(result))
-    return ExcitationSection(
-        result.condition_number, result.base.rank, worst, result.arm.robot.links
-    )
-
-
-def _physical(result: Identification, exports: Mapping[str, Sequence[str]]) -> list[Section]:
-    return [] if result.physical is None else [PhysicalSection(result.physical, exports)]
-
-
-def _noise(result: Identification, verification: Verification | None) -> list[Section]:
-    if verification is None or verification.noise is None:
-        return []
-    return [EncoderNoise(result.arm.robot, verification.noise)]
 
 
 def _asked(

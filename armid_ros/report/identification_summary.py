@@ -26,10 +26,8 @@ def headline(
 ) -> list[str]:
     """Return the grade with its reasons, and what the residual still depends on."""
     first, *others = graded.reasons
-    for line in () if verification is None else verification.left_out[::-1]:
-        _, failed, reason = line.partition(': not simulated: ')
-        if failed:  # of all recordings alike
-            others = [f'The model cannot be simulated: {reason}.', *graded.reasons[1:]]
+    if verification is not None and verification.unfit:
+        others = [f'The model cannot be simulated: {verification.unfit}.', *others]
     shown = [fit for fits in validation.values() for fit in fits] or result.training
     trends = residual_trends(result.arm.robot.joints, shown).values()
     return [f'{graded.word}: {first}', *others, *trends]

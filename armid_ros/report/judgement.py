@@ -12,7 +12,6 @@ from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.recording import Recording
-from armid_ros.report.families import full_label
 from armid_ros.report.notation import counted, digits
 from armid_ros.report.statistics import Trend, Whiteness
 import numpy as np
@@ -23,7 +22,6 @@ _OVERFIT = 1.3
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 #: Parameters that a sentence names.
-_NAMED = 8
 #: Share of a joint's residual that one variable explains, from which there is something to find.
 TELLING_SHARE = 0.15
 #: Share of the lags outside their 99 % band from which a residual is far from white.
@@ -83,7 +81,11 @@ def judge(
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
     findings = [
-        *_data_findings(recordings),
+        *[
+            Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
+            for recording in recordings
+            if not recording.report.unharmed
+        ],
         *_error_findings(result, training, held_out),
         *_residual_findings(result, fits or result.training),
         *_excitation_findings(result),
@@ -138,14 +140,6 @@ def _simulated(verification: Verification | None) -> list[str]:
     return [
         f'Driven by the recorded torques, its position error is at most {worst.after.worst} rms'
         f'{before}.'
-    ]
-
-
-def _data_findings(recordings: Sequence[Recording]) -> list[Caution]:
-    return [
-        Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
-        for recording in recordings
-        if not recording.report.unharmed
     ]
 
 
@@ -223,15 +217,12 @@ def _excitation_findings(result: Identification) -> list[Caution]:
     findings = []
     estimate = result.estimate
     known = excludes_zero(estimate.values, estimate.std)
-    links = result.arm.robot.links
-    lost = [full_label(estimate.parameters[k], links) for k in np.flatnonzero(~known)]
+    lost = int(np.sum(~known))
     if lost:
         findings.append(
             Caution(
-                f'{len(lost)} of {len(estimate.parameters)} parameters have '
-                f'intervals that include zero: {", ".join(lost[:_NAMED])}'
-                + (f' and {len(lost) - _NAMED} more' if len(lost) > _NAMED else '')
-                + '. Use the model for torques, not for these single values.'
+                f'{lost} of {len(known)} parameters have intervals that include zero. Use the '
+                'model for torques, not for these single values.'
             )
         )
     if result.condition_number > WEAK_CONDITION:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What residuals, correlations and excitation say, in numbers to be drawn or put in words."""
+"""What residuals and excitation say, in numbers to be drawn or put in words."""
 
 from __future__ import annotations
 
@@ -146,12 +146,6 @@ def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:
         parts = tuple((estimate.parameters[k], float(weights[k])) for k in order[:enough][:6])
         found.append(Direction(float(np.sqrt(max(variances[column], 0.0))), parts))
     return tuple(found)
-
-
-def correlations(estimate: Estimate) -> FloatArray:
-    """Return the correlation of every pair of parameters, shape (P, P)."""
-    std = np.where(estimate.std > 0.0, estimate.std, 1.0)
-    return np.asarray(np.clip(estimate.covariance / np.outer(std, std), -1.0, 1.0))
 
 
 def _some_columns(result: Identification, fits: Sequence[Fit]) -> FloatArray:

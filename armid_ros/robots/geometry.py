@@ -114,7 +114,9 @@ def shapes_of(
 
 
 def collision_geometry(
-    robot: Robot, progress: Callable[[float], None] | None = None
+    robot: Robot,
+    progress: Callable[[float], None] | None = None,
+    other: Literal['visual', 'collision'] = 'collision',
 ) -> tuple[pin.GeometryModel, dict[str, str]]:
     """
     Return the collision bodies of a robot, and notes on those that had to be left out.
@@ -138,7 +140,7 @@ def collision_geometry(
     geometry = pin.GeometryModel()
     notes: dict[str, str] = {}
     meshes: _Meshes = {}
-    for shape in shapes_of(robot, 'collision', progress=progress):
+    for shape in shapes_of(robot, 'collision', other, progress):
         if shape.kind == 'mesh' and shape.path is None:
             notes[shape.link] = (
                 f"link '{shape.link}': collision mesh {shape.mesh} not found; left out"

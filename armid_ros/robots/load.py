@@ -16,13 +16,7 @@ from xml.sax.saxutils import escape
 from armid_ros.errors import RobotError
 from armid_ros.files import read_text, reading
 from armid_ros.motion import FloatArray
-from armid_ros.robots.description import (
-    Description,
-    Joint,
-    parse_description,
-    parse_xml,
-    Vector,
-)
+from armid_ros.robots.description import Description, Joint, parse_description, parse_xml, Vector
 from armid_ros.robots.gravity import parse_gravity
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import Robot

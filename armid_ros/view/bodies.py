@@ -11,7 +11,6 @@ as bars from joint to joint.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
@@ -80,7 +79,15 @@ def bodies(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
 def _triangles(shape: LinkShape) -> FloatArray:
     """Return the triangles of a shape in its own frame."""
     if shape.path is not None:
-        return _mesh(shape.path, np.array(shape.size))
+        scale = np.array(shape.size)
+        try:
+            mesh = coal.MeshLoader().load(str(shape.path), scale)
+        except (RuntimeError, ValueError) as error:
+            raise ValueError(f'{shape.path} cannot be read as a mesh: {error}') from None
+        faces = np.array(
+            [[face[0], face[1], face[2]] for face in map(mesh.tri_indices, range(mesh.num_tris))]
+        )
+        return np.asarray(np.array(mesh.vertices())[faces])
     if shape.kind == 'box':
         return _hull(0.5 * np.array(shape.size) * _CUBE)
     if shape.kind == 'sphere':
@@ -89,17 +96,6 @@ def _triangles(shape: LinkShape) -> FloatArray:
     ends = _RING if shape.kind == 'cylinder' else _sphere()
     shift = np.array([0.0, 0.0, 0.5 * length])
     return _hull(np.concatenate([radius * ends + shift, radius * ends - shift]))
-
-
-def _mesh(path: Path, scale: FloatArray) -> FloatArray:
-    try:
-        mesh = coal.MeshLoader().load(str(path), scale)
-    except (RuntimeError, ValueError) as error:
-        raise ValueError(f'{path} cannot be read as a mesh: {error}') from None
-    faces = np.array(
-        [[face[0], face[1], face[2]] for face in map(mesh.tri_indices, range(mesh.num_tris))]
-    )
-    return np.asarray(np.array(mesh.vertices())[faces])
 
 
 def _bars(robot: Robot) -> tuple[Body, ...]:

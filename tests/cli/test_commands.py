@@ -36,6 +36,18 @@ def test_every_command_explains_itself_with_an_example(command):
     assert 'Example: armid ' in armid(command, '--help').output
 
 
+def test_options_of_a_project_are_taken_and_printed_where_none_is_typed(
+    bags, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    project = tmp_path / 'armid.toml'
+    project.write_text(f'robot = "{ROBOT}"\n[inspect]\ngravity = "moon"\n')
+    taken = armid('inspect', bags[0], '--gravity', 'earth').stderr
+    assert f'--robot {ROBOT}' in taken and 'moon' not in taken
+    project.write_text('[inspect]\ngravty = "moon"\n')
+    assert 'gravity' in armid('inspect', bags[0], code=2).stderr
+
+
 #: What takes long to import, and the packages of armid_ros that import it.
 HEAVY = (
     *('numpy', 'scipy', 'pinocchio', 'coal', 'matplotlib', 'rich', 'rosbags', 'rclpy', 'dask'),

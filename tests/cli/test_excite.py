@@ -9,13 +9,7 @@ import shutil
 import armid_ros.api.excitation as excitation_files
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import (
-    check_limits,
-    ClearanceModel,
-    design,
-    Limits,
-    load_excitation,
-)
+from armid_ros.excitation import check_limits, ClearanceModel, design, Limits, load_excitation
 from armid_ros.excitation.geometry.heights import lowest_point
 from armid_ros.recording import read_joint_trajectory, read_recording
 from armid_ros.robots import collision_model, load_robot

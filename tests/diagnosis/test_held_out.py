@@ -4,9 +4,7 @@
 
 from dataclasses import dataclass
 
-from armid_ros.diagnosis.data.rows import (
-    Problem,
-)
+from armid_ros.diagnosis.data.rows import Problem
 from armid_ros.diagnosis.search.held_out import held_out
 from armid_ros.diagnosis.search.trial import Candidate
 from armid_ros.effects import CATALOGUE

@@ -8,9 +8,7 @@ from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.gap import not_repeating
-from armid_ros.diagnosis.verdict.naming import (
-    _separating,
-)
+from armid_ros.diagnosis.verdict.naming import _separating
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
@@ -120,11 +118,10 @@ def test_no_value_is_lost_by_rounding(bench, name, values, std, shown):
     assert shown in sentence(replace(found, std=std))
 
 
-def test_a_parameter_of_several_joints_is_called_by_its_name_once(bench):
+def test_values_of_several_joints_are_left_to_the_table(bench):
     joints = ('shoulder', 'elbow')
     text = sentence(finding(bench, name='viscous_friction', values=(0.3, 0.2), joints=joints))
-    assert text.count('viscous coefficient') == 1
-    assert text.index('0.300 +- 0.020') < text.index('0.200 +- 0.020')
+    assert 'shoulder, elbow' in text and '0.3' not in text
 
 
 def test_names_that_are_one_cause_have_one_share(bench):

@@ -54,6 +54,13 @@ def test_an_identification_and_its_model(at_desk):
     check('identification', ar.identify('my_arm.urdf', 'monday', physical=box).document())
 
 
+def test_a_check_of_a_description(at_desk):
+    words = ['check', 'my_arm.urdf', 'friday', '--strict', '--out', 'checked']
+    assert CliRunner().invoke(main, words).exit_code == 3
+    check('check', read(at_desk / 'checked' / 'check.json'))
+    check('check', json.loads(armid('check', 'my_arm.urdf', '--json')))
+
+
 @pytest.mark.parametrize(
     'recordings',
     [('today_1', '--validate', 'today_2', '--baseline', 'monday'), ('friday',)],

@@ -6,12 +6,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import (
-    check_limits,
-    FourierTrajectory,
-    Limits,
-    used_shares,
-)
+from armid_ros.excitation import check_limits, FourierTrajectory, Limits, used_shares
 from armid_ros.excitation.feasibility import trajectory_faults
 from armid_ros.robots import robot_from_urdf
 import numpy as np

@@ -6,12 +6,7 @@ import csv
 from dataclasses import replace
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import (
-    Excitation,
-    FourierTrajectory,
-    load_excitation,
-    save_excitation,
-)
+from armid_ros.excitation import Excitation, FourierTrajectory, load_excitation, save_excitation
 import numpy as np
 import pytest
 

@@ -138,7 +138,7 @@ def test_what_is_wrong_is_said_without_a_robot(spoil, said, clean):
         (1e3, 'bad: refused by `armid identify`: run: torques of'),
         (-1.0, 'bad: refused by `armid identify`: run: torques of'),
         (12.0, 'seem to be in kgf cm instead of N m'),
-        (4.0, 'times the torque in N m (currents?): convert them'),
+        (4.0, 'times the torque in N m: currents'),
     ],
 )
 def test_units_of_efforts_are_seen_against_the_description(factor, said, clean, robot):
@@ -216,7 +216,7 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     found = inspect(other, robot, rng=np.random.default_rng(0))
     assert graded.word != 'good'
     assert (found.trial.grade, found.trial.reasons) == (graded.word, graded.reasons)
-    said = f'`armid identify` grades this recording {graded.word}: {graded.reasons[0]}'
+    said = f'Graded {graded.word} by `armid identify`: {graded.reasons[0]}'
     assert found.verdict == said
 
 

@@ -35,7 +35,6 @@ TITLES = [
     'Fit',
     'Residual by variable',
     'Parameters',
-    'Correlations',
     'Excitation',
     'Whiteness',
     'Data quality',
@@ -406,9 +405,7 @@ def test_print_shows_what_is_folded_and_folds_it_again(browser, first_plot):
 
 def test_the_terminal_says_below_the_grade_that_the_model_cannot_be_simulated(case):
     reasons = ('It predicts.', 'But not that.')
-    failed = Verification(
-        None, (), ('a.mcap: not simulated: no body', 'b.mcap: not simulated: no')
-    )
+    failed = Verification(None, (), ('a.mcap: not simulated: no body',), 'no body')
     lines = headline(Grade('good', reasons), case.result, {}, failed)
     assert lines[:3] == [
         'good: It predicts.',

@@ -7,14 +7,7 @@ from dataclasses import replace
 from armid_ros.identification import Fit
 from armid_ros.motion import Motion
 from armid_ros.report.judgement import judge
-from armid_ros.report.statistics import (
-    correlations,
-    directions,
-    torque_reach,
-    torque_scale,
-    Trend,
-    Whiteness,
-)
+from armid_ros.report.statistics import directions, torque_reach, torque_scale, Trend, Whiteness
 import numpy as np
 import pytest
 
@@ -68,12 +61,6 @@ def test_worst_known_direction_is_the_largest_variance_of_the_torque(case):
     assert found[0].uncertainty == pytest.approx(np.sqrt(np.linalg.norm(scaled, 2)))
     values = [direction.uncertainty for direction in found]
     assert values == sorted(values, reverse=True) and len(values) == case.result.base.rank
-
-
-def test_correlations_are_one_with_itself_and_never_more(case):
-    rho = correlations(case.result.estimate)
-    np.testing.assert_allclose(np.diag(rho), 1.0)
-    assert np.abs(rho).max() <= 1.0
 
 
 def test_without_held_out_data_the_next_step_is_to_record_them(case):

@@ -85,8 +85,8 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     '--residual',
     type=click.Choice(['gp']),
-    help='Learn what is left without a name, where the verdict is partial or unknown, as a map '
-    'with its uncertainty (gp: a Gaussian process of each joint), and suggest a law.',
+    help='Learn the unexplained residual where the verdict is partial or unknown. gp: a Gaussian '
+    'process of each joint.',
 )
 @click.option(
     '--strict',
@@ -189,15 +189,8 @@ def diagnose(
     else:
         show(result.core)
         _show_extras(out, result)
-    _exit(result.verdict, strict)
-
-
-def _exit(verdict: str, strict: bool) -> None:
-    """End with a code of its own where a script must not go on."""
-    if verdict == 'bad_data':
-        click.get_current_context().exit(2)
-    if strict and verdict in ('unknown', 'not_repeatable'):
-        click.get_current_context().exit(3)
+    stopped = {'bad_data': 2, **({'unknown': 3, 'not_repeatable': 3} if strict else {})}
+    click.get_current_context().exit(stopped.get(result.verdict, 0))
 
 
 def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:

@@ -25,8 +25,8 @@ _OPTIONS = (
     click.option(
         '--partner',
         metavar='R',
-        help='Shipped name, URDF or xacro of a machine or person recorded in the same bags, to '
-        'which the arm may be tied, such as the wearer of an exoskeleton.',
+        help='Shipped name, URDF or xacro of a machine or person in the same bags that the arm '
+        'may be tied to.',
     ),
     click.option('--partner-topic', help="The partner's JointState topic, where several name it."),
     click.option(
@@ -34,9 +34,8 @@ _OPTIONS = (
         'ties',
         multiple=True,
         metavar='JOINT=JOINT',
-        help="Where they may be tied: a joint of the arm and one of the partner, whose links' "
-        'centroids the tie joins, or points of them, JOINT@X,Y,Z=JOINT@X,Y,Z [m]. By default '
-        'links of equal number.',
+        help='Where they may be tied: a joint of the arm and one of the partner. JOINT@X,Y,Z sets '
+        'a point of the link [m]; the centroid by default. By default links of equal number.',
     ),
 )
 

@@ -22,10 +22,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_rows
 from armid_ros.effects import Effect
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.normal_equations import (
-    NormalEquations,
-    scaled_inverse,
-)
+from armid_ros.identification.fitting.normal_equations import NormalEquations, scaled_inverse
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray

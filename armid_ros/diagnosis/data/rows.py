@@ -8,10 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.trajectory import block_rows, row_weights, Trajectory
-from armid_ros.identification.fitting.normal_equations import (
-    informative_basis,
-    NormalEquations,
-)
+from armid_ros.identification.fitting.normal_equations import informative_basis, NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt

@@ -238,15 +238,10 @@ def _widest(used: Conditioning) -> int:
     return max(1, min(used.decimation // _OVERSAMPLING, fast_enough))
 
 
-def _thin(used: Conditioning) -> int:
-    """Return the factor by which a motion is thinned out before columns are computed."""
-    return max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
-
-
 def _trajectory(
     recording: Recording, fold: int, motion: Motion, used: Conditioning, least: FloatArray
 ) -> Trajectory:
-    thin = _thin(used)
+    thin = max(d for d in range(1, _widest(used) + 1) if used.decimation % d == 0)
     if thin > 1:
         first = replace(used, decimation=thin)
         assert motion.tau is not None

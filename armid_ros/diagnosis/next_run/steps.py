@@ -62,7 +62,11 @@ def next_steps(
     elif no_run:
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
     steps += [text for finding in findings for text in _records(finding, run)]
-    steps += [_more(group) for group in by_cause(diagnosis.suspected)]
+    steps += [
+        'Record three more motions, and diagnose all recordings together: that tells whether '
+        f'{names_and_places(group)} changed.'
+        for group in by_cause(diagnosis.suspected)
+    ]
     unseen = _not_checked(diagnosis)
     if unseen:
         steps += unseen
@@ -90,14 +94,6 @@ def _not_checked(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.at_rest:
         steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
     return steps
-
-
-def _more(group: Sequence[Finding]) -> str:
-    """Say how to learn whether a cause is there that recordings hardly tell."""
-    return (
-        'Record three more motions, and diagnose all recordings together: that tells whether '
-        f'{names_and_places(group)} changed.'
-    )
 
 
 def _use(diagnosis: Diagnosis, model: str) -> str:
@@ -132,7 +128,7 @@ def _centre(finding: Finding) -> str:
     if not (finding.weighs and mass and len(moments) == 3 and excludes_zero(*mass[0][1:])):
         return ''
     at = ', '.join(as_sure(value / mass[0][1], std / abs(mass[0][1])) for _, value, std in moments)
-    return f'; the load is centred at ({at}) m in the frame of that link'
+    return f'. The load is centred at ({at}) m in the frame of that link'
 
 
 def _first(looks: list[str]) -> list[str]:
@@ -177,7 +173,7 @@ def _telling(finding: Finding, rival: Rival, run: NextRun | None) -> str:
     best = shown_best(finding.name, finding.joints, rival)
     if on_one_link(finding.name, finding.joints, rival):
         return (
-            f'No motion tells {names}, as they move as one body: weigh what the link carries, or '
+            f'No motion tells {names}, as they move as one body. Weigh what the link carries, or '
             f'record {best}.'
         )
     tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'

@@ -50,12 +50,10 @@ _AS_EXACT = (
 )
 #: What would tell a change from a misfit, where there are no or too few recordings.
 _NO_BASELINE = (
-    'It may be the misfit of another motion: recordings from before, given as baseline, tell '
-    'that from a change.'
+    'It may be the model error of this motion. Recordings from before (--baseline) exclude that.'
 )
 _ONE_EACH = (
-    'It may be the misfit of another motion: more than one recording a day tells that from a '
-    'change.'
+    'It may be the model error of this motion. Record more than one motion a day to exclude that.'
 )
 
 
@@ -111,7 +109,9 @@ class Explainer:
         first = explain(given, described, settings)
         nothing = np.zeros(self.arm.robot.n_joints)
         closed = at_floor(first, settings)
-        if closed and not _beside_a_correction(first):
+        if closed and not (
+            len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
+        ):
             return Chosen(first, nothing, NOISE)
         tell(0.4, 'the model fitted anew')
         anew = self._anew(tuple(prepared.sigma))
@@ -120,7 +120,7 @@ class Explainer:
             return Chosen(anew, nothing, NOISE)
         misfit, words = nothing, NOISE
         if not (closed or corrected):
-            misfit = _left_by(anew)
+            misfit = np.sqrt(anew.evidence.power(anew.fitted.residual))
             tell(0.7, 'the model as given')
             sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
             first = explain(given, replace(described, sigma=sigma), settings)
@@ -264,11 +264,6 @@ def _noise_within(
     )
 
 
-def _beside_a_correction(first: Explanation) -> bool:
-    """Return whether one of several causes, or a rival body, may correct the description."""
-    return len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
-
-
 def _may_correct(step: Step) -> bool:
     effect, others = step.trial.candidate.effect, [rival.candidate.effect for rival in step.rivals]
     return effect.traits.corrects or (
@@ -310,11 +305,6 @@ def _is_correction(trial: Trial, arm: ArmModel) -> bool:
     kept = list(trial.candidate.kept)
     values[kept], std[kept] = trial.values, trial.deviation
     return effect.is_correction(values, std, arm)
-
-
-def _left_by(explanation: Explanation) -> FloatArray:
-    """Return the root mean square residual of an explanation, of each joint, (n,) [N m]."""
-    return np.sqrt(explanation.evidence.power(explanation.fitted.residual))
 
 
 def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:

@@ -19,12 +19,7 @@ from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import Workspace
-from armid_ros.diagnosis.search.candidates import (
-    Candidates,
-    candidates,
-    nuisance_of,
-    Question,
-)
+from armid_ros.diagnosis.search.candidates import Candidates, candidates, nuisance_of, Question
 from armid_ros.diagnosis.search.elimination import BackwardElimination, doubtful, LinearFit, pruned
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of

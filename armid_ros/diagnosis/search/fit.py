@@ -248,7 +248,7 @@ def _settled(
     def loss_of(patch: Patch, residual: Sequence[FloatArray]) -> float:
         change = patch.change
         away = change @ known.matrix @ change - 2.0 * known.vector @ change
-        return _loss(residual, evidence) + float(away)
+        return float(sum(np.sum(own**2) for own in evidence.weighted(residual))) + float(away)
 
     residual = evidence.residuals(state.model)
     loss = loss_of(state, residual)
@@ -305,10 +305,6 @@ def _expected(
         own - (block.reshape(-1, size) @ step).reshape(own.shape)
         for own, block in zip(residual, columns, strict=True)
     ]
-
-
-def _loss(residual: Sequence[FloatArray], evidence: Evidence) -> float:
-    return float(sum(np.sum(own**2) for own in evidence.weighted(residual)))
 
 
 def _step(

@@ -24,13 +24,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import (
-    each_times,
-    make_problem,
-    Problem,
-    Products,
-    products,
-)
+from armid_ros.diagnosis.data.rows import each_times, make_problem, Problem, Products, products
 from armid_ros.diagnosis.data.trajectory import fold_rows
 from armid_ros.diagnosis.search.fit import Fitted
 from armid_ros.diagnosis.search.search_state import BaselineRows, Nuisance

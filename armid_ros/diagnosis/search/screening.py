@@ -309,7 +309,7 @@ def _examined(
     assert state.total is not None
     least = 0.0 if state.before is None else state.settings.thresholds.headline * state.total
     most = state.settings.thresholds.open_share
-    open_squares = _open_squares(state)
+    open_squares = np.where(state.gaps(state.residual), np.sum(state.residual**2, axis=0), np.inf)
     there: list[Trial] = []
     large: list[tuple[Trial, Trial]] = []
     certain: list[Key] = []
@@ -340,11 +340,6 @@ def _examined(
         state = replace(state, tested=state.tested.among(able, certain))
     there = [change for change in there if changed(change, state)]
     return result, sorted(there, key=lambda t: -worth(t, state)), closing, state
-
-
-def _open_squares(state: SearchState) -> FloatArray:
-    """Return the squares of every joint that has a gap; infinite where there is none, (n,)."""
-    return np.where(state.gaps(state.residual), np.sum(state.residual**2, axis=0), np.inf)
 
 
 def _compared(trials: Sequence[Trial], alone: Sequence[Trial], state: SearchState) -> list[Trial]:

@@ -262,7 +262,17 @@ def diagnose_ties(
     ties, fitted = start.find()
     if not fitted.named:
         return _within_its_noise(arm, prepared, settings)
-    found = _explanation(ties, fitted)
+    reference = ties.fitted(())
+    survey, rivals = _rivals(ties, reference, fitted)
+    view = LinearFit.of(fitted, ties.evidence)
+    share = ties.settings.thresholds.misfit_share
+    steps = []
+    for k in range(len(fitted.named)):
+        again = view.trial_of(k)
+        assert again.trial is not None
+        steps.append(Step(again.trial, rivals, (again.trial,), again.power, survey.tried, share))
+    base: BaseParameters | None = ties.base
+    found = Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, ties.evidence)
     if _open(found, settings):
         most = settings.thresholds.many_causes
         question = Question(arm, prepared.base, arm, prepared.base, (), most)
@@ -315,21 +325,6 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
     if np.any(described.chi2_per_row > np.maximum(limits, _ALIKE * found.chi2_per_row)):
         return found
     return described
-
-
-def _explanation(ties: Ties, fitted: Fitted) -> Explanation:
-    """Return the explanation with a step for each tie, tried jointly with the others."""
-    reference = ties.fitted(())
-    survey, rivals = _rivals(ties, reference, fitted)
-    view = LinearFit.of(fitted, ties.evidence)
-    share = ties.settings.thresholds.misfit_share
-    steps = []
-    for k in range(len(fitted.named)):
-        again = view.trial_of(k)
-        assert again.trial is not None
-        steps.append(Step(again.trial, rivals, (again.trial,), again.power, survey.tried, share))
-    base: BaseParameters | None = ties.base
-    return Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, ties.evidence)
 
 
 def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tuple[Trial, ...]]:

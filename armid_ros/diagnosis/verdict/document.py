@@ -61,7 +61,17 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'filters': _filters(diagnosis),
         'candidates': _candidates(diagnosis),
         'not_visible': list(diagnosis.not_visible),
-        'detectable': _detectable(diagnosis),
+        'detectable': [
+            {
+                'name': row.name,
+                'joints': list(row.joints),
+                'parameter': '' if row.parameter is None else row.parameter.name,
+                'min_detectable': _finite(row.size),
+                'unit': '' if row.parameter is None else row.parameter.unit,
+                'visible_fraction': row.visible,
+            }
+            for row in detectable(diagnosis.explanation)
+        ],
         'model': model,
     }
 
@@ -155,7 +165,19 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     if explanation is None or explanation.survey is None:
         return []
     survey, arm = explanation.survey, explanation.given
-    return [_candidate(trial, survey, arm) for trial in survey.ranking[:_MOST_CANDIDATES]]
+    return [
+        {
+            'name': trial.candidate.effect.said_as,
+            'joints': list(trial.candidate.effect.joints),
+            'share': share_alone(trial, survey),
+            'held_out_gain': trial.gain,
+            'replicated_in': trial.replicated,
+            'visible_fraction': trial.visible,
+            'min_detectable': _finite(_said_size(trial, survey, arm)[1]),
+            'adjusted_p': min(1.0, trial.p * survey.tried),
+        }
+        for trial in survey.ranking[:_MOST_CANDIDATES]
+    ]
 
 
 def share_alone(trial: Trial, survey: Survey) -> float:
@@ -166,34 +188,6 @@ def share_alone(trial: Trial, survey: Survey) -> float:
 
     """
     return min(trial.gain / max(survey.total, 1e-300), 1.0)
-
-
-def _candidate(trial: Trial, survey: Survey, arm: ArmModel) -> dict[str, Any]:
-    return {
-        'name': trial.candidate.effect.said_as,
-        'joints': list(trial.candidate.effect.joints),
-        'share': share_alone(trial, survey),
-        'held_out_gain': trial.gain,
-        'replicated_in': trial.replicated,
-        'visible_fraction': trial.visible,
-        'min_detectable': _finite(_said_size(trial, survey, arm)[1]),
-        'adjusted_p': min(1.0, trial.p * survey.tried),
-    }
-
-
-def _detectable(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the smallest detectable size of each effect; null where no size is detectable."""
-    return [
-        {
-            'name': row.name,
-            'joints': list(row.joints),
-            'parameter': '' if row.parameter is None else row.parameter.name,
-            'min_detectable': _finite(row.size),
-            'unit': '' if row.parameter is None else row.parameter.unit,
-            'visible_fraction': row.visible,
-        }
-        for row in detectable(diagnosis.explanation)
-    ]
 
 
 def _finite(value: float) -> float | None:

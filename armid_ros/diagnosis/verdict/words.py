@@ -23,6 +23,8 @@ Word = Literal[
 ]
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
+#: Nouns that take an article: a payload, but viscous friction.
+_COUNTED = {'payload', 'spring', 'offset', 'delay', 'tilt', 'limit', 'gain', 'coupling', 'change'}
 #: What a share is of, where something is named and where nothing is.
 _GAP, _LEFT = 'the gap', 'what is left'
 
@@ -130,7 +132,8 @@ def decide(
     if not findings:
         if open_gap:
             return Verdict('unknown', f'Something is missing: {rest}. {_unexplained(unnamed)}')
-        text = _consistent(floor_in_words, as_it_is, unnamed.minor)
+        text = _consistent(floor_in_words, unnamed.minor)
+        text = f'{_refit(as_it_is, arm.robot, floor_in_words)}{text}'
         hidden = [] if hides is None else [_could_hide(hides, unnamed.minor, arm.robot)]
         told = [suspicion(group) for group in by_cause(unnamed.suspected)]
         return Verdict('consistent', ' '.join([text, *hidden, *told]))
@@ -139,9 +142,8 @@ def decide(
         return Verdict('partial', f'{said}{tied} There is more: {rest}.')
     if tied:
         return Verdict('ambiguous', f'{said}{tied}')
-    fitted = as_it_is is not None and as_it_is.ratio.max() > 1.0
-    once = ', once its rigid body and friction are fitted as well' if fitted else ''
-    return Verdict('named', f'{said} The remaining error is {floor_in_words}{once}.')
+    refit = _refit(as_it_is, arm.robot, floor_in_words)
+    return Verdict('named', f'{refit}{said} The remaining error is {floor_in_words}.')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:
@@ -155,17 +157,23 @@ def _rivals_in_words(findings: Sequence[Finding]) -> str:
     return f' These data cannot tell {", nor ".join(pairs)}.' if pairs else ''
 
 
-def _consistent(floor_in_words: str, as_it_is: Excess | None, minor: Sequence[Finding]) -> str:
-    """Say that a model explains the data, what is fitted anew for that, and what is too small."""
+def _consistent(floor_in_words: str, minor: Sequence[Finding]) -> str:
+    """Say that a model explains the data, and what is too small to matter."""
     small = [sentence(one, _LEFT) for one in minor[:1] if one.share >= SAID]
+    text = f'The model explains the recordings: what is left is no more than {floor_in_words}'
+    return f'{text}, or too small to matter. {small[0]}' if small else f'{text}.'
+
+
+def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
+    """Say that rigid body and friction were refitted, and how far off they were as given."""
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
-        text = f'The model explains the recordings: what is left is no more than {floor_in_words}'
-        return f'{text}, or too small to matter. {small[0]}' if small else f'{text}.'
-    text = (
-        'The model explains the recordings once its rigid body and friction are fitted: what is '
-        f'left is no more than {floor_in_words}{", or too small to matter" if small else ""}.'
+        return ''
+    joint = robot.joints[int(np.argmax(as_it_is.ratio))]
+    times = larger(np.sqrt(as_it_is.ratio.max()))
+    return (
+        f'Rigid body and friction were refitted: as given, the error of {joint} is {times} '
+        f'{floor_in_words} can be. '
     )
-    return ' '.join([text, *small])
 
 
 def _could_hide(hides: Hiding, minor: Sequence[Finding], robot: Robot) -> str:
@@ -293,23 +301,23 @@ def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
 
 def _subject(finding: Finding) -> str:
     """Return what a cause is, where, and its values."""
-    words = finding.name.replace('_', ' ')
-    article = 'An' if words[0] in 'aeiou' else 'A'
+    words = finding.name.replace('_', ' ').replace('coulomb', 'Coulomb')
+    article = f'a{"n" if words[0] in "aeiou" else ""} ' if words.split()[-1] in _COUNTED else ''
+    subject = f'{article}{words}'[:1].upper() + f'{article}{words}'[1:]
     if finding.ties:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)
-        return f'{words.capitalize()} at {where}'
+        return f'{subject} at {where}'
     if finding.weighs:
-        return f'{article} {words} {_weight(finding)} on {finding.joints[0]}{_put_down(finding)}'
+        return f'{subject} {_weight(finding)}'
     many = _in_many(finding)
     if many:
-        return f'{words.capitalize()}{many}'
+        return f'{subject}{many}'
     where = f' in {", ".join(finding.joints)}' if finding.joints else ''
-    shown = list(_values(finding))
-    if len(shown) > 3:
-        shown = [*shown[:2], f'and {len(shown) - 2} more']
+    shown = [] if len(finding.joints) > 1 else list(_values(finding))
+    shown = [shown[0], f'and {len(shown) - 1} more'] if len(shown) > 2 else shown
     meant = f': {finding.sign}' if finding.sign else ''
     numbers = f' ({", ".join(shown)}{meant})' if shown else ''
-    return f'{article} {words}{where}{numbers}'
+    return f'{subject}{where}{numbers}'
 
 
 def _in_many(finding: Finding) -> str:
@@ -356,8 +364,7 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
 
 def _shape(finding: Finding, parameter: ParameterName) -> Shape | None:
     """Return what the catalogue says of a shape; None for a quantity."""
-    kind = CATALOGUE.get(finding.name)
-    shapes = () if kind is None else kind.shapes
+    shapes = CATALOGUE[finding.name].shapes if finding.name in CATALOGUE else ()
     return next((shape for shape in shapes if shape.name == parameter.name), None)
 
 
@@ -380,17 +387,13 @@ def added(had: float) -> str:
 
 
 def _weight(finding: Finding) -> str:
-    """Return the mass of a payload, or that it is not determined."""
+    """Return the mass of a payload, or that it is not determined, where it is, if put down."""
     mass, std = _mass(finding)
-    if not abs(mass) > HALF_WIDTH * std:
-        return 'whose mass these data do not determine'
-    return f'of {as_sure(abs(mass), std)} kg'
-
-
-def _put_down(finding: Finding) -> str:
-    """Say that a payload was put down if its mass is negative; else return nothing."""
-    mass, std = _mass(finding)
-    return ' that was put down' if mass < -HALF_WIDTH * std else ''
+    known = abs(mass) > HALF_WIDTH * std
+    text = (
+        f'of {as_sure(abs(mass), std)} kg' if known else 'whose mass these data do not determine'
+    )
+    return f'{text} on {finding.joints[0]}{" that was put down" if known and mass < 0.0 else ""}'
 
 
 def _mass(finding: Finding) -> tuple[float, float]:
@@ -402,10 +405,8 @@ def _mass(finding: Finding) -> tuple[float, float]:
 def _with_degrees(value: float, std: float, unit: str) -> str:
     """Return a value with its interval; an angle in degrees as well, to the same digits."""
     text = f'{as_sure(value, std)} {unit}'.strip()
-    if unit == 'rad':
-        degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
-        return f'{text}, {degrees} degrees'
-    return text
+    degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
+    return f'{text}, {degrees} degrees' if unit == 'rad' else text
 
 
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
@@ -434,8 +435,8 @@ def others_in_words(finding: Finding) -> str:
     words = []
     for rival in finding.rivals:
         place = f' of {", ".join(rival.joints)}' if elsewhere and rival.joints else ''
-        same = rival.name == finding.name
-        words.append(('one' if same else rival.name.replace('_', ' ')) + place)
+        name = 'one' if rival.name == finding.name else rival.name.replace('_', ' ')
+        words.append(name + place)
     return ' or '.join(words)
 
 

@@ -9,11 +9,7 @@ import re
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.environment import Obstacle, parse_obstacles
-from armid_ros.excitation.geometry.planning_scene import (
-    is_scene,
-    read_scene_file,
-    scene_obstacles,
-)
+from armid_ros.excitation.geometry.planning_scene import is_scene, read_scene_file, scene_obstacles
 from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.robots import Robot
 

@@ -24,11 +24,7 @@ from functools import partial
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
-from armid_ros.identification.fitting.instruments import (
-    by_instruments,
-    linear_problem,
-    smoothed,
-)
+from armid_ros.identification.fitting.instruments import by_instruments, linear_problem, smoothed
 from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.regression import Regression, weighted_rows

@@ -177,10 +177,10 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
         word = by_error(worst.error)
         use = {
             'good': '',
-            'poor': ': too much to compute torques with',
-            'unusable': ': the model does not describe this motion',
+            'poor': ', too much to compute torques with',
+            'unusable': ', the model does not describe this motion',
         }
-        text = f'the predicted torque of {bag}, held out, is off by {worst.said}{use[word]}'
+        text = f'torque error on {bag}, held out: {worst.said}{use[word]}'
         yield _Reason(word, text)
     if not validation:
         yield _halves(result)
@@ -215,13 +215,14 @@ class _Worst(NamedTuple):
         if by_error(error) != by_error(errors[largest]):  # most of the largest error is noise
             worst = int(np.lexsort((errors, beyond))[-1])
         said = f'{errors[worst]:.3g} %'
+        details = []
         if by_error(error) != by_error(errors[worst]):
-            said += f' ({error:.3g} % without the noise)'
+            details.append(f'{error:.3g} % without noise')
         if len(joints) > 1:
-            of = 'all joints' if np.all(moves) else 'the joints that move'
-            said += f' in {joints[worst]}, the most of {of}'
-            said += ' without the noise of their torques' if worst != largest else ''
-        return cls(error, said)
+            details.append(
+                f'worst joint: {joints[worst]}{"" if worst == largest else " beyond noise"}'
+            )
+        return cls(error, f'{said} ({", ".join(details)})' if details else said)
 
 
 def _halves(result: Identification) -> _Reason:
@@ -230,7 +231,7 @@ def _halves(result: Identification) -> _Reason:
     every = result.halves.joints
     worst = _Worst.of(every, result.training, result)
     word = by_error(worst.error)
-    text = f'no recording was held out; halves of the data predict each other to {worst.said}'
+    text = f'cross-check between the halves of the data: {worst.said}'
     undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
     undetermined &= beyond_noise(every, result.training, result.used) > 0.0
     if np.any(undetermined):

@@ -283,9 +283,8 @@ def other_scale(
     text = (
         f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
         if unit
-        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m '
-        '(currents?): convert them, unless it is the masses of the description; by those they '
-        f'need --current-gain {gains}'
+        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
+        f'currents, or wrong masses in the description; for currents give --current-gain {gains}'
     )
     return Hypothesis(
         'scale',

@@ -101,8 +101,8 @@ class Mistake:
             )
         arm = 'fitted' if self.fitted else 'described'
         return (
-            f'{text} (the arm as {arm} predicts the torque of {robot.joints[self.joint]} to '
-            f'{before:.0f} % as recorded, to {after:.0f} % with that put right)'
+            f'{text} (torque error of {robot.joints[self.joint]} with the {arm} arm: '
+            f'{before:.0f} % as recorded, {after:.0f} % corrected)'
         )
 
 

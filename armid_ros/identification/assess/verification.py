@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import ArmidError, IdentificationError, ModelError
 from armid_ros.identification.assess.consistency import check_noise, NoiseCheck
 from armid_ros.identification.fitting.instruments import unlimited
 from armid_ros.identification.identify import Identification
@@ -259,12 +259,15 @@ class Verification:
         Simulations along held-out recordings.
     left_out : tuple of str
         What was not done, and why.
+    unfit : str
+        Why the identified model cannot be simulated; empty if it can, or was not tried.
 
     """
 
     noise: NoiseCheck | None
     forward: tuple[ForwardValidation, ...]
     left_out: tuple[str, ...]
+    unfit: str = ''
 
     def sentences(self) -> tuple[str, ...]:
         """Say in words what was found; ``left_out`` says what was not done."""
@@ -314,10 +317,10 @@ def verify(
         )
     except (ArmidError, np.linalg.LinAlgError) as error:
         left_out.append(f'not tested for encoder noise: {error}')
-    forward, missing = simulate_held_out(
+    forward, missing, unfit = simulate_held_out(
         description, result.arm, result.used, held_out, progress=progress
     )
-    return Verification(noise, forward, (*left_out, *missing))
+    return Verification(noise, forward, (*left_out, *missing), unfit)
 
 
 def simulate_held_out(
@@ -327,7 +330,7 @@ def simulate_held_out(
     held_out: Sequence[Recording],
     *,
     progress: Callable[[float, str], None] = lambda share, what: None,
-) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
+) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...], str]:
     """
     Simulate two models in closed loop along held-out recordings.
 
@@ -348,14 +351,17 @@ def simulate_held_out(
         One a recording that could be simulated.
     left_out : tuple of str
         What was not done, and why.
+    unfit : str
+        Why the second model cannot be simulated; empty if it can, or was not tried.
 
     """
     if not held_out:
-        return (), ('not simulated: no recording was held out',)
+        return (), ('not simulated: no recording was held out',), ''
     if after.quasi_static:
-        return (), ('not simulated: a quasi-static model has no inertia',)
+        return (), ('not simulated: a quasi-static model has no inertia',), ''
     pairs: list[ForwardValidation] = []
     left_out: list[str] = []
+    unfit = ''
     duration = min(LONGEST, SIMULATED / len(held_out))
     for index, recording in enumerate(held_out):
         progress(index / len(held_out), 'simulating held-out recordings')
@@ -363,6 +369,7 @@ def simulate_held_out(
             patched = forward_validation(after, recording, used, nominal=after, duration=duration)
         except ArmidError as error:
             left_out.append(f'{recording.source}: not simulated: {error}')
+            unfit = unfit or (str(error) if isinstance(error, ModelError) else '')
             continue
         plain = None
         try:
@@ -370,7 +377,7 @@ def simulate_held_out(
         except ArmidError as error:
             left_out.append(f'{recording.source}: the description is not simulated: {error}')
         pairs.append(ForwardValidation(plain, patched))
-    return tuple(pairs), tuple(left_out)
+    return tuple(pairs), tuple(left_out), unfit
 
 
 def _errors(score: ForwardScore) -> dict[str, dict[str, float]]:

@@ -35,11 +35,7 @@ from armid_ros.identification.rows.regression import (
     regressions,
     weighted_rows,
 )
-from armid_ros.identification.rows.signals import (
-    Conditioning,
-    segments,
-    unbroken,
-)
+from armid_ros.identification.rows.signals import Conditioning, segments, unbroken
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

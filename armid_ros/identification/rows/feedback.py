@@ -90,7 +90,7 @@ def laws_of_controllers(
             f'the torque of {name} is a law of position and direction of motion alone, to '
             f'{100 * left / size:.1f} %: it holds the weight or pushes along, as a controller '
             f'commands it, and has nothing of the {lacking:.2g} {unit} that inertia takes. '
-            'Something else moves the arm, or body and friction cannot be told apart: record '
+            'Something else moves the arm, or body and friction cannot be distinguished: record '
             'the arm while it follows a trajectory'
         )
     return tuple(said) if len(said) > silent else ()

@@ -11,11 +11,7 @@ from typing import Literal
 from armid_ros.effects.load import described_spread
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import ParameterName
-from armid_ros.identification.rows.signals import (
-    Conditioning,
-    decimate,
-    decimated_samples,
-)
+from armid_ros.identification.rows.signals import Conditioning, decimate, decimated_samples
 from armid_ros.model import (
     group_columns,
     inverse_dynamics,
@@ -23,11 +19,7 @@ from armid_ros.model import (
     regressor,
     rigid_parameter_names,
 )
-from armid_ros.model.spring_ties import (
-    tie_columns_derivatives,
-    tie_geometry,
-    TiedMachines,
-)
+from armid_ros.model.spring_ties import tie_columns_derivatives, tie_geometry, TiedMachines
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np

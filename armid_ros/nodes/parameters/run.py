@@ -14,7 +14,7 @@ SIMULATION = NodeParameter(
 START = NodeParameter(
     'start',
     False,
-    'Begin without ~/start, as soon as there is a subscriber and the arm is heard of; true by '
+    'Begin without ~/start, as soon as joint states arrive and a controller subscribes; true by '
     'default in a simulation only.',
 )
 

@@ -168,9 +168,8 @@ def identify_elastic(
         elif not data.bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
         result = _identify(pair, data, printed, tick)
-        tick(1.0, 'drawing')
+        tick(1.0, 'writing')
         known, table = _known(robot, pair.shipped, begin)
-        files = _draw(result, known, staged.folder)
         page = elastic_report(
             result,
             robot.name,
@@ -193,7 +192,7 @@ def identify_elastic(
     _tell(document)
     if story is not None:
         say(story.sentence())
-    say(f'{out}: {", ".join(["elastic.json", "report.html", *files])}')
+    say(f'{out}: elastic.json, report.html')
 
 
 def _provenance(data: ElasticData, begin: str, seed: int | None) -> Provenance:
@@ -265,22 +264,6 @@ def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParame
     if begin != 'found':
         return two_link_set(begin).parameters, f"the set '{begin}', which the tuning began with"
     return None, ''
-
-
-def _draw(
-    result: TwoInertiaIdentification, known: TwoLinkParameters | None, out: Path
-) -> list[str]:
-    from armid_ros.papers.elastic.report.figures import bode_figure, comparison_figure, step_figure
-    from armid_ros.report.figures.style import save_figure
-
-    figures = {'bode.png': bode_figure(result)}
-    if known is not None:
-        figures['parameters.png'] = comparison_figure(result, known)
-    if result.tuning is not None:
-        figures['steps.png'] = step_figure(result.tuning)
-    for name, figure in figures.items():
-        save_figure(figure, out / name)
-    return list(figures)
 
 
 def _tell(document: dict[str, Any]) -> None:

@@ -85,7 +85,7 @@ class SimulationOptions:
         self, path: Path, topics: Sequence[str], pair: TiedPair, gait: Gait, rng: Generator
     ) -> None:
         """Record a motion of both as their sensors see it."""
-        motions = exercise(pair, self.motion, _times(self.duration), gait)
+        motions = exercise(pair, self.motion, np.arange(0.0, self.duration, 1.0 / _RATE), gait)
         tau = pair_torques(pair, *motions).tau
         tau = tau + self.torque_noise * rng.normal(size=tau.shape)
         stamps = 10**9 + np.rint(motions.own.t * 1e9).astype(np.int64)
@@ -118,7 +118,14 @@ def identify_pair(
         path = staged.folder / 'recording' if bag is None else bag
         if bag is None:
             simulated.record(path, names, pair, gait, np.random.default_rng(seed))
-        both = _read(path, names, pair)
+        settings = options.read_settings()
+        machine, wearer = (
+            read_recording(path, joints=one.joints, topic=topic, settings=settings)
+            for one, topic in zip((pair.robot, pair.other), names, strict=True)
+        )
+        options.tell_damage(machine, wearer)
+        source = str(settled(path))
+        both = replace(machine, source=source), replace(wearer, source=source)
         found = _identify(pair, *both, inertias, tick)
         walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else SimulatedWalk()
     document = _document(found, walked, both[0].source)
@@ -152,18 +159,6 @@ def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Si
     return SimulatedWalk(truth, checks, whole)
 
 
-def _read(bag: Path, topics: Sequence[str], pair: TiedPair) -> tuple[Recording, Recording]:
-    """Read the machine and its wearer; say what is wrong with the bag."""
-    settings = options.read_settings()
-    machine, wearer = (
-        read_recording(bag, joints=one.joints, topic=topic, settings=settings)
-        for one, topic in zip((pair.robot, pair.other), topics, strict=True)
-    )
-    options.tell_damage(machine, wearer)
-    source = str(settled(bag))
-    return replace(machine, source=source), replace(wearer, source=source)
-
-
 def _tell(document: dict[str, Any]) -> None:
     """Print the springs, and how far off joints are that are driven by torque."""
     print_rows(
@@ -190,10 +185,6 @@ def _tell(document: dict[str, Any]) -> None:
             f'off (the source: {row["source_deg"]:g}); {row["error_softer_deg"]:.2f} deg with '
             f'springs {100 * _SOFTER:.0f} % too soft'
         )
-
-
-def _times(duration: float) -> FloatArray:
-    return np.arange(0.0, duration, 1.0 / _RATE)
 
 
 def _identify(

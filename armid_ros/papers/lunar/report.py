@@ -49,21 +49,20 @@ def sentences(found: Reproduction) -> tuple[str, ...]:
         if one.table.uniform:
             low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
             lines.append(
-                f'Table {one.table.number}, {one.table.title}: mean absolute error over noise '
-                f'{digits(float(slow.max()))} at most by the weight alone, '
-                f'{digits(float(whole.max()))} with the whole dynamics; the paper: '
+                f'Table {one.table.number}, {one.table.title}: the error over noise is at most '
+                f'{digits(float(slow.max()))} by the weight alone, '
+                f'{digits(float(whole.max()))} with the whole dynamics. The paper has '
                 f'{low} to {high}.'
             )
             continue
         noisy = one.ratio(one.methods[0].noisy)
         paper = 100.0 * float(np.mean(one.table.ratio))
         lines.append(
-            f'Table {one.table.number}, {one.table.title}: error of the peak torque '
-            f'{digits(100.0 * float(slow.mean()))} % by the weight alone, '
-            f'{digits(100.0 * float(whole.mean()))} % with the whole dynamics, on average; '
-            f'{digits(100.0 * float(noisy.mean()))} % against the noisy torque. The paper: '
-            f'{paper:.2f} %'
+            f'Table {one.table.number}, {one.table.title}: the error of the peak torque is '
+            f'{digits(100.0 * float(noisy.mean()))} %; the paper has {paper:.2f} %'
             + (f' ({STATED_ERROR:g} % in its abstract).' if one.table.number == 3 else '.')
+            + f' Without noise it is {digits(100.0 * float(slow.mean()))} % by the weight alone '
+            f'and {digits(100.0 * float(whole.mean()))} % with the whole dynamics.'
         )
     lines.append(
         f'{len(found.composites)} gravity parameters; a load of {_load(found)} is found where '

@@ -298,7 +298,11 @@ def _compared(
     values = [gravity * theory.values(one.arm.robot.rigid_parameters[static]) for one in found]
     places = [
         [
-            next(k for k, p in enumerate(one.estimate.parameters) if _leads(p.name, name.name))
+            next(
+                k
+                for k, p in enumerate(one.estimate.parameters)
+                if (p.name.split(' ')[0] == name.name.split(' ')[0])
+            )
             for name in theory.parameters
         ]
         for one in found
@@ -328,7 +332,3 @@ def _compared(
     spread = np.linalg.inv(weighted.T @ columns)
     load = spread @ (weighted.T @ change)
     return composites, float(load[0]), float(np.sqrt(spread[0, 0]))
-
-
-def _leads(name: str, leader: str) -> bool:
-    return name.split(' ')[0] == leader.split(' ')[0]

@@ -13,12 +13,7 @@ from typing import NamedTuple
 import zlib
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.compression import (
-    CORRUPT,
-    decompressed,
-    partly_decompressed,
-    stated_size,
-)
+from armid_ros.recording.compression import CORRUPT, decompressed, partly_decompressed, stated_size
 from armid_ros.recording.mcap.records import Chunk, FileMap
 from armid_ros.recording.settings import ReadSettings
 

@@ -18,13 +18,7 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.mcap.chunks import Content, Contents
-from armid_ros.recording.mcap.content import (
-    BLOCK_MESSAGES,
-    Gathered,
-    message_block,
-    tiled,
-    walk,
-)
+from armid_ros.recording.mcap.content import BLOCK_MESSAGES, Gathered, message_block, tiled, walk
 from armid_ros.recording.mcap.records import (
     add_definition,
     Chunk,

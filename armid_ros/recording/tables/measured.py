@@ -10,12 +10,7 @@ from collections.abc import Iterator, Mapping
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, ReadReport, Recording
-from armid_ros.recording.series import (
-    gaps,
-    JointSamples,
-    longest_in_order,
-    not_finite,
-)
+from armid_ros.recording.series import gaps, JointSamples, longest_in_order, not_finite
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
 from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS

@@ -58,7 +58,12 @@ class JointTable(Section):
     """Ranges, speeds and efforts."""
 
     title: ClassVar[str] = 'Joints'
-    template: ClassVar[str] = 'inspection_joints.html'
+    template: ClassVar[str] = 'table.html'
+    hint: ClassVar[str] = (
+        'Speed: 99th percentile, from the positions. Step: smallest change of position between '
+        'samples. Dq ratio: recorded velocity over the derivative of the positions; 1 if units '
+        'and signs agree. Effort: rms and maximum.'
+    )
 
     found: Inspection
 

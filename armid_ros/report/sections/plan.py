@@ -45,7 +45,13 @@ class PlannedMotion(Section):
     def rows(self) -> list[tuple[str, list[str]]]:
         """Joint, and how much of each limit it uses."""
         return [
-            (joint, [_percent(share[j]) for share in self.shares.values()])
+            (
+                joint,
+                [
+                    (f'{100.0 * share[j]:.0f} %' if share[j] > 0.0 else 'no limit')
+                    for share in self.shares.values()
+                ],
+            )
             for j, joint in enumerate(self.limits.joints)
         ]
 
@@ -76,10 +82,6 @@ class PlannedMotion(Section):
             )
             for name, values, lower, upper in quantities
         ]
-
-
-def _percent(share: float) -> str:
-    return f'{100.0 * share:.0f} %' if share > 0.0 else 'no limit'
 
 
 @dataclass(frozen=True)

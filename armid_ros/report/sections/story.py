@@ -1,36 +1,23 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnosis in short: the arm with the joint that it is about, where, which, patch, gap."""
+"""The diagnosis in short: the arm with the joint that it is about, where, and the gap."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.words import (
-    added,
-    by_cause,
-    names_and_places,
-    others_in_words,
-    share_in_words,
-)
-from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.diagnosis.verdict.words import by_cause
 from armid_ros.report.arm_picture import ArmPicture, draw_arm
-from armid_ros.report.notation import (
-    digits,
-    percent,
-    torque_unit,
-    value_of,
-)
+from armid_ros.report.notation import digits, percent, torque_unit
 from armid_ros.report.page import render, Section
 from armid_ros.residual import JointResidual, Residual
 from markupsafe import Markup
 import numpy as np
 
-#: Joints of the gap that are said, and values of a cause.
-_JOINTS, _VALUES = 2, 2
+#: Joints of the gap that are listed one by one.
+_JOINTS = 2
 
 
 @dataclass(frozen=True)
@@ -55,10 +42,10 @@ class Story(Section):
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints to be pointed out: those of the causes, or else the one with the gap."""
+        """Joints to be pointed out: those of the largest cause, or else the one with the gap."""
         robot = self.diagnosis.arm.robot
         if self.diagnosis.findings:
-            named = [joint for one in self.diagnosis.findings for joint in one.joints or ()]
+            named = {joint for one in self._headline for joint in one.joints}
             return tuple(joint for joint in robot.joints if joint in named)
         found = [place.joint for place in self.diagnosis.where] + [m.joint for m in self._maps]
         return tuple(found[:1])
@@ -66,7 +53,12 @@ class Story(Section):
     @property
     def whole_arm(self) -> bool:
         """Whether a cause is one of the whole arm."""
-        return any(not finding.joints for finding in self.diagnosis.findings)
+        return any(not finding.joints for finding in self._headline)
+
+    @property
+    def _headline(self) -> list[Finding]:
+        """Return the cause that explains most."""
+        return next(iter(by_cause(self.diagnosis.findings)), [])
 
     @property
     def picture(self) -> Markup:
@@ -80,7 +72,7 @@ class Story(Section):
     @property
     def caption(self) -> str:
         """Return what the drawing shows."""
-        names = ', '.join(one.name.replace('_', ' ') for one in self.diagnosis.findings)
+        names = ', '.join(one.name.replace('_', ' ') for one in self._headline)
         if self.whole_arm:
             return f'coloured: the whole arm ({names})'
         if not self.joints:
@@ -90,12 +82,7 @@ class Story(Section):
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
-        answers = [
-            ('Where', self._where()),
-            ('Which', self._which()),
-            ('Patch', self._patch()),
-            ('Gap', self._gap()),
-        ]
+        answers = [('Where', self._where()), ('Gap', self._gap())]
         left = self.diagnosis.left
         if self.diagnosis.findings and left:
             answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in left[:_JOINTS]]))
@@ -129,25 +116,6 @@ class Story(Section):
             return []
         return [f'In the fitted recordings only; in the held-out ones {joint} is below its floor:']
 
-    def _which(self) -> list[str]:
-        causes = [_cause(finding) for finding in self.diagnosis.findings] or [
-            'No cause was found.',
-            *(_suspected(group) for group in by_cause(self.diagnosis.suspected)),
-        ]
-        return causes + [_likeness(one) for one in self._maps if one.law is not None]
-
-    def _patch(self) -> list[str]:
-        diagnosis = self.diagnosis
-        patched = not diagnosis.harmful
-        added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
-        if self._maps:
-            added.append(f'the learned residual of {", ".join(one.joint for one in self._maps)}')
-        if not added:
-            return ['The model is unchanged.']
-        fitted = diagnosis.refitted and patched
-        more = ', with rigid body and friction refitted' if fitted else ''
-        return [f'model.yaml is the model with {" and ".join(added)}{more}.']
-
     @property
     def _maps(self) -> tuple[JointResidual, ...]:
         return () if self.residual is None else self.residual.joints
@@ -171,39 +139,9 @@ class Story(Section):
         return [f'{robot.joints[j]}: {change}, {where}.', least, *map(_taken, self._maps)]
 
 
-def _cause(finding: Finding) -> str:
-    """Return a cause with its place, values and share."""
-    places = ', '.join(finding.place_of(joint) for joint in finding.joints)
-    where = f' at {places}' if places else ', whole arm'
-    values = [
-        f'{name.words} {value_of(finding, name, value, std)}{added(had)}'
-        for name, value, std, had in _values(finding)
-    ]
-    more = len(finding.values) - len(values)
-    listed = ', '.join([*values, f'{more} more'] if more else values)
-    numbers = f': {listed}' if listed else ''
-    rivals = others_in_words(finding)
-    doubt = f'; the data do not distinguish it from {rivals}' if rivals else ''
-    name, share = finding.name.replace('_', ' '), share_in_words(finding, interval=True)
-    if finding.together:
-        share += f', together with {" and ".join(finding.together).replace("_", " ")}'
-    return f'{name}{where}{numbers}; explains {share}{doubt}'
-
-
-def _suspected(group: Sequence[Finding]) -> str:
-    """Return a cause that these recordings hardly tell."""
-    return f'Suspected: {names_and_places(group)}; record more to confirm.'
-
-
 def share_of(diagnosis: Diagnosis) -> str:
     """Return what the shares of joints are of: where something is named, of what it explains."""
     return 'the explained part' if diagnosis.findings else 'the gap'
-
-
-def _likeness(one: JointResidual) -> str:
-    """Return the law that what is left of a joint looks like."""
-    assert one.law is not None
-    return f'{one.joint}, no known cause: looks like {one.law.text}, {percent(one.law.share)}'
 
 
 def _taken(one: JointResidual) -> str:
@@ -211,10 +149,3 @@ def _taken(one: JointResidual) -> str:
     return (
         f'{one.joint}: the map predicts {percent(one.gain)} of the residual without a known cause.'
     )
-
-
-def _values(finding: Finding) -> Sequence[tuple]:  # type: ignore[type-arg]
-    """Return the first values, those whose interval leaves out zero before all others."""
-    rows = list(zip(finding.parameters, finding.values, finding.std, finding.had, strict=True))
-    told = [row for row in rows if excludes_zero(row[1], row[2])]
-    return (told or rows)[:_VALUES]

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from tests.hidden.lived.arms import load_arm
-from tests.hidden.lived.causes import (
-    Coulomb,
-    LoadFriction,
-    Mounting,
-    Stribeck,
-    Tilt,
-)
+from tests.hidden.lived.causes import Coulomb, LoadFriction, Mounting, Stribeck, Tilt
 from tests.hidden.lived.chain import Chain
 from tests.hidden.lived.motions import draw_path, tracked
 from tests.hidden.lived.plant import LivedArm

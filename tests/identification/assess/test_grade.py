@@ -52,7 +52,7 @@ def test_a_sound_recording_is_good_with_its_held_out_error(sound):
     found, _ = sound
     assert found.word == 'good'
     assert len(found.reasons) == 1
-    assert 'The predicted torque of other, held out, is off by' in found.reasons[0]
+    assert 'Torque error on other, held out: ' in found.reasons[0]
 
 
 def test_the_document_has_the_grade_and_the_reasons(sound):
@@ -76,7 +76,7 @@ def test_the_word_follows_the_held_out_error(structure, run, other, sound, share
     ]
     found = grade(result, structure, [run], {'other': off}, [other])
     assert found.word == word
-    error = float(found.reasons[0].split('off by ')[1].split(' %')[0])
+    error = float(found.reasons[0].split('held out: ')[1].split(' %')[0])
     assert error == pytest.approx(100.0 * share, abs=10.0)
 
 
@@ -86,7 +86,7 @@ def test_one_bad_recording_among_good_ones_is_not_averaged_away(structure, run, 
     bad = [replace(fit, predicted=-fit.predicted) for fit in good]
     found = grade(result, structure, [run], {'a': good, 'b': good, 'c': bad}, [])
     assert found.word == 'unusable'
-    assert 'of c, held out' in found.reasons[0]
+    assert 'on c, held out' in found.reasons[0]
 
 
 def with_torque_of(recording, joint, change):
@@ -104,7 +104,7 @@ def test_the_grade_is_that_of_the_joint_that_is_predicted_worst(structure, run, 
     assert Score.of(blind).relative_error_percent < LIMITS.poor
     found = grade(result, structure, [run], {'other': blind}, [other])
     assert found.word == 'unusable'
-    assert f'is off by 100 % in {structure.robot.joints[5]}, the most of all' in found.reasons[0]
+    assert f'100 % (worst joint: {structure.robot.joints[5]})' in found.reasons[0]
 
 
 @pytest.mark.slow
@@ -171,7 +171,7 @@ def test_joints_that_rest_in_what_is_held_out_are_said_not_to_be_checked(structu
 
 def named_worst(reasons):
     """Return the error and the joint that a grade names."""
-    pattern = r'off by ([0-9.]+) %(?: \(0 % without the noise\))? in (\w+), the most of all joints'
+    pattern = r'held out: ([0-9.]+) % \((?:0 % without noise, )?worst joint: (\w+)\)'
     (said,) = re.findall(pattern, ' '.join(reasons))
     return float(said[0]), said[1]
 
@@ -213,7 +213,7 @@ def test_noise_is_told_from_torque_that_no_model_describes(run, sound):
 def test_without_held_out_data_halves_of_the_recording_judge_each_other(structure, run):
     found, result = graded(structure, [run])
     assert found.word == 'good'
-    assert 'No recording was held out' in found.reasons[0]
+    assert 'halves of the data' in found.reasons[0]
     assert result.halves.whole < 5.0
 
 
@@ -344,7 +344,7 @@ def test_a_wrist_with_a_coupling_is_good_with_it_and_unusable_without(real_data,
     """Half of the torque of joint 5 of the TX40 is friction of the coupling with joint 6."""
     without = of_machine('tx40', real_data, tmp_path)
     assert without.word == 'unusable'
-    assert 'in joint_5, the most of all joints' in without.reasons[0]
+    assert 'worst joint: joint_5' in without.reasons[0]
     (folder := tmp_path / 'coupled').mkdir()
     effects = (*FRICTION, 'coupled_joint_friction')
     assert of_machine('tx40', real_data, folder, effects).word == 'good'

@@ -289,7 +289,7 @@ def test_currents_are_no_unit_and_have_the_gain_of_each_joint(robot, sound):
     """Of gains near that of kgf m, as those of a UR10e."""
     gains = np.array([13.3, 11.1, 10.6, 9.5, 12.0, 11.0])
     said = mistake_in(robot, replace(sound, tau=sound.tau / gains))
-    assert 'kgf' not in said and 'currents?' in said
+    assert 'kgf' not in said and 'currents' in said
     stated = [float(one) for one in said.split('--current-gain ')[1].split(' ')[0].split(',')]
     np.testing.assert_allclose(stated[:4], gains[:4], rtol=0.1)
 
@@ -403,7 +403,7 @@ def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, soun
     link = np.array([1.0, 0.0, 0.0, 0.0, 1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3])
     nominal = robot.with_inertias(np.tile(link, robot.n_joints))
     turned = replace(sound, q=with_column(sound.q, 1, np.negative))
-    assert 'unless it is the masses of the description' in mistake_in(nominal, sound)
+    assert 'wrong masses in the description' in mistake_in(nominal, sound)
     said = mistake_in(nominal, turned)
     assert 'the position of shoulder_roll seems to have the opposite sign' in said
     assert 'the arm as fitted' in said

@@ -115,7 +115,11 @@ def fit_springs(
             f'springs: there is no stretch of {_SHORTEST:g} s without a pause in the recordings'
         )
     loads = [inverse_dynamics(robot, link) for _, link in stretches]
-    inertia = _inertia(robot, np.concatenate([link.q for _, link in stretches]))
+    q = np.concatenate([link.q for _, link in stretches])
+    data = robot.model.createData()
+    chosen = q[np.linspace(0, len(q) - 1, _POSES).astype(int)]
+    diagonals = [np.diag(pin.crba(robot.model, data, pose)).copy() for pose in chosen]
+    inertia = np.asarray(np.mean(diagonals, axis=0))
     found = []
     for j, joint in enumerate(robot.joints):
         records = [
@@ -158,14 +162,6 @@ def _stretches(motors: Recording, links: Recording, cutoff: float) -> list[tuple
 def _motion(joints: tuple[str, ...], t: FloatArray, q: FloatArray) -> Motion:
     dq = np.gradient(q, t, axis=0)
     return Motion(joints, t, q, dq, np.gradient(dq, t, axis=0))
-
-
-def _inertia(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the mean diagonal of the inertia matrix, shape (n,)."""
-    data = robot.model.createData()
-    chosen = q[np.linspace(0, len(q) - 1, _POSES).astype(int)]
-    diagonals = [np.diag(pin.crba(robot.model, data, pose)).copy() for pose in chosen]
-    return np.asarray(np.mean(diagonals, axis=0))
 
 
 def _motor(

@@ -135,7 +135,17 @@ def identify_two_inertia(
 
     tell(0.0, 'step 1: rigid arm')
     rigid = fit_rigid(runs)
-    known = _rigid_guess(rigid, drives)
+    first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
+    if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
+        raise IdentificationError(
+            f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
+            f'{gamma:.3g} kg m^2, which no two links have; is the slow motion strong enough, and '
+            'do torques and velocities of a joint have the same sign?'
+        )
+    alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
+    known = replace(
+        drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
+    )
     tell(0.05, 'step 2: decoupled joints')
     joints = decouple(runs, known)
     tell(0.35, 'measured responses')
@@ -152,21 +162,6 @@ def identify_two_inertia(
     angles = np.quantile(np.concatenate([run.link.q[:, 1] for run in runs]), _SHARES)
     return TwoInertiaIdentification(
         rigid, measured, joints, fits, untuned, len(runs), angles, tuning
-    )
-
-
-def _rigid_guess(rigid: RigidFit, drives: TwoLinkParameters) -> TwoLinkParameters:
-    """Return what step 1 knows; step 2 takes beta, gamma and the Coulomb torques from it."""
-    first, beta, gamma, rotor = rigid.estimate.values[:4].tolist()
-    if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
-        raise IdentificationError(
-            f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
-            f'{gamma:.3g} kg m^2, which no two links have; is the slow motion strong enough, and '
-            'do torques and velocities of a joint have the same sign?'
-        )
-    alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)
-    return replace(
-        drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
     )
 
 

@@ -68,16 +68,15 @@ def draw_poses(
         for group in lines
     ]
     ties = [
-        tuple(np.round(strip.place(_ends(start, way), pose), 1).ravel().tolist())
+        tuple(
+            np.round(strip.place(SIDE.flat(np.stack([start, start + _MAGNIFIED * way])), pose), 1)
+            .ravel()
+            .tolist()
+        )
         for pose in range(len(rows))
         for start, way in zip(geometry.other_position[pose], geometry.way[pose], strict=True)
     ]
     return Drawing(*strip.size, drawn[0], drawn[1], tuple(ties), strip.captions(captions))
-
-
-def _ends(start: FloatArray, way: FloatArray) -> FloatArray:
-    """Return both ends of a spring, drawn out of proportion, shape (2, 2) [m]."""
-    return SIDE.flat(np.stack([start, start + _MAGNIFIED * way]))
 
 
 def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:

@@ -1,0 +1,248 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether a description can be that of an arm, and which of its links a recording contradicts.
+
+A recording determines base parameters: combinations of masses, first moments and inertias of
+several links. A mass alone is determined under the hypothesis that few links are wrong. Links are
+added by forward selection, each with its ten parameters, a prior of the size of the description's
+spread and the covariance of the base parameters; those of effects are nuisance parameters.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects.load import described_spread
+from armid_ros.identification import Identification, Score
+from armid_ros.inspection.inspect import Remark
+from armid_ros.model import LINK_PARAMETERS
+from armid_ros.motion import FloatArray
+from armid_ros.robots import driven_in_words, inertia_doubts, NO_MASS, Robot
+from armid_ros.robots.geometry import collision_geometry
+import numpy as np
+
+#: Density of a link [kg/m^3]: shapes contain the link, so steel is the most and foam the least.
+_DENSITIES = 30.0, 8000.0
+#: Three turns to either side [rad]: a limit beyond is hardly in rad.
+_TURNS = 6.0 * np.pi
+#: A velocity limit above this [rad/s] is hardly in rad/s, a shape above this [m] hardly in metres.
+_FASTEST, _LONGEST = 50.0, 10.0
+#: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
+_MATERIAL = 1.0
+#: Share of the rest that a further link has to explain; chi-squared per row that may remain.
+_FURTHER, _REMAINS = 0.5, 10.0
+#: More wrong links than this cannot be told from a wrong model.
+_MOST = 3
+#: A standard deviation above this share of the prior's is no measurement.
+_DETERMINED = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class LinkCheck:
+    """
+    The n links of a description compared with an identification.
+
+    Attributes
+    ----------
+    links, joints : tuple of str
+        The links, and the joints that move them.
+    mass, centre : ndarray, shape (n,) and (n, 3)
+        As described [kg], [m] in the frame of the joint; centres are NaN without mass.
+    measured_mass, mass_std : ndarray, shape (n,)
+        [kg]; NaN where a link agrees or the motion does not determine its mass.
+    measured_centre, centre_std : ndarray, shape (n, 3)
+        [m]; NaN alike.
+    explains : ndarray, shape (n,)
+        Share of the weighted difference that a link alone explains.
+    wrong : tuple of int
+        Links that together explain the difference, the most important first; empty for none.
+    explained : float
+        Share that they explain.
+    error_percent, fitted_error_percent : float
+        Torque error with the described links and with fitted ones; friction fitted in both.
+    grade : str
+        Of the identification: good, poor or unusable.
+
+    """
+
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    mass: FloatArray
+    centre: FloatArray
+    measured_mass: FloatArray
+    mass_std: FloatArray
+    measured_centre: FloatArray
+    centre_std: FloatArray
+    explains: FloatArray
+    wrong: tuple[int, ...]
+    explained: float
+    error_percent: float
+    fitted_error_percent: float
+    grade: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the fitted links lower the torque error by less than matters."""
+        return self.error_percent - self.fitted_error_percent < _MATERIAL
+
+
+def description_remarks(robot: Robot) -> tuple[Remark, ...]:
+    """
+    Check inertias, densities and limits of a description without a recording.
+
+    Raises
+    ------
+    RobotError
+        If a shape has no geometry, or a mesh cannot be read.
+
+    """
+    found = [*(Remark('bad', text) for text in inertia_doubts(robot)), *_of_limits(robot)]
+    found += _of_shapes(robot)
+    known = {remark.text for remark in found}
+    notes = dict.fromkeys([*robot.notes, *driven_in_words(robot)])
+    return (*found, *(Remark('note', note) for note in notes if note not in known))
+
+
+def _of_limits(robot: Robot) -> Iterator[Remark]:
+    for k, joint in enumerate(robot.joints):
+        if robot.prismatic[k]:
+            continue
+        reach = max(-robot.lower[k], robot.upper[k])
+        if _TURNS < reach < np.inf:
+            yield Remark('bad', f"joint '{joint}': limit {reach:g} rad; is it in degrees?")
+        if _FASTEST < robot.velocity_limit[k] < np.inf:
+            fast = f"joint '{joint}': velocity limit {robot.velocity_limit[k]:g} rad/s"
+            yield Remark('doubt', f'{fast}; is it in degrees per second?')
+
+
+def _of_shapes(robot: Robot) -> Iterator[Remark]:
+    """Check size and density of links with shapes; shapes overlap, so volumes are upper bounds."""
+    geometry, missing = collision_geometry(robot, other='visual')
+    volume = dict.fromkeys(robot.description.links, 0.0)
+    for one in geometry.geometryObjects:
+        one.geometry.computeLocalAABB()
+        box, link = one.geometry.aabb_local, robot.model.frames[one.parentFrame].name
+        volume[link] += abs(float(one.geometry.computeVolume()))
+        if max(box.width(), box.height(), box.depth()) > _LONGEST:
+            yield Remark('bad', f"link '{link}': shape above {_LONGEST:g} m; millimetres?")
+    for link, inertial in robot.description.links.items():
+        if volume[link] <= 0.0 or link in missing:
+            continue
+        mass = 0.0 if inertial is None else inertial.mass
+        density = f"link '{link}': {mass:g} kg, {mass / volume[link]:.3g} kg/m^3"
+        if mass > _DENSITIES[1] * volume[link]:
+            yield Remark('bad', f'{density}; steel has 7850')
+        elif mass < _DENSITIES[0] * volume[link] and link != robot.base:
+            yield Remark('doubt', f'{density}; foam has 30')
+    yield from (Remark('note', text) for text in missing.values())
+
+
+def check_links(found: Identification, described: ArmModel, grade: str) -> LinkCheck:
+    """
+    Find which links of a description explain what an identification found.
+
+    Parameters
+    ----------
+    found : Identification
+        Not constrained to physical consistency, so that its covariance is that of the data.
+    described : ArmModel
+        The description, with the effects of the identification.
+    grade : str
+        Of the identification.
+
+    """
+    robot, size = described.robot, len(LINK_PARAMETERS)
+    rigid = size * robot.n_joints
+    difference = found.estimate.values - found.base.values(described.theta)
+    factor = np.linalg.cholesky(found.estimate.covariance)
+    rows = np.linalg.solve(factor, np.column_stack([found.base.grouping, difference]))
+    nuisance, _ = np.linalg.qr(rows[:, rigid:-1])
+    rows = np.delete(rows, np.s_[rigid:-1], axis=1)
+    rows -= nuisance @ (nuisance.T @ rows)
+    spread = described_spread(robot).ravel()
+    total = float(rows[:, -1] @ rows[:, -1])
+    error, fitted_error = _errors(found, described)
+    wrong = [] if error - fitted_error < _MATERIAL else _selected(rows, spread, total)
+    changes, covariance, rest = _fit(rows, spread, wrong)
+    freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
+    covariance = covariance * max(1.0, rest / freedom)  # Birge ratio: what no link explains
+    body = robot.rigid_parameters.reshape(-1, size)[:, :4]
+    measured, std = np.full((2, robot.n_joints, 4), np.nan)
+    for position, k in enumerate(wrong):
+        own = slice(size * position, size * position + 4)
+        if covariance[own, own][0, 0] > (_DETERMINED * spread[size * k]) ** 2:
+            continue
+        mass, *moments = body[k] + changes[own]
+        measured[k] = mass, *(np.array(moments) / mass)
+        slope = np.eye(4) / mass
+        slope[0, 0], slope[1:, 0] = 1.0, -measured[k, 1:] / mass
+        std[k] = np.sqrt(np.diag(slope @ covariance[own, own] @ slope.T))
+    return LinkCheck(
+        links=robot.links,
+        joints=robot.joints,
+        mass=body[:, 0],
+        centre=body[:, 1:] / np.where(body[:, :1] > NO_MASS, body[:, :1], np.nan),
+        measured_mass=measured[:, 0],
+        mass_std=std[:, 0],
+        measured_centre=measured[:, 1:],
+        centre_std=std[:, 1:],
+        explains=np.array(
+            [1.0 - _fit(rows, spread, [k])[2] / total for k in range(robot.n_joints)]
+        ),
+        wrong=tuple(wrong),
+        explained=1.0 - rest / total,
+        error_percent=error,
+        fitted_error_percent=fitted_error,
+        grade=grade,
+    )
+
+
+def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
+    """Return the torque errors with the described links and with the fitted ones [%]."""
+    rigid = len(described.robot.rigid_parameters)
+    theta = np.concatenate([described.theta[:rigid], found.arm.theta[rigid:]])
+    before = described.with_theta(theta)
+    fits = [
+        replace(
+            fit,
+            predicted=fit.predicted + before.torque(fit.motion) - found.arm.torque(fit.motion),
+        )
+        for fit in found.training
+    ]
+    scores = Score.of(fits), Score.of(found.training)
+    return scores[0].relative_error_percent, scores[1].relative_error_percent
+
+
+def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
+    """Return the links of a forward selection, less one that the later ones make needless."""
+    every = range(len(spread) // len(LINK_PARAMETERS))
+    wrong: list[int] = []
+    rest = total
+    while len(wrong) < min(_MOST, len(every)) and rest > _REMAINS * len(rows):
+        left = {k: _fit(rows, spread, [*wrong, k])[2] for k in every if k not in wrong}
+        best = min(left, key=left.__getitem__)
+        if left[best] > (1.0 - _FURTHER) * rest:
+            break
+        wrong, rest = [*wrong, best], left[best]
+    for k in wrong[:-1]:
+        fewer = [one for one in wrong if one != k]
+        if _fit(rows, spread, fewer)[2] < max(rest / _FURTHER, _REMAINS * len(rows)):
+            return fewer
+    return wrong
+
+
+def _fit(
+    rows: FloatArray, spread: FloatArray, links: Sequence[int]
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return change, covariance and remaining chi-squared of links that may be wrong."""
+    size = len(LINK_PARAMETERS)
+    own = [size * k + i for k in links for i in range(size)]
+    columns, target = rows[:, own] * spread[own], rows[:, -1]
+    inverse = np.linalg.inv(columns.T @ columns + np.eye(len(own)))
+    scaled = inverse @ columns.T @ target
+    rest = target - columns @ scaled
+    return spread[own] * scaled, spread[own, None] * inverse * spread[own], float(rest @ rest)

@@ -1,0 +1,55 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A description made wrong on purpose: impossible values and wrong links are found."""
+
+import armid_ros as ar
+import numpy as np
+import pytest
+
+from docsite.desk import ARM, FRICTION, LOAD
+from tests.golden.inputs import recorded
+
+URDF = ARM.read_text()
+BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision></link>'
+
+
+def with_box(edge):
+    """Return the description with a cube for its forearm."""
+    end = URDF.rindex('</link>')
+    return URDF[:end] + BOX.format(edge) + URDF[end + len('</link>') :]
+
+
+@pytest.mark.parametrize(
+    ('text', 'weight', 'fact'),
+    [
+        (URDF.replace('izz="0.002"', 'izz="2.0"'), 'bad', 'triangle inequality'),
+        (URDF.replace('upper="2.4"', 'upper="137"'), 'bad', 'degrees'),
+        (URDF.replace('velocity="3"', 'velocity="172"'), 'doubt', 'degrees per second'),
+        (with_box(0.04), 'bad', '1.56e+04 kg/m^3'),
+        (with_box(0.5), 'doubt', '8 kg/m^3'),
+        (with_box(300), 'bad', 'millimetres'),
+    ],
+    ids=['inertia', 'limit', 'velocity', 'metal', 'feathers', 'millimetres'],
+)
+def test_an_impossible_value_is_found(text, weight, fact):
+    found = ar.check(ar.load_robot(text))
+    assert any(one.weight == weight and fact in one.text for one in found.remarks)
+    assert found.wrong == (weight == 'bad')
+
+
+def run(effects, seed=0):
+    return recorded(ar.ArmModel.of(ARM, effects=effects), seed)
+
+
+def test_a_mass_that_the_description_lacks_is_recovered_with_its_interval():
+    found = ar.check(ARM, run((*FRICTION, LOAD)))
+    assert found.links.wrong == (2,)
+    links, centre = found.links, np.array([0.0, 0.01, 0.27]) / 1.4
+    assert abs(links.measured_mass[2] - 1.4) < 4.0 * links.mass_std[2] < 0.04
+    assert np.all(np.abs(links.measured_centre[2] - centre) < 4.0 * links.centre_std[2])
+    assert 'too light at elbow' in found.finding
+
+
+def test_a_description_that_is_right_agrees():
+    found = ar.check(ARM, run(FRICTION))
+    assert found.links.agrees and found.links.wrong == () and not found.wrong
