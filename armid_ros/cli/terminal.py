@@ -152,7 +152,8 @@ def print_rows(
     console = Console()
     heads = list(rows[0]) if rows else []
     for head in spare:
-        if _width(rows, heads) > console.width:
+        cells = [[one, *(_cell(row[one]) for row in rows)] for one in heads]
+        if sum(2 + max(map(len, column)) for column in cells) > console.width:
             heads.remove(head)
     table = Table(box=None, header_style='bold')
     for head in heads:
@@ -165,14 +166,6 @@ def print_rows(
     for row in rows:
         table.add_row(*(Text(_cell(row[head])) for head in heads))
     console.print(table)
-
-
-def _width(rows: Sequence[dict[str, Any]], heads: Sequence[str]) -> int:
-    """Return how many columns of a terminal a table takes."""
-    return sum(
-        2 + max(len(text) for text in (head, *(_cell(row[head]) for row in rows)))
-        for head in heads
-    )
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
