@@ -167,6 +167,7 @@ class ExcitationResult(Shown):
             'verdict': self.fitness.word,
             'summary': str(self.fitness),
             'not_checked': list(self.fitness.unchecked),
+            'excluded_pairs': self.scene.collision.excluded,
             'joints': list(core.excitation.joints),
             'duration': core.excitation.duration,
             'period': settings.period,
@@ -221,8 +222,10 @@ class ExcitationResult(Shown):
             If no way leads from the start to the trajectory; its coefficients are written then.
 
         """
-        _save_coefficients(self.core.excitation, folder)
-        _save_coefficients(self.run.excitation, folder)
+        for name in ('excitation.yaml', 'excitation.csv'):
+            save_excitation(self.core.excitation, folder / name)
+        for name in ('excitation.yaml', 'excitation.csv'):  # where a way there is found
+            save_excitation(self.run.excitation, folder / name)
         urdf = self.arm.robot.urdf
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
         document = self.document(origin)
@@ -393,11 +396,6 @@ def transfer_planner(
         ClearanceModel.of(scene.bodies),
         settings.clearance,
     )
-
-
-def _save_coefficients(excitation: Excitation, folder: Path) -> None:
-    for name in ('excitation.yaml', 'excitation.csv'):
-        save_excitation(excitation, folder / name)
 
 
 def _information(

@@ -123,7 +123,8 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         chosen = np.linspace(0, len(q) - 1, min(_POSES, len(q))).astype(np.intp)
         poses = list(q[chosen])
     seen = [_flat(robot, pose, view) for pose, view in product(poses, _VIEWS)]
-    lines = max(seen, key=_area)
+    # of the largest area
+    lines = max(seen, key=lambda one: np.prod(np.ptp(one.reshape(-1, 2), axis=0) + 1e-3))
     points = lines.reshape(-1, 2)
     low, size = points.min(axis=0), np.maximum(np.ptp(points, axis=0), _SAME)
     scale = min((_WIDTH - 2 * _EDGE) / size[0], (_HEIGHT - 2 * _EDGE) / size[1])
@@ -197,7 +198,3 @@ def _flat(robot: Robot, q: FloatArray, view: Camera) -> FloatArray:
         for joint, end in sticks(robot.model)
     ]
     return view.flat(np.array([*ways, *bodies]))
-
-
-def _area(lines: FloatArray) -> float:
-    return float(np.prod(np.ptp(lines.reshape(-1, 2), axis=0) + 1e-3))
