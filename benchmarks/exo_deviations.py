@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 
 from armid_ros.identification.ties.problem import Inertias
-from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, PairMotion, stepping
 import numpy as np
@@ -60,17 +59,9 @@ def stated(
     values = np.array([part.stiffness for part in found])
     variance = np.mean([part.std**2 for part in found], axis=0)
     ratio = np.sqrt(variance) / values.std(axis=0, ddof=1)
-    hold = [_holds(part.interval()) for part in found]
-    return float(np.mean(ratio)), float(_spread(values)), 100.0 * float(np.mean(hold))
-
-
-def _holds(interval: FloatArray) -> FloatArray:
-    return np.asarray((interval[:, 0] <= STIFFNESS) & (interval[:, 1] >= STIFFNESS))
-
-
-def _spread(values: FloatArray) -> float:
-    """Return how sure a mean ratio is: as of one spring, for those of one draw are alike."""
-    return 1.0 / float(np.sqrt(2.0 * (len(values) - 1)))
+    hold = [np.prod(np.sign(part.interval() - STIFFNESS), axis=1) <= 0.0 for part in found]
+    sure = (2.0 * (len(values) - 1)) ** -0.5  # of one spring, for those of one draw are alike
+    return float(np.mean(ratio)), sure, 100.0 * float(np.mean(hold))
 
 
 if __name__ == '__main__':

@@ -16,7 +16,7 @@ _MASS = 'payload_m'
 
 def score_of_question(kind: str, judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     """Return the metrics of the question that a kind asks beside those of all kinds."""
-    return _QUESTIONS.get(kind.partition('/')[2], _nothing)(judged)
+    return _QUESTIONS.get(kind.partition('/')[2], lambda _: ())(judged)
 
 
 def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
@@ -30,7 +30,9 @@ def pairs(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     return (
         rate('found, periodic', periodic, lambda j: j.tied),
         rate('found, point to point', dwells, lambda j: j.tied),
-        number('  of what periodic data give', np.mean, ratio, 'at least 0.85', _most_of_it),
+        number(
+            '  of what periodic data give', np.mean, ratio, 'at least 0.85', lambda x: x >= 0.85
+        ),
     )
 
 
@@ -63,14 +65,6 @@ def mass_is_right(judged: LivedJudged) -> bool:
 def is_consistent(judged: LivedJudged) -> bool:
     """Return whether the arm is said to be as described."""
     return judged.answer.verdict == 'consistent' and not judged.answer.headline
-
-
-def _most_of_it(ratio: float) -> bool:
-    return ratio >= 0.85
-
-
-def _nothing(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
-    return ()
 
 
 _QUESTIONS: dict[str, Callable[[Sequence[LivedJudged]], tuple[Metric, ...]]] = {

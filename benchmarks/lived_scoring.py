@@ -275,7 +275,7 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
         number('  error, median', np.median, shares, 'at most 0.05', lambda x: x <= 0.05),
         number('parameter error, median', np.median, [e for e, _ in errors], '', None),
         rate('95 % intervals with the truth', errors, lambda e: e[1], least=0.90, most=0.98),
-        rate('mounting within 1 deg and 2 %', turned, _near, least=1.0),
+        rate('mounting within 1 deg and 2 %', turned, lambda e: e[0] <= 1.0 and abs(e[1]) <= 0.02),
         number('  degrees, median', np.median, [e[0] for e in turned], '', None),
         rate('failures', judged, lambda j: bool(j.answer.error)),
         number('processor time, median [s]', np.median, seconds, 'at most 5', lambda x: x <= 5.0),
@@ -309,11 +309,6 @@ def seconds_by_joints(judged: Sequence[LivedJudged]) -> str:
         for joints, own in sorted(taken.items())
     ]
     return f'processor time by joints, median and longest [s]: {"; ".join(counts)}'
-
-
-def _near(error: tuple[float, float]) -> bool:
-    degrees, share = error
-    return degrees <= 1.0 and abs(share) <= 0.02
 
 
 def nameable(truth: LivedTruth) -> bool:

@@ -85,8 +85,14 @@ def lost(first, last, count):
     return round((last - first) / MS) + 1 - count
 
 
+def resident(running):
+    """Return the memory of a process [MB]."""
+    lines = Path(f'/proc/{running.pid}/status').read_text().splitlines()
+    return next(int(line.split()[1]) / 1024.0 for line in lines if line.startswith('VmRSS'))
+
+
 def at_one_kilohertz(seconds, folder):
-    """Identify and record an arm at 1 kHz; print what was lost and how long updates took."""
+    """Identify, diagnose and record an arm at 1 kHz; print losses, memory and update times."""
     robot = load_robot(panda())
     save_excitation(short_run(robot, 8.0, max(1, int(seconds / 8.0))), folder / 'run.yaml')
     with private_context() as context, steady():
@@ -107,15 +113,22 @@ def at_one_kilohertz(seconds, folder):
             'floor:=none',
         )
         arm = process(context, 'simulated_arm', f'robot:={panda()}', 'executor:=events')
-        with recorder, excitation as moving:
-            with arm:
+        live = process(context, 'live_diagnosis', f'robot:={panda()}')
+        with recorder as recording_it, excitation as moving, live as diagnosing:
+            ours = {'recorder': recording_it, 'publisher': moving, 'live diagnosis': diagnosing}
+            memory = []
+            with arm as simulating:
                 while not node.received:
                     executor.spin_once(timeout_sec=0.1)
-                first = node.last_stamp_ns
-                end = time.monotonic() + seconds
-                while time.monotonic() < end:
-                    executor.spin_once(timeout_sec=0.1)
-                assert moving.poll() is None, 'the excitation_publisher refuses the run'
+                first, begun = node.last_stamp_ns, time.monotonic()
+                for share in (0.1, 0.5, 1.0):  # of the run; windows and caches are full at first
+                    while time.monotonic() < begun + share * seconds:
+                        executor.spin_once(timeout_sec=0.1)
+                    memory.append(
+                        {n: resident(p) for n, p in (ours | {'arm': simulating}).items()}
+                    )
+                    stopped = [name for name, one in ours.items() if one.poll() is not None]
+                    assert not stopped, f'ended early: {stopped}'
             for _ in range(1000):
                 executor.spin_once(timeout_sec=0.001)
         missing = lost(first, node.last_stamp_ns, node.received)
@@ -129,6 +142,9 @@ def at_one_kilohertz(seconds, folder):
     print(f'  lost by the identifier      {missing} of {node.received + missing} (wanted: 0)')
     print(f'  lost by the recorder        {span - len(recording)} of {span} (wanted: 0)')
     print(f'  restarts of the filters     {restarts} (wanted: 0)')
+    for name in memory[0]:
+        sizes = ', '.join(f'{one[name]:.0f}' for one in memory)
+        print(f'  memory of {name:17} {sizes} MB after a tenth, a half and all of it')
     p50, p99, p999 = np.percentile(times, (50, 99, 99.9))
     print(
         f'  processor time of an update p50 {p50:.0f} us, p99 {p99:.0f} us (wanted: 250), '

@@ -194,10 +194,9 @@ def _settings(columns: dict[str, Any]) -> ColumnSettings:
         said['rename'] = tuple(said['rename'].items())
     for name in ('position_scale', 'effort_scale', 'zero', 'gear'):
         value = said.get(name)
-        if isinstance(value, str):
-            said[name] = numbers(value)
-        elif value is not None:
-            said[name] = tuple(np.atleast_1d(value).tolist())
+        if value is not None:
+            listed = numbers(value) if isinstance(value, str) else np.atleast_1d(value).tolist()
+            said[name] = tuple(listed)
     try:
         return ColumnSettings(**said)
     except TypeError as error:

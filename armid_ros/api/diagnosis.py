@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Literal, TYPE_CHECKING, TypeGuard, TypeVar
 
@@ -416,15 +417,12 @@ def _since(
         found = recordings_of(identified_from(arm), model.robot)
     else:
         return []
-    if any(_same(one, other) for one in found for other in asked):
-        return []
+    for one, other in product(found, asked):
+        if np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q):
+            return []
     if not isinstance(arm, IdentificationResult):
         require_as_identified(arm)
     return found
-
-
-def _same(one: Recording, other: Recording) -> bool:
-    return bool(np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q))
 
 
 def _is_written(arm: RobotLike) -> TypeGuard[str | Path]:

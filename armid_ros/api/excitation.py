@@ -50,6 +50,8 @@ if TYPE_CHECKING:
 #: Waypoints per second of a JointTrajectory; controllers interpolate between them.
 WAYPOINT_RATE = 50.0
 SCHEMA = 'armid/excitation/1'
+#: Of more joints one search is made by default: each step of it takes seconds.
+_MANY_JOINTS = 20
 #: Name of the bag.
 BAG = 'trajectory'
 #: Of the run-in and the run-out [s], and at most this share of the duration.
@@ -158,6 +160,7 @@ class ExcitationResult(Shown):
             'verdict': self.fitness.word,
             'summary': str(self.fitness),
             'not_checked': list(self.fitness.unchecked),
+            'excluded_pairs': self.scene.collision.excluded,
             'joints': list(core.excitation.joints),
             'duration': core.excitation.duration,
             'period': settings.period,
@@ -212,8 +215,10 @@ class ExcitationResult(Shown):
             If no way leads from the start to the trajectory; its coefficients are written then.
 
         """
-        _save_coefficients(self.core.excitation, folder)
-        _save_coefficients(self.run.excitation, folder)
+        for name in ('excitation.yaml', 'excitation.csv'):
+            save_excitation(self.core.excitation, folder / name)
+        for name in ('excitation.yaml', 'excitation.csv'):  # where a way there is found
+            save_excitation(self.run.excitation, folder / name)
         urdf = self.arm.robot.urdf
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
         document = self.document(origin)
@@ -250,7 +255,7 @@ def design_excitation(
     duration: float = 24.0,
     periods: int = 2,
     rng: Rng = 0,
-    time_budget: float = 60.0,
+    time_budget: float | None = None,
     floor: str | float | None = None,
     environment: str | Path | None = None,
     joint_limits: str | Path | Mapping[str, float] | None = None,
@@ -276,8 +281,8 @@ def design_excitation(
         How often the trajectory is run through; two tell noise from what a model lacks.
     rng : int or Generator
         Seed, or source of randomness.
-    time_budget : float
-        Processor time of each search process [s]; the best so far is kept.
+    time_budget : float, optional
+        Of each search process [s]: by default 120, and above 20 joints 25 and one search.
     floor : str or float, optional
         Height of the floor above the origin of the base [m], or 'none'; by default the base plane
         of an arm that stands, or what is shipped with the robot.
@@ -334,7 +339,10 @@ def design_excitation(
         robot, acceleration = with_joint_limits(model.robot, file, given)
         model = replace(model, robot=robot)
         settings = {'acceleration': acceleration, **settings}
-    known = design_settings(duration, periods, time_budget=time_budget, **settings)
+    many = model.robot.n_joints > _MANY_JOINTS
+    usual: dict[str, Any] = {'starts': 1, 'time_budget': 25.0} if many else {'time_budget': 120.0}
+    budget = {} if time_budget is None else {'time_budget': time_budget}
+    known = design_settings(duration, periods, **usual | budget | settings)
     if scene is None:
         height = None if floor is None else str(floor)
         scene = CollisionScene.of(model.robot, known.clearance, height, environment)
@@ -381,11 +389,6 @@ def transfer_planner(
         ClearanceModel.of(scene.bodies),
         settings.clearance,
     )
-
-
-def _save_coefficients(excitation: Excitation, folder: Path) -> None:
-    for name in ('excitation.yaml', 'excitation.csv'):
-        save_excitation(excitation, folder / name)
 
 
 def _information(

@@ -156,11 +156,9 @@ def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     widths[0] = max(8, widths[0] + min(0, spare))
     lines = []
     for row in table:
-        first = row[0] if len(row) == 1 else _fitted(row[0], widths[0])
-        rest = (cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=False))
+        name, width = row[0], widths[0]
+        fitted = name.ljust(width) if len(name) <= width else name[: width - 1] + '…'
+        first = name if len(row) == 1 else fitted
+        rest = (cell.rjust(one) for cell, one in zip(row[1:], widths[1:], strict=False))
         lines.append('  '.join(['', first, *rest]).rstrip()[:WIDTH])
     return lines
-
-
-def _fitted(text: str, width: int) -> str:
-    return text.ljust(width) if len(text) <= width else text[: width - 1] + '…'

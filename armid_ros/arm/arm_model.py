@@ -437,7 +437,7 @@ class ArmModel:
             Which ``parameters`` may change; all by default.
 
         """
-        motion = random_motion(self.robot, None, rng)
+        motion = random_motion(self.robot, rng)
         names = tuple(name for effect in self.effects for name in effect.points)
         if names:
             size = (len(motion), len(names), 3)

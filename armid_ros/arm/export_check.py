@@ -44,7 +44,7 @@ def torque_check(exported: Exported, arm: ArmModel, seed: int = 0) -> dict[str, 
     except ImportError:
         return {'not_checked': 'MuJoCo is not installed'}
     robot = arm.body
-    motion = random_motion(robot, STATES, np.random.default_rng(seed))
+    motion = random_motion(robot, np.random.default_rng(seed), STATES)
     placed = {
         key: np.array([exported.values.get(key, {}).get(joint, 0.0) for joint in robot.joints])
         for key in ('damping', 'friction', 'armature')

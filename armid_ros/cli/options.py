@@ -91,12 +91,13 @@ def tell_damage(*recordings: Recording) -> None:
 def open_robot(
     source: str,
     gravity: str,
-    joints: str | None,
+    joints: str | Sequence[str] | None,
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
     """Load the robot that --robot, --gravity and --joints ask for; say what is doubtful."""
-    robot = _loaded(source, gravity, listed(joints) if joints else None, bags)
+    named = listed(joints) if isinstance(joints, str) else joints
+    robot = _loaded(source, gravity, named or None, bags)
     lines = driven_in_words(robot) if joints is None else ()
     if tell:
         notes = click.get_current_context().meta.setdefault(NOTES, [])
@@ -106,7 +107,7 @@ def open_robot(
 
 
 def _loaded(
-    source: str, gravity: str, chosen: tuple[str, ...] | None, bags: Sequence[Path]
+    source: str, gravity: str, chosen: Sequence[str] | None, bags: Sequence[Path]
 ) -> Robot:
     if source != '-':
         return load_robot(source, gravity=gravity, joints=chosen)

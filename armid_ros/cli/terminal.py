@@ -153,7 +153,8 @@ def print_rows(
     heads = list(rows[0]) if rows else []
     left_out = []
     for head in spare:
-        if _width(rows, heads) > console.width:
+        cells = [[one, *(_cell(row[one]) for row in rows)] for one in heads]
+        if sum(2 + max(map(len, column)) for column in cells) > console.width:
             heads.remove(head)
             left_out.append(head)
     table = Table(box=None, header_style='bold')
@@ -169,14 +170,6 @@ def print_rows(
     console.print(table)
     if left_out:
         say(wrapped(f'no room in {console.width} columns for: {", ".join(left_out)}', ' ', '   '))
-
-
-def _width(rows: Sequence[dict[str, Any]], heads: Sequence[str]) -> int:
-    """Return how many columns of a terminal a table takes."""
-    return sum(
-        2 + max(len(text) for text in (head, *(_cell(row[head]) for row in rows)))
-        for head in heads
-    )
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:

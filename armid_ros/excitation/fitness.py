@@ -14,7 +14,7 @@ from armid_ros.excitation.geometry.heights import lowest_point, LowestPoint
 from armid_ros.excitation.limits import has_velocity_limit, Limits, SLOW_VELOCITY
 from armid_ros.excitation.run import Run
 from armid_ros.motion import Motion
-from armid_ros.robots import CollisionModel, continuous_joints, Robot
+from armid_ros.robots import CollisionModel
 import numpy as np
 
 FIT, PARTLY, UNFIT = 'fit to run', 'not checked in all', 'not to be run'
@@ -124,7 +124,8 @@ def not_checked(
         elif floor.source == 'environment':
             found.append('the floor (the environment has no plane)')
     found += _bodies_not_checked(collision)
-    endless = np.isin(limits.joints, continuous_joints(collision.robot))
+    by_name = collision.robot.description.by_name
+    endless = np.array([by_name[joint].kind == 'continuous' for joint in limits.joints])
     free = {
         'position': (np.isinf(limits.lower) | np.isinf(limits.upper)) & ~endless,
         'velocity': np.isinf(limits.velocity),
@@ -142,7 +143,8 @@ def not_checked(
     if slow:
         taken = f'{SLOW_VELOCITY:g} rad/s or m/s'
         found.append(f'the velocity of {_listed(slow)} (no limit is given; {taken} is taken)')
-    massless = _massless(collision.robot)
+    mass = collision.robot.rigid_parameters.reshape(collision.robot.n_joints, -1)[:, 0]
+    massless = [link for link, m in zip(collision.robot.links, mass, strict=True) if not m > 0.0]
     if massless:
         found.append(f'the weight of {_listed(massless)} (no inertia)')
     return tuple(found)
@@ -164,12 +166,6 @@ def _bodies_not_checked(collision: CollisionModel) -> list[str]:
         pairs = [f'{first} and {second}' for first, second in collision.touching]
         found.append(f'the clearance of {_listed(pairs)} (touch at zero, no SRDF)')
     return found
-
-
-def _massless(robot: Robot) -> list[str]:
-    """Return the links of driven joints that weigh nothing, with all that hangs on them."""
-    mass = robot.rigid_parameters.reshape(robot.n_joints, -1)[:, 0]
-    return [link for link, m in zip(robot.links, mass, strict=True) if not m > 0.0]
 
 
 def _listed(names: Sequence[str]) -> str:

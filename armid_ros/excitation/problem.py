@@ -93,7 +93,7 @@ class DesignProblem:
                 "criterion 'T' compares two models: it needs a rival, and a rival needs it"
             )
         whole = arm if rival is None else _joined(arm, rival)
-        motion = random_motion(arm.robot, None, rng)
+        motion = random_motion(arm.robot, rng)
         columns = target_columns(whole, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(

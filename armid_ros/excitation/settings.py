@@ -69,7 +69,8 @@ class DesignSettings:
     starts : int
         Number of searches, each from the best of ``candidates`` random trajectories.
     candidates : int
-        Number of random feasible trajectories that each search begins with.
+        Number of random feasible trajectories that each search begins with; of an arm of more
+        than 10 joints, fewer in proportion.
     iterations : int
         Iterations of each search. This, not the time, decides between results.
     time_budget : float

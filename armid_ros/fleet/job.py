@@ -145,7 +145,7 @@ def require_linear(arm: ArmModel, rng: np.random.Generator) -> None:
         Naming them, and what to do.
 
     """
-    motion = random_motion(arm.robot, 200, rng)
+    motion = random_motion(arm.robot, rng, 200)
     bare = ArmModel(arm.robot)
     for effect in arm.effects:
         one = bare.with_effect(effect)

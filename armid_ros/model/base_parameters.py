@@ -228,7 +228,7 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
 
     """
     robot = levelled(robot)
-    motion = random_motion(robot, None, rng)
+    motion = random_motion(robot, rng)
     rest = Motion(motion.joints, motion.t, motion.q, 0.0 * motion.dq, 0.0 * motion.ddq)
     names = rigid_parameter_names(robot)
     static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]

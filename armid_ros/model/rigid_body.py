@@ -187,13 +187,13 @@ def gravity_sensitivity(robot: Robot, q: FloatArray) -> FloatArray:
     return columns
 
 
-def random_motion(robot: Robot, n_samples: int | None, rng: np.random.Generator) -> Motion:
+def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None = None) -> Motion:
     """
     Draw independent random states that excite every identifiable parameter.
 
     Positions are uniform within the limits (one turn where there are none), velocities and
-    accelerations are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). None
-    stands for as many states as tell all parameters.
+    accelerations are normal with a standard deviation of 1 rad/s and 1 rad/s^2 (or m). By default
+    there are as many states as tell all parameters.
 
     """
     n = robot.n_joints

@@ -128,7 +128,8 @@ def draw_arm(robot: Robot, marked: Sequence[str], q: FloatArray | None = None) -
         chosen = np.linspace(0, len(q) - 1, min(_POSES, len(q))).astype(np.intp)
         poses = list(q[chosen])
     seen = [(_flat(robot, pose, view), view) for pose, view in product(poses, _VIEWS)]
-    lines, view = max(seen, key=lambda one: _area(one[0]))
+    size_of = [np.prod(np.ptp(flat.reshape(-1, 2), axis=0) + 1e-3) for flat, _ in seen]
+    lines, view = seen[int(np.argmax(size_of))]
     down = view.flat(robot.gravity / max(float(np.linalg.norm(robot.gravity)), _SAME))
     points = lines.reshape(-1, 2)
     low, size = points.min(axis=0), np.maximum(np.ptp(points, axis=0), _SAME)
@@ -204,7 +205,3 @@ def _flat(robot: Robot, q: FloatArray, view: Camera) -> FloatArray:
         for joint, end in sticks(robot.model)
     ]
     return view.flat(np.array([*ways, *bodies]))
-
-
-def _area(lines: FloatArray) -> float:
-    return float(np.prod(np.ptp(lines.reshape(-1, 2), axis=0) + 1e-3))

@@ -119,6 +119,7 @@ def excitation_report(
         if len(model.geometry.collisionPairs)
     }
     whole = with_obstacles(collision, obstacles)
+    said = (*collision.notes, *filter(None, [collision.excluded]))
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     sections: list[Section] = [
         _verdict(design, arm.robot.links, shares, checked, collision.notes),
@@ -133,7 +134,7 @@ def excitation_report(
         ),
         Foreseen(design, arm.robot.links),
         PlannedMotion(limits, motion, shares),
-        PlannedClearance(motion.t, curves, design.settings.clearance, collision.notes),
+        PlannedClearance(motion.t, curves, design.settings.clearance, said),
         Harmonics(excitation.trajectory),
         Asked(_asked(design, arm, robot, obstacles, after, run)),
         Origin(provenance or Provenance()),

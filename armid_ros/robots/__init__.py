@@ -15,12 +15,12 @@ from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
 from armid_ros.robots.mounting import Mounting, read_mounting
 from armid_ros.robots.robot import NO_MASS, PARAMETERS_PER_BODY, Robot
 from armid_ros.robots.selection import (
-    continuous_joints,
     driven_in_words,
     held_joints,
     HeldJoint,
     inertia_doubts,
     joints_beside_arms,
+    load_arms,
 )
 from armid_ros.robots.shipped import shipped_robots
 
@@ -31,7 +31,7 @@ __all__ = [
     'driven_in_words',
     'inertia_doubts',
     'joints_beside_arms',
-    'continuous_joints',
+    'load_arms',
     'held_joints',
     'HeldJoint',
     'described_at',

@@ -57,6 +57,8 @@ class CollisionModel:
         Links with a body that was left out, because its mesh was not found.
     touching : tuple of (str, str)
         Pairs of links that are not checked, because they touch at zero.
+    excluded : str
+        How many pairs of links which SRDF excludes; empty without one.
 
     """
 
@@ -65,6 +67,7 @@ class CollisionModel:
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     touching: tuple[tuple[str, str], ...] = ()
+    excluded: str = ''
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -162,13 +165,18 @@ def collision_model(
 
     """
     geometry, missing = collision_geometry(robot, progress)
-    disabled = _disabled_pairs(robot, Path(srdf) if srdf is not None else _find_srdf(robot))
+    path = _find_srdf(robot) if srdf is None else Path(srdf)
+    disabled = _disabled_pairs(robot, path)
     description = robot.description
     joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}
-    bodies = list(geometry.geometryObjects)
+    bodies, excluded = list(geometry.geometryObjects), set[frozenset[str]]()
     for (i, first), (j, second) in combinations(enumerate(bodies), 2):
         links = frozenset((_link(robot, first), _link(robot, second)))
-        if first.parentJoint != second.parentJoint and links not in joined | disabled:
+        if first.parentJoint == second.parentJoint or links in joined:
+            continue
+        if links in disabled:
+            excluded.add(links)
+        else:
             geometry.addCollisionPair(pin.CollisionPair(i, j))
     touching = () if disabled else _leave_out_touching(robot, geometry)
     _leave_out_separate(robot, geometry)
@@ -176,7 +184,9 @@ def collision_model(
         f"links '{first}' and '{second}' touch at zero and there is no SRDF; not checked"
         for first, second in touching
     )
-    return CollisionModel(robot, geometry, (*missing.values(), *doubts), tuple(missing), touching)
+    notes = (*missing.values(), *doubts)
+    by_file = '' if path is None else f'{path.name} excludes {len(excluded)} pairs of links'
+    return CollisionModel(robot, geometry, notes, tuple(missing), touching, by_file)
 
 
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
@@ -188,14 +198,8 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
         for number, result in enumerate(placed.distanceResults)
         if result.min_distance <= 0.0
     }
-    _keep(
-        geometry,
-        [
-            number
-            for number in range(len(geometry.collisionPairs))
-            if _links(robot, geometry, number) not in touching
-        ],
-    )
+    numbers = range(len(geometry.collisionPairs))
+    _keep(geometry, [n for n in numbers if _links(robot, geometry, n) not in touching])
     return tuple(sorted(touching))
 
 

@@ -102,7 +102,10 @@ def shapes_of(
         frame = robot.model.frames[frames[name]]
         for number, element in enumerate(link.findall(tag) or link.findall(other or tag)):
             try:
-                placement = frame.placement * _placement(element)
+                origin = getattr(element.find('origin'), 'attrib', {})
+                rotation = pin.rpy.rpyToMatrix(*_numbers(origin.get('rpy', '0 0 0')))
+                place = pin.SE3(rotation, np.array(_numbers(origin.get('xyz', '0 0 0'))))
+                placement = frame.placement * place
                 kind, size, mesh = _geometry(element)
             except (TypeError, ValueError):
                 raise RobotError(
@@ -180,14 +183,6 @@ def _geometry(element: ElementTree.Element) -> tuple[str, tuple[float, ...], str
             size = _numbers(texts[0]) if shape.tag == 'box' else tuple(map(float, texts))
             return shape.tag, size, ''
     raise ValueError
-
-
-def _placement(element: ElementTree.Element) -> pin.SE3:
-    origin = element.find('origin')
-    if origin is None:
-        return pin.SE3.Identity()
-    rotation = pin.rpy.rpyToMatrix(*_numbers(origin.get('rpy', '0 0 0')))
-    return pin.SE3(rotation, np.array(_numbers(origin.get('xyz', '0 0 0'))))
 
 
 def _numbers(text: str) -> tuple[float, float, float]:

@@ -10,7 +10,6 @@ are there. A body with several joints becomes a link for each; the frame of a li
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import math
 from pathlib import Path
 import re
@@ -128,7 +127,7 @@ class _Writer:
                 self.notes.append(
                     f"body '{self.bodies[body]}' is not fixed to the world; left out"
                 )
-                if free and any(self._carried(body)):
+                if free and any(self.model.body_rootid[k] == body != k for k in model.jnt_bodyid):
                     raise RobotError(
                         f"{self.path}: body '{self.bodies[body]}' floats, but the base of an arm "
                         'is fixed: take its freejoint out'
@@ -137,14 +136,6 @@ class _Writer:
             anchors[body] = self._link(body, parent, list(joints), anchors[parent])
         self._not_read()
         return self.root
-
-    def _carried(self, root: int) -> Iterator[int]:
-        """Yield the joints of other kinds that are fixed to a body."""
-        model = self.model
-        for joint in range(model.njnt):
-            body = int(model.jnt_bodyid[joint])
-            if model.body_rootid[body] == root and body != root:
-                yield joint
 
     def _link(
         self, body: int, parent: int, joints: list[int], parent_anchor: FloatArray

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from armid_ros.errors import meant, RobotError
@@ -139,14 +139,6 @@ def inertia_doubts(robot: Robot) -> tuple[str, ...]:
     return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
 
 
-def continuous_joints(robot: Robot) -> tuple[str, ...]:
-    """Return the driven joints that are described as turning without end."""
-    description = robot.description
-    return tuple(
-        joint for joint in robot.joints if description.by_name[joint].kind == 'continuous'
-    )
-
-
 def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
     """
     Return the driven joints that belong to no arm: wheels, a head, a torso that carries arms.
@@ -156,6 +148,17 @@ def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
     """
     of_arms = {joint for arm in _arms(robot.description, robot.joints) for joint in arm}
     return tuple(joint for joint in robot.joints if joint not in of_arms) if of_arms else ()
+
+
+def load_arms(
+    load: Callable[[Sequence[str] | None], Robot], joints: Sequence[str] | None
+) -> tuple[Robot, tuple[str, ...]]:
+    """Load a robot by the joints to drive; by default those of its arms, and the others too."""
+    robot = load(joints)
+    others = () if joints else joints_beside_arms(robot)
+    if others:
+        robot = load([joint for joint in robot.joints if joint not in others])
+    return robot, others
 
 
 def held_joints(robot: Robot) -> tuple[HeldJoint, ...]:

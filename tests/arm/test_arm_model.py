@@ -20,7 +20,7 @@ def robot():
 
 @pytest.fixture(scope='module')
 def motion(robot):
-    return random_motion(robot, 40, np.random.default_rng(0))
+    return random_motion(robot, np.random.default_rng(0), 40)
 
 
 def arm_with(robot, **values):
@@ -105,6 +105,6 @@ def test_effects_that_an_arm_lacks_have_no_values(robot):
 def test_an_arm_goes_to_other_processes_after_use(robot):
     """What it derives and keeps, functions among it, stays behind."""
     arm = ArmModel(robot).with_effect(make_effect('torque_offset', robot), np.full(6, 0.1))
-    motion = random_motion(robot, 5, np.random.default_rng(0))
+    motion = random_motion(robot, np.random.default_rng(0), 5)
     tau = arm.torque(motion)
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(arm)).torque(motion), tau)

@@ -5,6 +5,7 @@
 from importlib.metadata import files
 import json
 import shutil
+import time
 
 import armid_ros.api.excitation as excitation_files
 from armid_ros.arm import ArmModel
@@ -16,6 +17,7 @@ from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
 
+from ..excitation.conftest import urdf
 from .conftest import armid, ROBOT
 
 pytestmark = pytest.mark.slow
@@ -77,6 +79,22 @@ def test_an_arm_whose_zero_is_on_the_floor_starts_beside_it_and_says_so(ur5):
     first = plan_of(example('ur5_robot'), out).q[0]
     assert 0.0 < np.abs(first).max() < 0.2
     assert 'wrist_3_link and floor' in said
+
+
+@pytest.mark.long
+def test_an_arm_of_fifty_five_joints_takes_a_minute_of_processor_time_by_default(tmp_path):
+    names = ['base', *(f'l{k}' for k in range(55))]
+    joints = [
+        (f'j{k}', 'revolute', *names[k : k + 2], '0 0 0.3', f'{k % 2} 1 0', -0.3, 0.3, 9e3)
+        for k in range(55)
+    ]
+    path = tmp_path / 'long.urdf'
+    path.write_text(urdf(*joints))
+    begun = time.process_time()
+    armid('excite', '--robot', path, '--floor', 'none', '--out', tmp_path / 'plan')
+    assert time.process_time() - begun < 60.0
+    document = json.loads((tmp_path / 'plan' / 'excitation.json').read_text())
+    assert all(row['std'] is not None for row in document['parameters'])
 
 
 @pytest.mark.long

@@ -37,7 +37,7 @@ def coefficients(problem, rng):
 @ROBOTS
 def test_regressor_is_pinocchios(name, request):
     robot = request.getfixturevalue(name)
-    motion = random_motion(robot, 20, np.random.default_rng(1))
+    motion = random_motion(robot, np.random.default_rng(1), 20)
     ours = RigidRegressor.of(Chain.of(robot), motion.q, motion.dq, motion.ddq).matrix()
     np.testing.assert_allclose(ours, regressor(robot, motion), atol=1e-11)
 
@@ -47,7 +47,7 @@ def test_regressor_is_pinocchios(name, request):
 def test_pullback_of_the_regressor_is_its_derivative(name, argument, request):
     robot = request.getfixturevalue(name)
     rng = np.random.default_rng(2)
-    motion, chain = random_motion(robot, 5, rng), Chain.of(robot)
+    motion, chain = random_motion(robot, rng, 5), Chain.of(robot)
     weights = rng.normal(size=(5, robot.n_joints, 10 * robot.n_joints))
     states = [motion.q, motion.dq, motion.ddq]
     analytic = RigidRegressor.of(chain, *states).pullback(weights)[argument]
@@ -121,7 +121,7 @@ def test_gradient_with_prior_information(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40)
     rng = np.random.default_rng(3)
     problem = DesignProblem.of(two_link_arm, settings, rng)
-    known = problem.information(random_motion(two_link_arm.robot, 50, rng)).matrix
+    known = problem.information(random_motion(two_link_arm.robot, rng, 50)).matrix
     assert_gradient(Objective.of(problem, known), problem)
 
 

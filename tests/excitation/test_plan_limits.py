@@ -5,7 +5,7 @@
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import CollisionScene, Limits, with_joint_limits
 from armid_ros.excitation.limits import SLOW_VELOCITY, TIME_TO_TOP_SPEED
-from armid_ros.robots import inertia_doubts, joints_beside_arms, robot_from_urdf
+from armid_ros.robots import inertia_doubts, joints_beside_arms, load_arms, robot_from_urdf
 import numpy as np
 import pytest
 
@@ -83,6 +83,8 @@ def test_wheels_head_and_torso_belong_to_no_arm():
             arms.append(name)
     robot = robot_from_urdf(urdf(*parts))
     assert set(robot.joints) - set(joints_beside_arms(robot)) == set(arms)
+    loaded, others = load_arms(lambda joints: robot_from_urdf(urdf(*parts), joints=joints), None)
+    assert set(loaded.joints) == set(arms) and set(others).isdisjoint(arms)
     one = [part for part in parts if not part[0].startswith('left')]
     robot = robot_from_urdf(urdf(*one))
     assert set(joints_beside_arms(robot)) == {'wheel0', 'wheel1', 'head'}

@@ -85,35 +85,20 @@ def test_a_second_run_in_one_folder_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('content', 'refusal'),
+    ('name', 'text', 'refusal'),
     [
-        ({'schema': SCHEMA, 'robot': 'ur5'}, None),
-        ({'schema': SCHEMA, 'robot': 'panda'}, 'panda.* ur5.*--force'),
-        ({'schema': 'armid/diagnosis/1'}, 'armid/diagnosis/1.* armid/ident.*--force'),
-        ('rubbish', 'identification.json'),
+        ('identification.json', f'{{"schema": "{SCHEMA}", "robot": "ur5"}}', None),
+        ('identification.json', f'{{"schema": "{SCHEMA}", "robot": "panda"}}', 'panda.* ur5.*--f'),
+        ('identification.json', '{"schema": "armid/d/1"}', 'armid/d/1.* armid/ident.*--force'),
+        ('identification.json', '"rubbish"', 'identification.json'),
+        ('model.yaml', 'schema: armid/model/1\nrobot: ur5\n', None),
+        ('model.yaml', 'schema: armid/model/1\nrobot: panda\n', 'panda.* ur5.*--force'),
+        ('model.yaml', 'schema: other/1\nrobot: ur5\n', 'other/1'),
+        ('model.yaml', 'hello', 'model.yaml'),
     ],
 )
-def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, content, refusal):
-    (tmp_path / 'identification.json').write_text(json.dumps(content))
-    if refusal:
-        with pytest.raises(OutputError, match=refusal):
-            with result_folder(tmp_path, SCHEMA, 'ur5'):
-                pass
-    with result_folder(tmp_path, SCHEMA, 'ur5', force=refusal is not None):
-        pass
-
-
-@pytest.mark.parametrize(
-    ('text', 'refusal'),
-    [
-        ('schema: armid/model/1\nrobot: ur5\n', None),
-        ('schema: armid/model/1\nrobot: panda\n', 'panda.* ur5.*--force'),
-        ('schema: other/1\nrobot: ur5\n', 'other/1'),
-        ('hello', 'model.yaml'),
-    ],
-)
-def test_a_model_that_no_run_of_this_kind_left_is_kept_unless_forced(tmp_path, text, refusal):
-    (tmp_path / 'model.yaml').write_text(text)
+def test_results_of_another_kind_or_robot_are_kept_unless_forced(tmp_path, name, text, refusal):
+    (tmp_path / name).write_text(text)
     if refusal:
         with pytest.raises(OutputError, match=refusal):
             with result_folder(tmp_path, SCHEMA, 'ur5'):

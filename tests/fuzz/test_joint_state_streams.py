@@ -18,7 +18,6 @@ import os
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
-from armid_ros.motion import Motion
 from armid_ros.nodes.messages.joint_states import JointStateReader
 from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
@@ -28,16 +27,8 @@ import pytest
 from rclpy.clock import Clock
 from sensor_msgs.msg import JointState
 
-ARM = """<robot name="arm"><link name="base"/>
-<link name="upper"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
-<inertia ixx="0.01" iyy="0.03" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="lower"><inertial><origin xyz="0.15 0 0"/><mass value="1"/>
-<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
-<axis xyz="0 1 0"/><limit lower="-3" upper="3" velocity="9" effort="50"/></joint>
-<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
-<origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>
-<limit lower="-3" upper="3" velocity="9" effort="30"/></joint></robot>"""
+from tests.ros.test_online_identifier import EFFECT, PENDULUM, two_sines
+
 RATE, SECONDS, NOISE, RESOLUTION = 100.0, 4.0, 0.05, 1e-5
 COUNT = round(RATE * SECONDS)
 #: Damaged messages of a stream, and what they may make of deviations and values.
@@ -78,21 +69,11 @@ class Silent:
 
 def measured() -> tuple[np.ndarray, ...]:
     """Return the truth, and what sensors say of a motion: q, dq, tau."""
-    arm = ArmModel(load_robot(ARM))
-    arm = arm.with_effect(*parse_effect('viscous_friction:viscous_coefficient=0.3', arm.robot))
-    t = np.arange(COUNT)[:, np.newaxis] / RATE
-    w, phase = np.array([3.1, 4.3]), np.array([0.0, 1.0])
-    q, dq, ddq = (
-        sum(
-            a * (k * w) ** order * np.sin(k * w * t + phase + order * np.pi / 2.0)
-            for a, k in ((1.0, 1.0), (0.4, 2.3))
-        )
-        for order in range(3)
-    )
-    rng = np.random.default_rng(0)
-    tau = arm.torque(Motion(arm.robot.joints, t[:, 0], q, dq, ddq))
-    q = np.round(q / RESOLUTION) * RESOLUTION
-    return arm, q, dq, tau + NOISE * rng.normal(size=tau.shape)
+    arm = ArmModel(load_robot(PENDULUM))
+    arm = arm.with_effect(*parse_effect(EFFECT, arm.robot))
+    motion, rng = two_sines(arm, np.arange(COUNT) / RATE, 2.3), np.random.default_rng(0)
+    q = np.round(motion.q / RESOLUTION) * RESOLUTION
+    return arm, q, motion.dq, motion.tau + NOISE * rng.normal(size=q.shape)
 
 
 ARM_MODEL, Q, DQ, TAU = measured()

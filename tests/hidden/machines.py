@@ -63,22 +63,14 @@ def with_rigid_errors(robot: Robot, rng: np.random.Generator) -> Robot:
         if mass <= 0.0:
             continue
         com = values[1:4] / mass
-        central = _matrix(values[4:]) - mass * _steiner(com)
+        described = values[4:][np.array([[0, 1, 3], [1, 2, 4], [3, 4, 5]])]
+        central = described - mass * _steiner(com)
         new_mass, new_com = mass * mass_scale, com * com_scale
         inertia = central * mass_scale * inertia_scale + new_mass * _steiner(new_com)
         values[0], values[1:4] = new_mass, new_mass * new_com
-        values[4:] = _vector(inertia)
+        values[4:] = inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
     return robot.with_inertias(parameters.ravel())
 
 
 def _steiner(com: FloatArray) -> FloatArray:
     return com @ com * np.eye(3) - np.outer(com, com)
-
-
-def _matrix(values: FloatArray) -> FloatArray:
-    xx, xy, yy, xz, yz, zz = values
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _vector(matrix: FloatArray) -> FloatArray:
-    return matrix[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]

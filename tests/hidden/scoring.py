@@ -279,7 +279,11 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
         rate('joint right', placed, lambda j: j.localised, least=0.98),
         number('gap closed, median', np.median, closed, 'at least 0.95', lambda x: x >= 0.95),
         number(
-            'gap closed, 10th percentile', _tenth, closed, 'at least 0.85', lambda x: x >= 0.85
+            'gap closed, 10th percentile',
+            lambda x: np.quantile(x, 0.1),
+            closed,
+            'at least 0.85',
+            lambda x: x >= 0.85,
         ),
         rate('pairs exact', pairs, lambda j: j.exact, least=0.80),
         rate('pairs within the sets', pairs, lambda j: j.exact_set),
@@ -293,10 +297,6 @@ def score(judged: Sequence[Judged]) -> tuple[Metric, ...]:
         number('processor time, median [s]', np.median, seconds, '', None),
         number('processor time, longest [s]', np.max, seconds, 'at most 30', lambda x: x <= 30.0),
     )
-
-
-def _tenth(values: Any) -> float:
-    return float(np.quantile(values, 0.1))
 
 
 def rate(

@@ -58,7 +58,7 @@ def test_friction_comes_back_in_numbers(structure, recording):
 
 def test_model_predicts_any_motion_not_only_the_training_data(arm, structure, recording):
     identified = run(structure, recording).arm
-    other = random_motion(arm.robot, 200, np.random.default_rng(9))
+    other = random_motion(arm.robot, np.random.default_rng(9), 200)
     error = identified.torque(other) - arm.torque(other)
     assert np.linalg.norm(error) < 0.03 * np.linalg.norm(arm.torque(other))
 

@@ -82,7 +82,7 @@ def test_no_gravity_needs_no_composites(rng):
 def test_base_regressor_predicts_the_same_torque(rng):
     robot = load_robot('humanoid_arm')
     base = ArmModel(robot).base_parameters(rng)
-    y = regressor(robot, random_motion(robot, 20, rng))
+    y = regressor(robot, random_motion(robot, rng, 20))
     beta = base.values(robot.rigid_parameters)
     full = y @ robot.rigid_parameters
     np.testing.assert_allclose(y[:, :, base.independent] @ beta, full, atol=1e-9)
@@ -90,7 +90,7 @@ def test_base_regressor_predicts_the_same_torque(rng):
 
 def test_rank_agrees_with_the_singular_values(rng):
     robot = load_robot('humanoid_arm')
-    y = regressor(robot, random_motion(robot, 200, rng)).reshape(-1, 60)
+    y = regressor(robot, random_motion(robot, rng, 200)).reshape(-1, 60)
     s = np.linalg.svd(y, compute_uv=False)
     assert ArmModel(robot).base_parameters(rng).rank == int(np.sum(s > 1e-9 * s[0]))
 

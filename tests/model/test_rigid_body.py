@@ -25,7 +25,7 @@ def arm(request):
 
 @pytest.fixture
 def motion(arm):
-    return random_motion(arm, 30, np.random.default_rng(1))
+    return random_motion(arm, np.random.default_rng(1), 30)
 
 
 def test_regressor_times_parameters_is_inverse_dynamics(arm, motion):

@@ -118,7 +118,7 @@ def test_description_read_again_has_the_parameters(robot):
 
 
 def test_pinocchio_and_mujoco_agree_with_the_model(robot):
-    motion = random_motion(robot, 30, np.random.default_rng(1))
+    motion = random_motion(robot, np.random.default_rng(1), 30)
     tau = inverse_dynamics(robot, motion)
     urdf, (mjcf, _) = export_urdf(robot), export_mjcf(robot)
     bound = 1e-9 * np.abs(tau).max()
@@ -135,7 +135,7 @@ def test_exports_agree_with_the_model_file_friction_and_rotors_included(robot, t
         arm = arm.with_effect(make_effect(name, robot), np.full(robot.n_joints, value))
     save_model(tmp_path / 'model.yaml', arm, robot.name)
     model = load_model(tmp_path / 'model.yaml', robot)
-    motion = random_motion(robot, 30, np.random.default_rng(1))
+    motion = random_motion(robot, np.random.default_rng(1), 30)
     tau = model.torque(motion)
     bound = 1e-9 * np.abs(tau).max()
     in_mujoco = mujoco_torque(arm_mjcf(model).text, robot, motion)
@@ -147,7 +147,7 @@ def test_exports_agree_with_the_model_file_friction_and_rotors_included(robot, t
 
 def test_damping_and_armature_act_in_mujoco():
     robot = load_robot('humanoid_arm')
-    motion = random_motion(robot, 30, np.random.default_rng(1))
+    motion = random_motion(robot, np.random.default_rng(1), 30)
     damping, armature = (dict.fromkeys(robot.joints, value) for value in (0.3, 0.02))
     tau = inverse_dynamics(robot, motion) + 0.3 * motion.dq + 0.02 * motion.ddq
     mjcf, _ = export_mjcf(robot, damping=damping, armature=armature)

@@ -99,20 +99,18 @@ def test_a_summary_that_is_damaged_is_not_believed(bag):
     np.testing.assert_array_equal(got.q, recording.q)
 
 
-def test_counts_of_metadata_are_compared(make_swing, tmp_path):
+@pytest.mark.parametrize(
+    ('old', 'new', 'damage'),
+    [
+        ('count: 300', 'count: 310', 'counts 310 messages of /joint_states, there are 300'),
+        ('name: /joint_states', 'name: /other', 'counts 300 messages of /other, there are none'),
+    ],
+)
+def test_counts_and_topics_of_metadata_are_compared(make_swing, tmp_path, old, new, damage):
     write_recording(tmp_path / 'bag', make_swing(300))
     metadata = tmp_path / 'bag' / 'metadata.yaml'
-    metadata.write_text(metadata.read_text().replace('message_count: 300', 'message_count: 310'))
-    got = read_recording(tmp_path / 'bag', joints=JOINTS)
-    assert 'metadata.yaml counts 310 messages of /joint_states, there are 300' in got.report.damage
-
-
-def test_a_topic_of_metadata_that_the_files_do_not_have_is_said(make_swing, tmp_path):
-    write_recording(tmp_path / 'bag', make_swing(300))
-    metadata = tmp_path / 'bag' / 'metadata.yaml'
-    metadata.write_text(metadata.read_text().replace('name: /joint_states', 'name: /other'))
-    got = read_recording(tmp_path / 'bag', joints=JOINTS)
-    assert 'counts 300 messages of /other, there are none' in got.report.damage
+    metadata.write_text(metadata.read_text().replace(old, new))
+    assert damage in read_recording(tmp_path / 'bag', joints=JOINTS).report.damage
 
 
 def test_a_message_of_2_63_bytes_or_less_than_its_head_is_no_message(make_swing, tmp_path):

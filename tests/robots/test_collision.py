@@ -224,6 +224,7 @@ class TestHumanoidArm:
     def test_it_hangs_beside_the_torso(self, name: str) -> None:
         model = collision_model(load_robot(name))
         assert model.notes == ()
+        assert model.excluded == 'humanoid_arm.srdf excludes 4 pairs of links'
         hanging = model.distance(np.radians((90.0, -90.0, 0.0, 0.0, 0.0, 0.0)))
         assert hanging.distance == pytest.approx(0.25 - 0.16 - 0.05, abs=1e-6)
         assert 'torso' in hanging.links

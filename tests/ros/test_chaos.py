@@ -18,7 +18,6 @@ import os
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
-from armid_ros.motion import Motion
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.robots import load_robot
 import numpy as np
@@ -26,7 +25,7 @@ import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from tests.ros.test_online_identifier import EFFECT, message, PENDULUM, RATE, spoil
+from tests.ros.test_online_identifier import EFFECT, message, PENDULUM, RATE, spoil, two_sines
 
 pytestmark = pytest.mark.long
 
@@ -103,19 +102,10 @@ class World:
 
     def states(self, count):
         """Return the next joint states of the motion."""
-        t = (self.k + np.arange(count))[:, np.newaxis] / RATE
+        motion = two_sines(self.arm, (self.k + np.arange(count)) / RATE, 0.37)
         self.k += count
-        w, phase = np.array([3.1, 4.3]), np.array([0.0, 1.0])
-        q, dq, ddq = (
-            sum(
-                a * (f * w) ** order * np.sin(f * w * t + phase + order * np.pi / 2.0)
-                for a, f in ((1.0, 1.0), (0.4, 0.37))
-            )
-            for order in range(3)
-        )
-        tau = self.arm.torque(Motion(self.arm.robot.joints, t[:, 0], q, dq, ddq))
-        tau = tau + NOISE * self.rng.normal(size=tau.shape)
-        rows = zip(t[:, 0] + self.offset, q, dq, tau, strict=True)
+        tau = motion.tau + NOISE * self.rng.normal(size=motion.q.shape)
+        rows = zip(motion.t + self.offset, motion.q, motion.dq, tau, strict=True)
         return [message(self.arm.robot.joints, *row) for row in rows]
 
     def send(self, batch):

@@ -9,15 +9,22 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+import time
 
 from armid_ros.excitation import save_excitation
+from armid_ros.nodes.lockstep import EPOCH_NS
+from armid_ros.nodes.qos import STREAM
 from armid_ros.recording import topics
 import pytest
+from sensor_msgs.msg import JointState
 import yaml
 
+from tests.ros.controller import seconds_of
 from tests.ros.launching import declared, LAUNCH, launched, modules
 from tests.ros.test_processes import short_excitation
 
+#: Of /clock, in lock step [ns].
+STEP_NS = 10**7
 CONFIG = LAUNCH.parent / 'config' / 'real_robot.yaml'
 
 
@@ -82,8 +89,26 @@ def test_torque_from_elsewhere_is_what_everybody_hears():
     assert dict(nodes['joint_state_merger'].remappings)['joint_states'] == 'arm/joint_states'
 
 
+def step_together(bench, arms, done):
+    """Let /clock go on when all arms have published what it was, and no faster than time."""
+    states = [bench.listen(JointState, f'/{arm}/joint_states', STREAM) for arm in arms]
+    begun, now = time.monotonic_ns(), EPOCH_NS
+
+    def stepped():
+        behind = [
+            one for one in states if one and seconds_of(one[-1].header.stamp) < 1e-9 * now - 1e-6
+        ]
+        return done() or (not behind and time.monotonic_ns() - begun >= now - EPOCH_NS)
+
+    while not done():
+        bench.tick(now)
+        bench.spin_until(stepped, f'the states of all arms at {now}')
+        now += STEP_NS
+
+
 @pytest.mark.long
-def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_path):
+@pytest.mark.parametrize('lock_step', [False, True])
+def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_path, lock_step):
     """As two `ros2 launch ... simulate:=true`, each node a process, with arms that are quick."""
     save_excitation(short_excitation(), tmp_path / 'run.yaml')
     environment = {
@@ -103,6 +128,7 @@ def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_p
             file=str(tmp_path / 'run.yaml'),
             save_to=str(folder / 'result'),
             runs='1',
+            use_sim_time=str(lock_step),
         )
         for name, node in nodes.items():
             command = [sys.executable, '-m', f'armid_ros.nodes.{name}', *node.arguments(folder)]
@@ -111,6 +137,11 @@ def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_p
                     command, env=environment, stdout=output, stderr=subprocess.STDOUT
                 )
     try:
+        if lock_step:
+            runs = [running[arm, 'identification_run'] for arm in ('left', 'right')]
+            step_together(
+                bench, ('left', 'right'), lambda: all(p.poll() is not None for p in runs)
+            )
         for arm in ('left', 'right'):
             log = tmp_path / arm / 'identification_run.log'
             assert running.pop((arm, 'identification_run')).wait(300) == 0, log.read_text()

@@ -48,16 +48,25 @@ def arm():
     return arm.with_effect(*parse_effect(EFFECT, arm.robot))
 
 
+def two_sines(arm, t, factor):
+    """Return a motion of two sines, the second one of a frequency so many times the first."""
+    w, phase = np.array([3.1, 4.3]), np.array([0.0, 1.0])
+    states = (
+        sum(
+            a * (f * w) ** order * np.sin(f * w * t[:, None] + phase + order * np.pi / 2.0)
+            for a, f in ((1.0, 1.0), (0.4, factor))
+        )
+        for order in range(3)
+    )
+    motion = Motion(arm.robot.joints, t, *states)
+    return motion.with_torque(arm.torque(motion))
+
+
 @pytest.fixture(scope='module')
 def samples(arm):
     """Return an exact motion of 4 s: t, q, dq, tau."""
-    t = np.arange(0.0, 4.0, 1.0 / RATE)[:, np.newaxis]
-    w, phase = np.array([3.1, 4.3]), np.array([0.0, 1.0])
-    q = np.sin(w * t + phase) + 0.4 * np.sin(2.3 * w * t)
-    dq = w * np.cos(w * t + phase) + 0.4 * 2.3 * w * np.cos(2.3 * w * t)
-    ddq = -(w**2) * np.sin(w * t + phase) - 0.4 * (2.3 * w) ** 2 * np.sin(2.3 * w * t)
-    motion = Motion(arm.robot.joints, t[:, 0], q, dq, ddq)
-    return t[:, 0], q, dq, arm.torque(motion)
+    motion = two_sines(arm, np.arange(0.0, 4.0, 1.0 / RATE), 2.3)
+    return motion.t, motion.q, motion.dq, motion.tau
 
 
 def message(joints, t, q, dq, tau):

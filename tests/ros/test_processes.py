@@ -180,25 +180,25 @@ def test_a_publisher_that_designs_is_ended_at_once(bench, processes):
     assert not heard
 
 
-def test_what_a_killed_recorder_leaves_is_read(bench, processes, tmp_path):
-    bag = tmp_path / 'bag'
+def recorder_at_work(bench, processes, bag):
     recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
     processes.start('simulated_arm', 'rate:=1000.0')
     bench.spin_until(
         lambda: any(f.stat().st_size > 50_000 for f in bag.glob('*.mcap')), 'the recording'
     )
-    processes.end(recorder, signal.SIGKILL)
+    return recorder
+
+
+def test_what_a_killed_recorder_leaves_is_read(bench, processes, tmp_path):
+    bag = tmp_path / 'bag'
+    processes.end(recorder_at_work(bench, processes, bag), signal.SIGKILL)
     recording = read_recording(bag, joints=load_robot('humanoid_arm').joints)
     assert len(recording) > 100 and recording.report.damage
 
 
 def test_a_recorder_whose_terminal_is_closed_completes_its_bag(bench, processes, tmp_path):
     bag = tmp_path / 'bag'
-    recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
-    processes.start('simulated_arm', 'rate:=1000.0')
-    bench.spin_until(
-        lambda: any(f.stat().st_size > 50_000 for f in bag.glob('*.mcap')), 'the recording'
-    )
+    recorder = recorder_at_work(bench, processes, bag)
     errors = processes.end(recorder, signal.SIGHUP)
     assert recorder.returncode == 1
     assert 'SIGHUP' in errors.strip().splitlines()[-1]

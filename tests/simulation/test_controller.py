@@ -14,7 +14,7 @@ from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, si
 import numpy as np
 import pytest
 
-MIDDLE = np.array([0.3, -0.4, 0.2, 0.8, 0.1, 0.2])
+from tests.simulation.test_run import MIDDLE, swinging
 
 
 def with_friction(robot: Robot) -> ArmModel:
@@ -25,17 +25,10 @@ def with_friction(robot: Robot) -> ArmModel:
     )
 
 
-def swinging(robot: Robot, duration: float = 4.0) -> Reference:
-    t = np.linspace(0.0, duration, 81)[:, np.newaxis]
-    w = np.linspace(1.5, 4.0, robot.n_joints)
-    q = MIDDLE + 0.3 * np.cos(w * t)
-    return Reference(
-        robot.joints, t[:, 0], q, -0.3 * w * np.sin(w * t), -0.3 * w**2 * np.cos(w * t)
-    )
-
-
 def test_computed_torque_of_the_true_arm_tracks_to_a_tenth_of_a_milliradian(humanoid) -> None:
-    run = simulate(with_friction(humanoid), swinging(humanoid), rng=np.random.default_rng(0))
+    run = simulate(
+        with_friction(humanoid), swinging(humanoid, 4.0, 81), rng=np.random.default_rng(0)
+    )
     assert np.abs(run.truth.q - run.reference.q).max() < 1.5e-4
     np.testing.assert_array_equal(run.saturated, 0.0)
 
@@ -94,10 +87,12 @@ def test_spring_and_damper_sag_under_a_gravity_they_do_not_know(humanoid) -> Non
 
 
 def test_drives_give_no_more_torque_than_they_have(humanoid) -> None:
-    needed = simulate(ArmModel(humanoid), swinging(humanoid), rng=np.random.default_rng(0))
+    needed = simulate(
+        ArmModel(humanoid), swinging(humanoid, 4.0, 81), rng=np.random.default_rng(0)
+    )
     limit = 0.8 * np.abs(needed.truth.tau).max(axis=0)
     weak = ArmModel(replace(humanoid, torque_limit=limit))
-    run = simulate(weak, swinging(humanoid), rng=np.random.default_rng(0))
+    run = simulate(weak, swinging(humanoid, 4.0, 81), rng=np.random.default_rng(0))
     assert np.all(np.abs(run.truth.tau) <= limit)
     assert np.any(run.saturated > 0.0)
     assert np.abs(run.truth.q - run.reference.q).max() > 1e-3

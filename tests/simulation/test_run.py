@@ -30,8 +30,8 @@ def arm(humanoid) -> ArmModel:
     return arm
 
 
-def swinging(robot: Robot, duration: float = 3.0) -> Reference:
-    t = np.linspace(0.0, duration, 61)[:, np.newaxis]
+def swinging(robot: Robot, duration: float = 3.0, count: int = 61) -> Reference:
+    t = np.linspace(0.0, duration, count)[:, np.newaxis]
     w = np.linspace(1.5, 4.0, robot.n_joints)
     q = MIDDLE + 0.3 * np.cos(w * t)
     return Reference(

@@ -173,13 +173,14 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     metavar='BAG',
     help='A bag recorded already: add most to what it tells. May be given several times.',
 )
-@click.option('--starts', default=4, show_default=True, help='Number of random restarts.')
+@click.option(
+    '--starts', type=click.IntRange(min=1), help='Random restarts; 4, above 20 joints 1.'
+)
 @click.option('--iterations', default=150, show_default=True, help='Of each search.')
 @click.option(
     '--time-budget',
-    default=120.0,
-    show_default=True,
-    help='At most so much processor time in each search process [s].',
+    type=click.FloatRange(min=0.0),
+    help='At most so much processor time in each search process [s]; 120, above 20 joints 25.',
 )
 @parameters.gravity
 @parameters.joints
@@ -245,7 +246,7 @@ def excite(
     arm, other = _arms(robot, model, effects, focus, texts, rival)
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
-    settings |= {
+    settings = {name: value for name, value in settings.items() if value is not None} | {
         'focus': tuple(name.partition('@')[0] for name in parted(focus) if name),
         'acceleration': limits,
         'noise': options.per_joint(torque_noise, robot, '--torque-noise'),
@@ -305,16 +306,16 @@ def _shown(
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
     """Load the robot; joints that belong to no arm are driven where they are named only."""
     from armid_ros.cli import options
-    from armid_ros.robots import joints_beside_arms
+    from armid_ros.files.cells import listed
+    from armid_ros.robots import load_arms
 
-    robot = options.open_robot(source, gravity, joints, bags)
-    others = () if joints else joints_beside_arms(robot)
-    if not others:
-        return robot
-    names = ','.join(joint for joint in robot.joints if joint not in others)
-    robot = options.open_robot(source, gravity, names, bags)
-    drives = f'{", ".join(others)}; --joints A,B,... drives them'
-    say(f'not driven, as they belong to no arm: {drives}', 'yellow')
+    robot, others = load_arms(
+        lambda names: options.open_robot(source, gravity, names, bags),
+        listed(joints) if joints else None,
+    )
+    if others:
+        drives = f'{", ".join(others)}; --joints A,B,... drives them'
+        say(f'not driven, as they belong to no arm: {drives}', 'yellow')
     return robot
 
 

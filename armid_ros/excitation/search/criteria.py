@@ -13,6 +13,7 @@ its gradient by the information matrix.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import ParameterName
@@ -80,7 +81,7 @@ class Information:
         values = np.linalg.eigvalsh(self.matrix)
         return float(np.sqrt(values[-1] / values[0])) if values[0] > 0 else np.inf
 
-    @property
+    @cached_property
     def std(self) -> FloatArray:
         """Predicted standard deviation of each parameter, shape (r,); inf where not seen."""
         diagonal = np.sqrt(np.diag(self.matrix))
@@ -92,7 +93,7 @@ class Information:
         variance = (vectors[:, visible] ** 2 / values[visible]).sum(axis=1)
         blind = (vectors[:, ~visible] ** 2).sum(axis=1) > np.sqrt(_BLIND)
         std[seen] = np.where(blind, np.inf, np.sqrt(variance)) / diagonal[seen]
-        return std
+        return read_only(std)
 
 
 @dataclass(frozen=True)

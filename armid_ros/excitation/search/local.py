@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import math
 
 from armid_ros.excitation.feasibility import Faults, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
@@ -43,6 +44,9 @@ _CHECK = 200
 #: Poses in which a pair of bodies has to come nearer than the margin and this [m] for the solver
 #: to look at it; the proof of clearance looks at all.
 _POSES, _WATCHED = 1000, 0.01
+
+#: Joints up to which a search draws all its candidates; the time of each grows with the joints.
+_CANDIDATE_JOINTS = 10
 
 #: Factor by which a trajectory that is not quite feasible is made smaller, and how often.
 _SHRINK, _SHRINKS = 0.99, 12
@@ -158,7 +162,8 @@ def _best_of_random(
     best: _Best,
 ) -> FourierTrajectory:
     settings = problem.settings
-    for _ in range(settings.candidates):
+    share = min(1.0, _CANDIDATE_JOINTS / problem.arm.robot.n_joints)
+    for _ in range(math.ceil(share * settings.candidates)):
         best.offer(
             random_feasible(
                 problem.arm,

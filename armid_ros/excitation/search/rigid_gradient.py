@@ -128,16 +128,10 @@ class RigidRegressor:
         # [k, m, j]: derivative by the axis of j as body m and those beyond it see it
         seen = np.einsum('mi,kijc->kmjc', chain.carries, by_axes)
         before = (chain.carries - np.eye(n)).T[:, :, np.newaxis]  # j carries m, j is not m
-        by_q += _axes_part(axes, seen * before)
+        across = motion_cross(axes[:, :, np.newaxis], axes[:, np.newaxis])  # S_m x S_j
+        by_q -= np.einsum('kmjc,kmjc->km', seen * before, across)
         by_dq = _dot(total_v, axes) + _dot(bent, axes) - 2.0 * _dot(total_a, turned_v)
         return by_q, by_dq, _dot(total_a, axes)
-
-
-def _axes_part(axes: FloatArray, seen: FloatArray) -> FloatArray:
-    """Return - sum_j <seen_mj, S_m x S_j>, shape (N, n)."""
-    return -np.asarray(
-        np.einsum('kmjc,kmjc->km', seen, motion_cross(axes[:, :, np.newaxis], axes[:, np.newaxis]))
-    )
 
 
 def _dot(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -20,7 +20,6 @@ from typing import Literal
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.checks import (
     effort_unit,
-    FOLLOWS,
     torque_factors,
     TORQUE_UNITS,
     unit_of,
@@ -38,6 +37,8 @@ _FINER = (-15.0, 15.0)
 _STRONGEST = 24.8
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
+#: Correlation from which the factor of a joint is known: it leaves 15 % of the torque at most.
+_CLEAR = 0.989
 
 Quantity = Literal['position', 'torque', 'position and torque']
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
@@ -273,19 +274,22 @@ def other_scale(
     def detailed(motions: Sequence[Motion]) -> Hypothesis:
         torques = [motion.tau for motion in motions if motion.tau is not None]
         factors, correlation = torque_factors(robot, motions, torques)
-        clear = np.where(correlation > FOLLOWS, factors, np.nan)
+        clear = np.where(correlation > _CLEAR, factors, np.nan)
         return other_scale(robot, factor, tuple(clear))
 
     unit = unit_of(factor, [one for one in of_joints if one > 0.0])
-    gains = ','.join(
-        f'{1.0 / (one if one > 0.0 else factor or np.inf):.3g}' for one in of_joints or (factor,)
-    )
     text = (
         f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
         if unit
         else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
-        f'currents, or wrong masses in the description; for currents give --current-gain {gains}'
+        'currents, or wrong masses in the description'
     )
+    known = np.array(of_joints) > 0.0
+    if known.any() and not unit:
+        gains = ','.join(f'{1.0 / one:.3g}' if one > 0.0 else '?' for one in of_joints)
+        hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
+        text += f'; for currents give --current-gain {gains}, as exact as those masses'
+        text += f'; that of {hidden} is not determined' if hidden else ''
     return Hypothesis(
         'scale',
         text,

@@ -127,13 +127,13 @@ def factors_apart(
     if all(in_unit) or all(1.0 / _GAINS < factors[k] < _GAINS for k in clear):
         return ''
     named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear)
-    common = float(np.exp(np.mean(np.log(factors[clear]))))
-    gains = ','.join(f'{1.0 / (factor or common):.3g}' for factor in factors)
+    gains = ','.join(f'{1.0 / factor:.3g}' if factor > 0.0 else '?' for factor in factors)
+    lacking = '' if len(clear) == len(factors) else '; ?: not determined by these data'
     then = 'the baseline' if before else 'the model'
     return (
         f'torques are those of {then} times {named}: one of the two is in other units than N m '
         '(currents? drivers change from one to the other with their version): convert each joint '
-        f'by its own gain, as with --current-gain {gains}'
+        f'by its own gain, as with --current-gain {gains}{lacking}'
     )
 
 

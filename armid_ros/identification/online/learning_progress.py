@@ -82,7 +82,7 @@ class LearningProgress:
     """
 
     def __init__(self, arm: ArmModel, base: BaseParameters, rng: np.random.Generator) -> None:
-        motion = random_motion(arm.robot, _STATES, rng)
+        motion = random_motion(arm.robot, rng, _STATES)
         columns = arm.columns(motion)[:, :, base.independent]
         self._rigid = np.sqrt(np.mean(inverse_dynamics(arm.robot, motion) ** 2, axis=0))
         self._size = np.sqrt(np.mean(columns**2, axis=0))
@@ -140,9 +140,6 @@ def too_little_motion(unlearned: Sequence[Unlearned]) -> str:
 
 
 def _word(parameter: ParameterName) -> str:
-    words = {
-        'viscous_coefficient': 'viscous friction',
-        'coulomb_torque': 'Coulomb friction',
-    }
+    words = {'viscous_coefficient': 'viscous friction', 'coulomb_torque': 'Coulomb friction'}
     rigid = _WORDS.get(parameter.unit) if parameter.name[:1] in 'Im' else None
     return rigid or words.get(parameter.name, parameter.name.replace('_', ' '))

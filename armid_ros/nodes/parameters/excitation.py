@@ -28,7 +28,7 @@ from armid_ros.excitation import (
     with_joint_limits,
 )
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.robots import CollisionModel, joints_beside_arms, load_robot, Robot
+from armid_ros.robots import CollisionModel, load_arms, load_robot, Robot
 import numpy as np
 
 Values = Callable[[str], Any]
@@ -136,12 +136,10 @@ def make_surroundings(value: Values) -> Surroundings:
         If there is no such file or robot, or nobody knows where its floor is.
 
     """
-    joints = tuple(filter(None, value('joints'))) or None
-    robot = load_robot(value('robot'), gravity=value('gravity'), joints=joints)
-    others = () if joints else joints_beside_arms(robot)
-    if others:
-        driven = [joint for joint in robot.joints if joint not in others]
-        robot = load_robot(value('robot'), gravity=value('gravity'), joints=driven)
+    robot, others = load_arms(
+        lambda joints: load_robot(value('robot'), gravity=value('gravity'), joints=joints),
+        tuple(filter(None, value('joints'))) or None,
+    )
     given = tuple(filter(None, value('velocity')))
     robot, acceleration = with_joint_limits(robot, value('joint_limits'), given)
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)

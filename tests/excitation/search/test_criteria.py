@@ -183,7 +183,7 @@ def test_settings_out_of_range_are_refused(settings):
 def test_information_of_two_recordings_adds_up(two_link_arm):
     rng = np.random.default_rng(0)
     problem = DesignProblem.of(two_link_arm, DesignSettings(), rng)
-    motion = random_motion(two_link_arm.robot, 60, rng)
+    motion = random_motion(two_link_arm.robot, rng, 60)
     whole = problem.information(motion).matrix
     parts = [problem.information(motion.select(s)).matrix for s in (slice(0, 20), slice(20, 60))]
     np.testing.assert_allclose(sum(parts), whole, rtol=1e-10, atol=1e-9)

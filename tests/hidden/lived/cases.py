@@ -191,9 +191,10 @@ def _record_case(draft: Draft) -> LivedCase:
     }
     reach = draft.gap(cause) if cause else 0.0
     chain = cause.bodies(arm.chain) if cause else arm.chain
+    assert robot.path is not None
     return LivedCase(
         spec=spec,
-        urdf=_path_of(robot),
+        urdf=robot.path,
         known=_known(spec, arm.wear, robot),
         day_1=tuple(r for run, r in recordings.items() if run.startswith('day_1')),
         day_2=tuple(r for run, r in recordings.items() if run.startswith('day_2')),
@@ -266,11 +267,6 @@ def draw_case(spec: LivedSpec) -> Draft:
     if spec.second_of_pair:
         return replace(draft, cause=draw_case(specify(spec.kind, spec.index - 1)).cause)
     return replace(draft, cause=_draw_cause(draft, described))
-
-
-def _path_of(robot: Robot) -> FilePath:
-    assert robot.path is not None
-    return robot.path
 
 
 def _truth(cause: Cause | None) -> tuple[Truth, ...]:

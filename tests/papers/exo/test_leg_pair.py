@@ -31,7 +31,7 @@ def pair() -> TiedPair:
 @pytest.fixture(scope='module')
 def motions(pair) -> PairMotion:
     rng = np.random.default_rng(0)
-    own, other = (random_motion(robot, 40, rng) for robot in (pair.robot, pair.other))
+    own, other = (random_motion(robot, rng, 40) for robot in (pair.robot, pair.other))
     return PairMotion(own, other)
 
 

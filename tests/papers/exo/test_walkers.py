@@ -28,7 +28,7 @@ def test_a_swing_leg_takes_the_same_torque_from_either_root(name) -> None:
     """Hips that hold still: a leg does not know what carries them."""
     standing, free = load_robot(name), walker(load_robot(name))
     rng = np.random.default_rng(1)
-    leg = random_motion(standing, 20, rng)
+    leg = random_motion(standing, rng, 20)
     legs = [standing.index(j) for j in standing.joints if 'swing' in j]
     parts = np.zeros((3, 20, standing.n_joints))
     hung = np.zeros((3, 20, free.n_joints))
