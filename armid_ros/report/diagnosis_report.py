@@ -193,7 +193,8 @@ def _verdict(
             f'before in {", ".join(worse)}; see Forward validation.'
         )
     summary = _printed(with_names(diagnosis.summary, names))
-    return VerdictSection(diagnosis.verdict.replace('_', ' '), tone, [summary], notes)
+    badge = 'cause found' if diagnosis.verdict == 'named' else diagnosis.verdict.replace('_', ' ')
+    return VerdictSection(badge, tone, [summary], notes)
 
 
 def _printed(text: str) -> str:

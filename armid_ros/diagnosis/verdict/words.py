@@ -143,7 +143,8 @@ def decide(
     if tied:
         return Verdict('ambiguous', f'{said}{tied}')
     refit = _refit(as_it_is, arm.robot, floor_in_words)
-    return Verdict('named', f'{refit}{said} The remaining error is {floor_in_words}.')
+    remains = floor_in_words if hides is None else 'as large as before the change'
+    return Verdict('named', f'{refit}{said} The remaining error is {remains}.')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:

@@ -52,7 +52,7 @@ def sentences(found: Reproduction) -> tuple[str, ...]:
                 f'Table {one.table.number}, {one.table.title}: the error over noise is at most '
                 f'{digits(float(slow.max()))} by the weight alone, '
                 f'{digits(float(whole.max()))} with the whole dynamics. The paper has '
-                f'{low} to {high}.'
+                f'{low} to {high}: less is better.'
             )
             continue
         noisy = one.ratio(one.methods[0].noisy)

@@ -290,9 +290,7 @@ def test_currents_are_no_unit_and_have_the_gain_of_each_joint(robot, sound):
     gains = np.array([13.3, 11.1, 10.6, 9.5, 12.0, 11.0])
     said = mistake_in(robot, replace(sound, tau=sound.tau / gains))
     assert 'kgf' not in said and 'currents' in said
-    stated, hidden = re.search(
-        r'--current-gain (\S+), as exact as those masses; that of (.+) is not', said
-    ).groups()
+    stated, hidden = re.search(r'--current-gain (\S+), .*; that of (.+) is not', said).groups()
     known = {k: float(one) for k, one in enumerate(stated.split(',')) if one != '?'}
     np.testing.assert_allclose(list(known.values()), gains[list(known)], rtol=0.1)
     assert set(hidden.split(', ')) == set(robot.joints[4:])
