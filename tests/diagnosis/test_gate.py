@@ -105,11 +105,11 @@ def test_currents_since_a_baseline_in_newton_metres_are_named_with_their_gains(u
     if inverse:
         arm = ArmModel(arm.robot.with_inertias(arm.robot.rigid_parameters / 11.0), arm.effects)
     (said,) = faults_since(arm, now, before)
-    stated = said.split('--current-gain ')[1].split(',')
+    stated = said.split('--current-gain ')[1].split(';')[0].split(',')
     known = [name in said.split('--current-gain')[0] for name in arm.robot.joints]
     expected = 1.0 / gains if inverse else gains
     assert 'currents?' in said and sum(known) >= 2
-    np.testing.assert_allclose(np.array(stated, dtype=float)[known], expected[known], rtol=0.1)
+    np.testing.assert_allclose(np.array(stated)[known].astype(float), expected[known], rtol=0.1)
 
 
 def test_masses_in_grams_are_no_unit_of_torques_that_are_as_before(bench):

@@ -100,7 +100,7 @@ def test_friction_of_a_model_without_any_is_nothing_to_look_at():
 def test_what_may_stand_in_its_place_is_looked_at_as_well():
     steps = next_steps(diagnosis('payload', ('wrist',), LINK, 'ambiguous'))
     assert 'link inertia' in steps[1] and 'wrist' in steps[1]
-    assert 'No motion' in steps[2] and 'weigh' in steps[2]
+    assert 'No motion' in steps[2] and 'Weigh' in steps[2]
 
 
 def test_loads_of_two_links_are_told_by_a_recording_that_names_their_joints():

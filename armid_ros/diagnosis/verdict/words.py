@@ -23,8 +23,8 @@ Word = Literal[
 ]
 #: A sentence with more joints than this only counts them; tables have the rest.
 _JOINTS_SAID = 3
-#: Nouns that take an article: a payload, but viscous friction.
-_COUNTED = {'payload', 'spring', 'offset', 'delay', 'tilt', 'limit', 'gain', 'coupling', 'change'}
+#: Nouns that take an article: a spring, but viscous friction.
+_COUNTED = {'spring', 'offset', 'delay', 'tilt', 'limit', 'gain', 'coupling', 'change'}
 #: What a share is of, where something is named and where nothing is.
 _GAP, _LEFT = 'the gap', 'what is left'
 
@@ -129,11 +129,11 @@ def decide(
         f'the error of {joint} {worst.where} is {larger(np.sqrt(worst.ratio.max()))} '
         f'{floor_in_words} can be{worst.more}'
     )
+    refit = _refit(as_it_is, arm.robot, floor_in_words)
     if not findings:
         if open_gap:
             return Verdict('unknown', f'Something is missing: {rest}. {_unexplained(unnamed)}')
-        text = _consistent(floor_in_words, unnamed.minor)
-        text = f'{_refit(as_it_is, arm.robot, floor_in_words)}{text}'
+        text = f'{refit}{_consistent(floor_in_words, unnamed.minor)}'
         hidden = [] if hides is None else [_could_hide(hides, unnamed.minor, arm.robot)]
         told = [suspicion(group) for group in by_cause(unnamed.suspected)]
         return Verdict('consistent', ' '.join([text, *hidden, *told]))
@@ -142,7 +142,6 @@ def decide(
         return Verdict('partial', f'{said}{tied} There is more: {rest}.')
     if tied:
         return Verdict('ambiguous', f'{said}{tied}')
-    refit = _refit(as_it_is, arm.robot, floor_in_words)
     remains = floor_in_words if hides is None else 'as large as before the change'
     return Verdict('named', f'{refit}{said} The remaining error is {remains}.')
 
@@ -303,7 +302,8 @@ def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
 def _subject(finding: Finding) -> str:
     """Return what a cause is, where, and its values."""
     words = finding.name.replace('_', ' ').replace('coulomb', 'Coulomb')
-    article = f'a{"n" if words[0] in "aeiou" else ""} ' if words.split()[-1] in _COUNTED else ''
+    counted = finding.weighs or words.split()[-1] in _COUNTED
+    article = f'a{"n" if words[0] in "aeiou" else ""} ' if counted else ''
     subject = f'{article}{words}'[:1].upper() + f'{article}{words}'[1:]
     if finding.ties:
         where = ', '.join(_tie(finding, tie.joint, tie.name) for tie in finding.ties)

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnosis in short: the arm with the joint that it is about, where, and the gap."""
+"""The diagnosis in short: the arm with the joint that it is about, where, patch, and the gap."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Story(Section):
     @property
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
-        answers = [('Where', self._where()), ('Gap', self._gap())]
+        answers = [('Where', self._where()), ('Patch', self._patch()), ('Gap', self._gap())]
         left = self.diagnosis.left
         if self.diagnosis.findings and left:
             answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in left[:_JOINTS]]))
@@ -115,6 +115,18 @@ class Story(Section):
         if gap.chi2_before[self.diagnosis.arm.robot.joints.index(joint)] > 1.0:
             return []
         return [f'In the fitted recordings only; in the held-out ones {joint} is below its floor:']
+
+    def _patch(self) -> list[str]:
+        diagnosis = self.diagnosis
+        patched = not diagnosis.harmful
+        added = [finding.name.replace('_', ' ') for finding in diagnosis.findings if patched]
+        if self._maps:
+            added.append(f'the learned residual of {", ".join(one.joint for one in self._maps)}')
+        if not added:
+            return ['The model is unchanged.']
+        fitted = diagnosis.refitted and patched
+        more = ', with rigid body and friction refitted' if fitted else ''
+        return [f'model.yaml is the model with {" and ".join(added)}{more}.']
 
     @property
     def _maps(self) -> tuple[JointResidual, ...]:

@@ -408,7 +408,7 @@ def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, soun
     assert 'wrong masses in the description' in mistake_in(nominal, sound)
     said = mistake_in(nominal, turned)
     assert 'the position of shoulder_roll seems to have the opposite sign' in said
-    assert 'the arm as fitted' in said
+    assert 'the fitted arm' in said
 
 
 def test_every_hypothesis_has_a_sentence_with_its_joints(robot, sound):
