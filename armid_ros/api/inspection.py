@@ -360,8 +360,6 @@ def check(
     """
     described = robot_of(robot)
     remarks = description_remarks(described)
-    order = ('bad', 'doubt', 'note')
-    remarks = tuple(sorted(remarks, key=lambda remark: order.index(remark.weight)))
     read = recordings_of(recordings, described)
     if not read:
         return CheckResult(described, remarks, None)

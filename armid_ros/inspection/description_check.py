@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import Identification, Score
-from armid_ros.inspection.inspect import Remark
+from armid_ros.inspection.inspect import Remark, worst_first
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 from armid_ros.robots import driven_in_words, inertia_doubts, NO_MASS, Robot
@@ -92,7 +92,7 @@ class LinkCheck:
 
 def description_remarks(robot: Robot) -> tuple[Remark, ...]:
     """
-    Check inertias, densities and limits of a description without a recording.
+    Check inertias, densities and limits of a description without a recording, the worst first.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
     found += _of_shapes(robot)
     known = {remark.text for remark in found}
     notes = dict.fromkeys([*robot.notes, *driven_in_words(robot)])
-    return (*found, *(Remark('note', note) for note in notes if note not in known))
+    return worst_first([*found, *(Remark('note', note) for note in notes if note not in known)])
 
 
 def _of_limits(robot: Robot) -> Iterator[Remark]:
@@ -170,6 +170,7 @@ def check_links(found: Identification, described: ArmModel, grade: str) -> LinkC
     changes, covariance, rest = _fit(rows, spread, wrong)
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
     covariance = covariance * max(1.0, rest / freedom)  # Birge ratio: what no link explains
+    alone = [_fit(rows, spread, [k])[2] for k in range(robot.n_joints)]
     body = robot.rigid_parameters.reshape(-1, size)[:, :4]
     measured, std = np.full((2, robot.n_joints, 4), np.nan)
     for position, k in enumerate(wrong):
@@ -190,9 +191,7 @@ def check_links(found: Identification, described: ArmModel, grade: str) -> LinkC
         mass_std=std[:, 0],
         measured_centre=measured[:, 1:],
         centre_std=std[:, 1:],
-        explains=np.array(
-            [1.0 - _fit(rows, spread, [k])[2] / total for k in range(robot.n_joints)]
-        ),
+        explains=1.0 - np.array(alone) / total,
         wrong=tuple(wrong),
         explained=1.0 - rest / total,
         error_percent=error,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import get_args, Literal
 
 from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
@@ -158,9 +158,12 @@ def inspect(
         found += [Remark('note', note) for note in trial.notes if note not in said]
     if robot is not None:
         found += [Remark('note', note) for note in robot.notes]
-    order = ('bad', 'doubt', 'note')
-    remarks = tuple(sorted(found, key=lambda remark: order.index(remark.weight)))
-    return Inspection(recording, topics, robot, sampling, joints, trial, remarks)
+    return Inspection(recording, topics, robot, sampling, joints, trial, worst_first(found))
+
+
+def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """Return remarks by weight, those of one weight in their order."""
+    return tuple(sorted(remarks, key=lambda remark: get_args(Weight).index(remark.weight)))
 
 
 def _said(text: str, others: Iterable[str]) -> bool:

@@ -84,7 +84,7 @@ class LinkTable(Section):
         'as described, or not determined by this motion. Explains: share of the difference '
         'between URDF and recording that this link explains if all others are right.'
     )
-    heads: ClassVar[Sequence[str]] = tuple(head[0].upper() + head[1:] for head in HEADS)
+    heads: ClassVar[Sequence[str]] = HEADS
 
     rows: Sequence[Sequence[str]]
 
