@@ -14,16 +14,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
-from armid_ros.diagnosis.search.candidates import candidates
+from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.choice import rows_over_noise
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.trial import Candidate
+from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.odds import CauseInformation
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
@@ -31,7 +33,9 @@ import scipy.linalg
 #: Columns of which what is free leaves less than this share add nothing.
 _LEAST_VISIBLE = 0.02
 #: Directions of a candidate with less than this share of its squares are left at zero.
-_DEPENDENT = 1e-9
+_DEPENDENT = 1e-6
+#: Standard deviation of values that are fitted freely, over their unit.
+_FREE = 1e3
 
 
 def bic_selection(
@@ -39,7 +43,7 @@ def bic_selection(
     recordings: Sequence[Recording],
     settings: DiagnosisSettings,
     rng: np.random.Generator,
-) -> list[Candidate]:
+) -> list[Cause]:
     """
     Return the candidates that lower the criterion, in the order in which they do.
 
@@ -60,46 +64,28 @@ def bic_selection(
     base, _ = excited(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)
     reference = fit(arm, (), Evidence.over_noise(data, one), base)
-    told = np.concatenate([part.informative for part in data])
-    left = np.concatenate(reference.residual)
-    alike = [np.sqrt(np.sum(left**2, axis=0, where=told) / told.sum(axis=0))] * len(data)
-    found = candidates(reference, Evidence.over_noise(data, alike), settings.kinds)
-    columns = [
-        np.concatenate(c, axis=2) for c in zip(found.columns, reference.columns, strict=True)
-    ]
-    problem = make_problem(data, alike, reference.residual, columns)
-    size = problem.x.shape[2]
-    free = list(range(size - reference.columns[0].shape[2], size))
-    rows = int(problem.used.sum())
-    flat = problem.x.reshape(-1, size)
-    whole = np.einsum('ij,ij->j', flat, flat)
-    chosen: list[Candidate] = []
+    alike = np.sqrt(Evidence.over_noise(data, one).power(reference.residual))
+    rows = rows_over_noise(Evidence.over_noise(data, [alike] * len(data)))
+    nuisance = Nuisance.of(rows, memoized_arm(arm), rng)
+    catalogue = Causes(settings.kinds, nuisance, False, frozenset())
+    pooled = Setting(True, 0.0, 0.0, 1.0, 1.0)
+    count = sum(nuisance.count)
+    chosen: list[Cause] = []
     while True:
-        projection = project(problem, free)
-        left = projection.rest(problem.y).ravel()
-        rest = projection.products(np.column_stack([flat, problem.y.ravel()]))
-        rest[-1, -1] = left @ left
-        best, candidate = _best(rest, whole, found.candidates, rows)
-        if candidate is None or best >= 0.0:
+        under = nuisance.marginal(pooled)
+        values, _ = nuisance.whole(under)
+        squares = sum(float(np.sum(nuisance.rest(values, k) ** 2)) for k in range(len(rows.today)))
+        best, cause = 0.0, None
+        for candidate in catalogue.causes(nuisance, under):
+            known = CauseInformation.of(candidate, nuisance, under, by_day=True)
+            if known.visible < _LEAST_VISIBLE:
+                continue
+            fitted = scipy.linalg.lstsq(known.matrix, known.vector, cond=_DEPENDENT)[0]
+            after = max(squares - float(fitted @ known.vector), 1e-300)
+            change = count * np.log(after / squares) + known.size * np.log(count)
+            if change < best:
+                best, cause = change, candidate
+        if cause is None:
             return chosen
-        chosen.append(candidate)
-        free += range(candidate.columns.start, candidate.columns.stop)
-
-
-def _best(
-    rest: FloatArray, whole: FloatArray, candidates: Sequence[Candidate], rows: int
-) -> tuple[float, Candidate | None]:
-    """Return the largest change of the criterion, and the candidate that makes it."""
-    best, chosen = 0.0, None
-    squares = float(rest[-1, -1])
-    for candidate in candidates:
-        span = candidate.columns
-        own, aim = rest[span, span], rest[span, -1]
-        if np.trace(own) < _LEAST_VISIBLE**2 * whole[span].sum() or np.trace(own) <= 0.0:
-            continue
-        values = scipy.linalg.lstsq(own, aim, cond=_DEPENDENT)[0]
-        after = max(squares - float(values @ aim), 1e-300)
-        change = rows * np.log(after / squares) + candidate.size * np.log(rows)
-        if change < best:
-            best, chosen = change, candidate
-    return best, chosen
+        chosen.append(cause)
+        nuisance = nuisance.and_cause(cause, _FREE)

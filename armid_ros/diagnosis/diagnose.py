@@ -150,7 +150,7 @@ def diagnose(
     asked = _Request(arm, given, prepared, known, doubt, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        found = diagnose_ties(arm, recordings, prepared, settings)
+        found = diagnose_ties(arm, recordings, prepared, settings, rng, tell)
         if found is not None:
             return _said(found, notes, asked)
     result = _said(_explainer(asked, misfit).chosen(), notes, asked)
@@ -227,10 +227,11 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
     names = Names.of(replace(chosen, explanation=explanation), unseen, arm, settings)
+    measured = RemainingMisfit(chosen, unseen, asked.before, arm, settings)
+    names = _telling(names, measured, unseen, settings)
     hardly = unseen is not None and not names.shares.predicted
     explanation, notes = names.stated, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
     found = findings(explanation, names.shares, arm, asked.rng)
-    measured = RemainingMisfit(chosen, unseen, asked.before, arm, settings)
     refitted = measured.as_it_is(explanation)
     as_it_is = measured.patched(names) if found else refitted
     worse = measured.harmed(explanation)
@@ -278,6 +279,20 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
         suspected=tuple(unnamed.suspected),
         blind=blind,
     )
+
+
+def _telling(
+    names: Names,
+    measured: RemainingMisfit,
+    unseen: Evidence | None,
+    settings: DiagnosisSettings,
+) -> Names:
+    """Return names, or none where most of a gap stays open: what is there is none of them."""
+    count = len(names.stated.steps)
+    if not count or names.shares.share(range(count)) > settings.thresholds.open_share:
+        return names
+    still = max(one.ratio.max() for one in measured.beside(names))
+    return names if still <= 1.0 else names.with_nothing_named(unseen, settings)
 
 
 def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:

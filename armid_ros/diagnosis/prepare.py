@@ -11,8 +11,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, NoiseFloor
 from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Trajectory, UNSURE
-from armid_ros.diagnosis.search.candidates import with_friction
 from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.damage import without_damage

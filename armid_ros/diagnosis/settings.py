@@ -18,39 +18,18 @@ class Thresholds:
 
     Attributes
     ----------
-    price : float
-        Share of the gap, or of what is left where a change is asked, that each value or shape of a
-        cause has to take before it counts: 50 values of a rigid body, a tenth.
-    outside : float
-        Values that a cause from outside the arm counts for beside its own: a person or a strap can
-        pull in any way.
-    error_rate : float
-        Probability of a name where nothing is, over all candidates that were tried: an alarm in
-        five hundred healthy arms.
-    rival_z : float
-        Deviations by which a name has to be ahead of another one to exclude it.
+    alarm : float
+        Log odds from which something is there, or has changed: 50 to 1.
+    alone : float
+        Log odds from which a cause may be it, where something surely is there.
     tie : float
-        Twice the share of the same by which it has to be ahead as well; share of a simpler cause,
-        in squares, that what contains it leaves at most, that a cause may lose at the bound of a
-        value, of what names make in a second that they may leave, and of a cause in all recordings
-        that one of them has to show to tell when it changed.
-    far : float
-        Lead over its own share that excludes another one however few blocks show it, and that
-        a link, which never changes, or a load of one that is not at the end of the arm has to have
-        over what happens between two days.
-    misfit_share : float
-        Power of a cause over that of the model's own misfit, summed over joints, below which it is
-        small print where recordings do not tell a change from another motion's misfit.
+        Log odds within which two causes are tied: 20 to 1.
+    inexact : float
+        Share of what a cause explains by which its law is inexact: a lead of less is none, such a
+        share may be left in a second, and a joint that has less of it is not where the gap is.
     of_state : float
         Share of a misfit, root mean square, that is a function of position, velocity and load:
         without load 0.4 to 0.8 in half of the joints of 14 arms.
-    unlikely : float
-        Probability of as large a change where nothing has changed, over all candidates that are
-        looked at, up to which one has: of 1113 candidates of 38 arms to which nothing happened
-        none has that, and none of those that would matter has ten times that.
-    usual : float
-        Degrees of freedom that what other candidates differ by from recording to recording counts
-        for: variances of candidates of one arm scatter as if they had 4, the median of 38 arms.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print; recordings hardly show causes that take less than this share of what they
@@ -62,9 +41,6 @@ class Thresholds:
     uncertain : float
         Share of the noise of a row that dry friction may be wrong by where the sign of a velocity
         is uncertain: beside reversals it is wrong by 0.5 to 2 times itself in five kinds of arms.
-    described : float
-        Share of a described friction by which it may be off; one fitted to more has changed.
-        Values of the laboratory are off by up to 0.1, friction of an arm by 0.2 in a day.
     least_visible : float
         A group of which what is free leaves less than this share of its columns is not visible.
     confidence : float
@@ -82,8 +58,6 @@ class Thresholds:
     surely : float
         Deviations that noise may make: a value may be beyond what is possible by so many, and a
         joint is worse, or held, beyond them.
-    same : float
-        Share, in squares, by which torques of causes differ that are one in other words.
     one_period : float
         Power of the difference of two periods at low frequency over that at high frequency from
         which something happened in one of them only: 3.6 at the most in 60 sets of the laboratory
@@ -92,35 +66,24 @@ class Thresholds:
         The same as the mean of three recordings or more: 2.4 at the most in those. Noise that
         lasts for 80 ms makes up to 3.7, and what happens in one period 3.7 and more: an alarm
         goes before a contact that is not seen.
-    few_causes, many_causes : int
-        Causes that are looked for in a model as given, and beside a body that is fitted anew.
 
     """
 
-    price: float = 0.002
-    outside: float = 10.0
-    error_rate: float = 0.002
-    rival_z: float = 2.0
-    tie: float = 0.02
-    far: float = 0.25
-    misfit_share: float = 1.0
+    alarm: float = 3.9
+    alone: float = 2.0
+    tie: float = 3.0
+    inexact: float = 0.02
     of_state: float = 0.6
-    unlikely: float = 0.01
-    usual: float = 4.0
     headline: float = 0.1
     same_fit: float = 1.5
     uncertain: float = 0.25
-    described: float = 0.25
     least_visible: float = 0.02
     confidence: float = 0.999
     predicted: float = 2.0
     open_share: float = 0.5
     surely: float = 3.0
-    same: float = 1e-3
     one_period: float = 8.0
     one_period_on_average: float = 3.5
-    few_causes: int = 4
-    many_causes: int = 16
 
     @property
     def other_motion(self) -> float:
@@ -165,7 +128,7 @@ class DiagnosisSettings:
 
     def without_small_print(self) -> DiagnosisSettings:
         """Return settings by which all that is there beyond chance is named."""
-        thresholds = replace(self.thresholds, misfit_share=0.0, headline=0.0)
+        thresholds = replace(self.thresholds, headline=0.0)
         return replace(self, material=0.0, everything=False, thresholds=thresholds)
 
     @property

@@ -336,10 +336,6 @@ class Effect(ABC):
 
         """
 
-    def is_correction(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """Return whether such values, each (P,), say that the description is wrong."""
-        return self.traits.corrects
-
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
         Return whether values within the bounds are what one would call by this name.

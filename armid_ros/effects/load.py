@@ -108,6 +108,10 @@ class Payload(_LinkBody):
         return PayloadChange
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+        """Return whether a body may have such values, not farther away than the arm is long."""
+        return self._weighs(values, std, arm) and not self._is_no_body(values, std, arm)
+
+    def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
         Return whether it may weigh something, not farther away than the arm is long.
 
@@ -121,7 +125,7 @@ class Payload(_LinkBody):
         heaviest = float(values[0] + SURELY * std[0])
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
-    def is_correction(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
+    def _is_no_body(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """
         Return whether no body can have such values.
 
@@ -171,7 +175,7 @@ class PayloadChange(Payload):
         It may weigh more than the links: a description often lacks what the arm held before.
 
         """
-        return super().plausible(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
+        return self._weighs(np.concatenate([np.abs(values[:1]), values[1:]]), std, arm)
 
     def named_as(self, values: FloatArray, arm: Arm) -> tuple[tuple[Effect, FloatArray], ...]:
         """Return the payload."""

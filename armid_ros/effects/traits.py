@@ -36,8 +36,6 @@ class Traits:
         Whether every joint may have it.
     friction : bool
         Whether it is friction: all friction of a joint may change at once.
-    common : bool
-        Whether joints that each have the effect of another name have it in common here.
     external : bool
         Whether it comes from outside the arm: a person, another machine.
     corrects : bool
@@ -61,7 +59,6 @@ class Traits:
     usual: bool = False
     everywhere: bool = False
     friction: bool = False
-    common: bool = False
     external: bool = False
     corrects: bool = False
     comes_and_goes: bool = False
@@ -171,7 +168,6 @@ TRAITS = {
     'friction_level': Traits(
         shown_by='constant velocities, slow to fast, in both directions',
         look_at='how warm the arm was and how long it had stood; then the grease and the seals',
-        common=True,
         friction=True,
     ),
     'gravity_magnitude': Traits(

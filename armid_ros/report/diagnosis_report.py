@@ -230,7 +230,7 @@ def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Sect
         sections.append(SmallPrint(diagnosis.minor, settings.everything, bool(diagnosis.findings)))
     if diagnosis.gap is not None:
         sizes = detectable(diagnosis.explanation)
-        sections += [CandidateTable(diagnosis, settings), CouldBeSeen(sizes)]
+        sections += [CandidateTable(diagnosis), CouldBeSeen(sizes)]
     return sections
 
 

@@ -30,7 +30,7 @@ def sprung(bench):
     """Return what explains recordings of an arm with a spring in its elbow."""
     rng = np.random.default_rng(0)
     found = diagnose(bench.arm, bench.recordings(spring), rng=rng).explanation
-    assert [step.trial.candidate.effect.name for step in found.steps] == ['joint_spring']
+    assert [step.trial.effect.name for step in found.steps] == ['joint_spring']
     return found
 
 

@@ -59,11 +59,11 @@ def test_the_size_that_shows_is_right_within_a_factor_of_four(bench, sizes, name
         assert (name in names) is there, f'{factor} times {size:.3g}: {found.summary}'
 
 
-def test_of_what_data_do_not_tell_apart_no_size_is_stated(bench, rows):
+def test_of_what_data_do_not_tell_apart_no_size_is_stated(bench, sizes):
     """An asymmetry of Coulomb friction is an offset, which is fitted beside it."""
     for joint in bench.robot.joints:
-        assert rows['asymmetric_friction', joint]['parameter'] == 'viscous_asymmetry'
-        assert rows['torque_offset', joint]['min_detectable'] < 0.01
+        assert sizes['asymmetric_friction', (joint,)]['parameter'] == 'viscous_asymmetry'
+        assert sizes['torque_offset', (joint,)]['min_detectable'] < 0.01
 
 
 def test_smooth_motion_shows_a_joint_only_if_it_is_softer(bench):

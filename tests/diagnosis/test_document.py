@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 from armid_ros.arm import Misfit
 from armid_ros.diagnosis import diagnose, diagnosis_document
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.verdict.document import smallest_size
 from armid_ros.effects import CATALOGUE
 import numpy as np
@@ -86,9 +87,14 @@ def test_torque_has_the_unit_of_its_joint(document):
 def test_a_size_that_no_arm_has_is_not_detectable(name, size, possible):
     robot = Bench().robot
     effect = CATALOGUE[name].on(robot, ('elbow',))
-    candidate = SimpleNamespace(kept=(0,), effect=effect, robot=robot)
-    trial = SimpleNamespace(candidate=candidate, std=[size / 5.0], resolution=[1.0])
-    found = smallest_size(trial, np.zeros(1))[1]
+    trial = SimpleNamespace(
+        named=SelectedEffect(effect, (0,)),
+        effect=effect,
+        std=[size / 5.0],
+        resolution=[1.0],
+        least=[0.0],
+    )
+    found = smallest_size(trial, robot)[1]
     assert found == pytest.approx(size) if possible else found == np.inf
 
 

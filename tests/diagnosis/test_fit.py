@@ -3,9 +3,9 @@
 """The fit of what was named."""
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
-from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest

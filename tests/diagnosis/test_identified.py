@@ -10,8 +10,8 @@ from armid_ros.diagnosis.data.baseline import described_precision, excited, Iden
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import identify, SignalSettings

@@ -10,8 +10,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -60,11 +60,7 @@ def doubtful(named):
     """Return the same with two other names left possible, as poorer data would."""
     (step,) = named.explanation.steps
     rivals = [
-        next(
-            t
-            for t in named.explanation.survey.ranking
-            if t.candidate.key[:2] == (name, ('elbow',))
-        )
+        next(t for t in named.explanation.survey.ranking if t.key[:2] == (name, ('elbow',)))
         for name in ('encoder_offset', 'torque_drift')
     ]
     steps = (replace(step, rivals=tuple(rivals)),)
@@ -91,7 +87,7 @@ def test_a_provisional_name_is_held_against_the_next_best(bench):
     alone = replace(found.explanation, steps=(replace(step, rivals=()),))
     run = next_run(replace(found, verdict='partial', explanation=alone), np.random.default_rng(1))
     assert {pair.name for pair in run.separations} == {'quadratic_friction'}
-    ranking = [t.candidate.effect.name for t in step.ranking]
+    ranking = [t.effect.name for t in step.ranking]
     assert {pair.rival for pair in run.separations} <= set(ranking) - {'quadratic_friction'}
 
 
@@ -168,7 +164,7 @@ def test_what_was_chosen_is_about_the_best_that_there_is(bench, doubtful, chosen
     clearance = ClearanceModel.of(collision_model(bench.robot))
     rng = np.random.default_rng(4)
     (own,) = doubtful.explanation.fitted.named
-    rivals = [t.candidate.effect for t in doubtful.explanation.steps[0].rivals]
+    rivals = [t.effect for t in doubtful.explanation.steps[0].rivals]
     worths = []
     for template in templates(('elbow',)):
         trajectory = template.draw(bench.arm, clearance, rng)

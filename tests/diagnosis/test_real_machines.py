@@ -8,8 +8,8 @@ from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.papers.elastic.identification.transmission import fit_transmission
 from armid_ros.recording import read_recording
@@ -65,7 +65,19 @@ def test_the_coupled_wrist_of_a_tx40(real_data, tmp_path):
     assert {'joint_5', 'joint_6'} <= set(wrist.joints)
 
 
-@pytest.mark.parametrize('name', ['viscous_friction', 'coulomb_friction', 'asymmetric_friction'])
+@pytest.mark.parametrize(
+    'name',
+    [
+        'viscous_friction',
+        'coulomb_friction',
+        pytest.param(
+            'asymmetric_friction',
+            marks=pytest.mark.xfail(
+                strict=True, reason='an unknown offset, which is always fitted, has its torque'
+            ),
+        ),
+    ],
+)
 def test_a_term_taken_out_of_the_model_of_a_positioning_system_is_named(real_data, tmp_path, name):
     machines = Machines(real_data, tmp_path)
     question = Question('emps', 'without', name)

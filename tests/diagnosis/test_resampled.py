@@ -4,9 +4,9 @@
 
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.deviations import with_jackknife_std
 from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.held_out import with_jackknife_std
-from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning

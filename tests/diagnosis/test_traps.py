@@ -10,11 +10,11 @@ The data and the library are the same for both; what differs is the one step tha
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.baseline import excited
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.rows import make_problem, project
-from armid_ros.diagnosis.search.candidates import candidates
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.choice import rows_over_noise
+from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.odds import CauseInformation
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
 import numpy as np
 import pytest
@@ -44,26 +44,20 @@ def shaken(recordings, size, seed):
 
 def significant(arm, data, sigma, names):
     """Return the most significant of some effects by chi squared, if it is at 5 % of them all."""
-    base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
-    evidence = Evidence.over_noise(data, sigma)
-    reference = fit(arm, (), evidence, base)
-    found = candidates(reference, evidence, [CATALOGUE[name] for name in names])
-    pairs = zip(found.columns, reference.columns, strict=True)
-    columns = [np.concatenate(pair, axis=2) for pair in pairs]
-    problem = make_problem(data, sigma, reference.residual, columns)
-    size = problem.x.shape[2]
-    free = range(size - reference.columns[0].shape[2], size)
-    projection = project(problem, free)
-    left = projection.rest(problem.y).ravel()
+    nuisance = Nuisance.of(
+        rows_over_noise(Evidence.over_noise(data, sigma)), arm, np.random.default_rng(0)
+    )
+    under = nuisance.marginal(Setting(True, 0.0, 0.0, 1.0, 1.0))
+    kinds = tuple(CATALOGUE[name] for name in names)
+    causes = Causes(kinds, nuisance, False, frozenset()).causes(nuisance, under)
     p = {}
-    for candidate in found.candidates:
-        columns = projection.rest(problem.x[:, :, candidate.columns]).reshape(-1, candidate.size)
-        aim = columns.T @ left
-        gain = float(np.linalg.lstsq(columns.T @ columns, aim, rcond=1e-9)[0] @ aim)
-        name = candidate.effect.name
-        p[name] = min(p.get(name, 1.0), float(stats.chi2.sf(gain, candidate.size)))
+    for cause in causes:
+        known = CauseInformation.of(cause, nuisance, under, by_day=True)
+        gain = float(known.vector @ np.linalg.lstsq(known.matrix, known.vector, rcond=1e-6)[0])
+        name = cause.effect.name
+        p[name] = min(p.get(name, 1.0), float(stats.chi2.sf(gain, known.size)))
     best = min(p, key=p.get)
-    return best if p[best] < 0.05 / len(found.candidates) else None
+    return best if p[best] < 0.05 / len(causes) else None
 
 
 FRICTION = (

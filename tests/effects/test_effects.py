@@ -93,10 +93,10 @@ def test_a_body_may_be_a_payload_and_one_lighter_about_its_axis_than_a_point_may
     inertia = pin.Inertia(rng.uniform(0.5, 5.0), centre, 1e-3 * thin @ thin.T)
     values = inertia.toDynamicParameters()
     std = np.full(10, 1e-6)
-    assert not effect.is_correction(values, std, arm)
+    assert effect.plausible(values, std, arm)
     nothing = np.concatenate([values[:4], 0.1 * values[4:]])
-    assert effect.is_correction(nothing, std, arm)
-    assert not effect.is_correction(nothing, np.abs(values), arm)
+    assert not effect.plausible(nothing, std, arm)
+    assert effect.plausible(nothing, np.abs(values), arm)
 
 
 def test_a_body_on_a_lift_has_inertia_and_its_rotor_a_mass():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import re
 from types import SimpleNamespace
 
-from armid_ros.diagnosis import diagnose, diagnosis_document, DiagnosisSettings
+from armid_ros.diagnosis import diagnose, diagnosis_document
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -204,13 +204,13 @@ def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):
 
 def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
     ranking = found.explanation.survey.ranking
-    rows = CandidateTable(found, DiagnosisSettings()).rows
+    rows = CandidateTable(found).rows
     assert rows[0].named
     assert all(float(row.share.rstrip(' %')) <= 100.0 for row in rows)
     negative = [
         row
         for row, trial in zip(rows, ranking, strict=False)
-        if np.all(trial.candidate.effect.bounds()[0] >= 0.0) and row.value.startswith('-')
+        if np.all(trial.effect.bounds()[0] >= 0.0) and row.value.startswith('-')
     ]
     assert not negative
     shown = re.sub('<[^>]*>', '', re.sub('<script.*?</script>', '', html[html.index('<main>') :]))

@@ -115,12 +115,6 @@ class Evidence:
         rows = np.concatenate(list(self.weighted(residual)))
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
-    def split(self, weighted: FloatArray, weight: FloatArray) -> list[FloatArray]:
-        """Return weighted rows (R, n) without their weights, split by trajectory."""
-        rows = np.where(weight > 0.0, weighted / np.where(weight > 0.0, weight, 1.0), 0.0)
-        cuts = np.cumsum([len(part.rows) for part in self.data])[:-1]
-        return np.split(rows, cuts)
-
     @property
     def assumed(self) -> bool:
         """Whether nothing repeats in some of the data, so that their noise is not measured."""
@@ -164,20 +158,6 @@ class Evidence:
                 products[lag] += np.sum(rows[lag:] * rows[: len(rows) - lag], axis=0)
         correlation = products[1:] / np.maximum(products[0], 1e-300)
         return np.asarray(1.0 + 2.0 * np.sum(correlation**2, axis=0))
-
-    def least_squares(self, settings: DiagnosisSettings, misfit_share: float) -> FloatArray:
-        """
-        Return the weighted squares that a material cause removes from each joint, at least, (n,).
-
-        They are no less than a share of the squared misfit.
-
-        """
-        wanted = (settings.material * self.torque_rms) ** 2
-        total = np.zeros_like(self.count)
-        for part, sigma, noise in zip(self.data, self.sigma, self.noise, strict=True):
-            misfit = misfit_share * np.maximum(sigma**2 - noise**2, 0.0)
-            total += part.informative.sum(axis=0) * np.maximum(wanted, misfit) / sigma**2
-        return np.maximum(total, 1e-12)
 
 
 def torque_rms(data: Sequence[Trajectory]) -> FloatArray:

@@ -124,11 +124,6 @@ class Trajectory:
         assert self.motion.tau is not None
         return self.reduce(self.motion.tau)
 
-    def with_torque_moved(self, by: FloatArray) -> Trajectory:
-        """Return the trajectory with a constant (n,) [N m] added to the measured torque."""
-        assert self.motion.tau is not None
-        return replace(self, motion=self.motion.with_torque(self.motion.tau + by))
-
     def residual(self, arm: ArmModel) -> FloatArray:
         """Return measured torque minus that of a model, in rows, shape (M, n) [N m]."""
         assert self.motion.tau is not None
@@ -330,35 +325,3 @@ def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:
         rows.append(part.fold * pieces + span)
     _, index = np.unique(np.concatenate(rows), return_inverse=True)
     return np.asarray(index, dtype=np.intp)
-
-
-@dataclass(frozen=True)
-class Workspace:
-    """The data and the arm for which columns are computed when shapes are refined."""
-
-    arm: ArmModel
-    data: tuple[Trajectory, ...]
-
-    def columns(self, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return the columns of an effect in rows, shape (R, n, p)."""
-        blocks = [part.columns(self.arm, effect) for part in self.data]
-        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])
-
-    def torque_echo(
-        self, effect: Effect, kept: Sequence[int], noise: Sequence[FloatArray]
-    ) -> FloatArray:
-        """
-        Return the mean of the columns of an effect times the noise of the torque, (R, n, p).
-
-        It comes from the columns with a torque that is one standard deviation of each trajectory,
-        (n,) [N m], higher and lower.
-
-        """
-        blocks = []
-        for part, deviation in zip(self.data, noise, strict=True):
-            higher, lower = (
-                part.with_torque_moved(by).columns(self.arm, effect)
-                for by in (deviation, -deviation)
-            )
-            blocks.append(deviation[:, np.newaxis] * (higher - lower) / 2.0)
-        return np.asarray(np.concatenate(blocks)[:, :, list(kept)])

@@ -228,9 +228,9 @@ def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
     found = {own.effect.name for own in explanation.fitted.named}
     doubts: dict[tuple[str, str], Doubt] = {}
     for named, step in pairs:
-        others = [t.candidate.effect for t in step.rivals]
+        others = [t.effect for t in step.rivals]
         if not others and diagnosis.verdict == 'partial':
-            others = [t.candidate.effect for t in step.ranking if t.gain > 0.0]
+            others = [t.effect for t in step.ranking if t.gain > 0.0]
             others = [effect for effect in others if effect.name not in found][:_RUNNERS_UP]
         for other in others:
             if other.name in found:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.search.trial import SelectedEffect
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.verdict.finding import Diagnosis
 from armid_ros.effects import Effect
 from armid_ros.errors import ModelError

@@ -1,38 +1,30 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What is asked of an arm: which nuisance parameters it has, and which candidates are tried.
+Every cause that is compared: each effect of the catalogue, per joint, pair or whole arm.
 
-Candidates are every effect of the catalogue, per joint, pair or whole arm. An effect with shape
-parameters is a family of candidates on a grid, of which the best is refined later by variable
-projection (Golub and Pereyra 1973): values are fitted at each shape. The columns of an effect are
-computed for all joints at once and divided among its candidates.
+An effect with shape parameters is a family of causes on a grid, of which the best is refined
+later. The columns of an effect are computed for all joints at once and divided among its causes.
 
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import reduce
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise, product
 
 from armid_ros.arm import ArmModel
-from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.baseline import EXCITED, excited, Prior
-from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.rows import make_problem, Problem, Projection
-from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory, Workspace
-from armid_ros.diagnosis.search.fit import Fitted
-from armid_ros.diagnosis.search.search_state import Nuisance
-from armid_ros.diagnosis.search.trial import Candidate
-from armid_ros.effects import CATALOGUE, Effect, Kind, Shape
-from armid_ros.effects.friction import friction_level
+from armid_ros.diagnosis.data.trajectory import Trajectory
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.nuisance import Marginal, Nuisance
+from armid_ros.diagnosis.search.priors import log_prior
+from armid_ros.effects import Effect, Kind, Shape
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
-from armid_ros.identification.fitting.normal_equations import NormalEquations
-from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -42,164 +34,163 @@ from scipy import optimize
 _MOST_SHAPES = 12
 #: Distance from a peak of a spectrum at which its side lobes may be, and its half width [1/rev].
 _LOBES, _PEAK = 3.0, 0.2
-#: Rounds of a refinement, and most evaluations of one line search.
-_ROUNDS, _EVALUATIONS = 2, 9
+#: Most evaluations of one line search.
+_EVALUATIONS = 9
+#: Values of a body over its mass that are as large as such values get: first moments and inertia.
+_BODY = np.array([1.0, *3 * [0.1], *6 * [0.01]])
 
 
 @dataclass(frozen=True)
-class Question:
+class Causes:
     """
-    What is asked of an arm.
+    The causes that may be named, with their columns.
 
     Attributes
     ----------
-    arm : ArmModel
-        The arm as given.
-    base : BaseParameters or None
-        Base parameters of it that are fitted; None where it stays as given.
-    nuisance_arm : ArmModel
-        The arm with friction and offsets also in joints for which none are given.
-    nuisance_base : BaseParameters or None
-        Base parameters of that which are fitted jointly with every candidate.
-    unknown : tuple of Effect
-        The friction and offsets that were added, joint by joint.
-    most : int
-        Most causes that are accepted.
-    prior, nuisance_prior : Prior or None
-        Information of the baseline about ``base`` and ``nuisance_base``.
-    since : bool
+    kinds : tuple of Kind
+        Effects to look for.
+    nuisance : Nuisance
+        Data and columns that causes are compared with, none of them accepted.
+    changed : bool
         Whether what has changed is asked, and not what was always there.
+    fitted : frozenset of (str, tuple of str)
+        Names and joints of what is among the nuisance parameters.
 
     """
 
-    arm: ArmModel
-    base: BaseParameters | None
-    nuisance_arm: ArmModel
-    nuisance_base: BaseParameters | None
-    unknown: tuple[Effect, ...]
-    most: int
-    prior: Prior | None = None
-    nuisance_prior: Prior | None = None
-    since: bool = False
-
-    @property
-    def body_is_free(self) -> bool:
-        """Whether the rigid body is fitted anew, and not only effects without given values."""
-        return frees_body(self.nuisance_base, self.arm)
-
-    def kinds(self, library: Sequence[Kind]) -> tuple[Kind, ...]:
-        """Return the effects to look for, of those that may be named."""
-        if not self.since:
-            return tuple(library)
-        kinds = [kind.as_change() for kind in library]
-        pairs = zip(self.arm.effects, self.arm.values, strict=True)
-        kinds += friction_level(pairs, self.arm.robot, [kind.name for kind in library])
-        return tuple(kinds)
-
-
-def frees_body(base: BaseParameters | None, arm: ArmModel) -> bool:
-    """Return whether any parameter of the rigid body is among those that are fitted."""
-    return base is not None and bool(np.any(base.independent < len(arm.robot.rigid_parameters)))
-
-
-def as_given(
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    most: int,
-    library: Sequence[str],
-    beside: Sequence[Effect] = (),
-) -> Question:
-    """Ask what a model lacks whose given values are right; see `fitted_anew`."""
-    arm, nuisance_arm, unknown = _arms(arm, library, beside)
-    return Question(
-        arm,
-        _without_values(arm, data),
-        nuisance_arm,
-        _without_values(nuisance_arm, data),
-        unknown,
-        most,
+    kinds: tuple[Kind, ...]
+    nuisance: Nuisance
+    changed: bool
+    fitted: frozenset[tuple[str, tuple[str, ...]]]
+    _known: dict[tuple[str, tuple[int, ...]], Cause | None] = field(
+        default_factory=dict, compare=False
     )
 
+    def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
+        """Return every cause that is not accepted yet, in every shape a search starts from."""
+        arm, result = nuisance.arm, list[Cause]()
+        taken = {(one.effect.name, one.effect.joints) for one, _ in nuisance.accepted}
+        bodies = {one.effect.adds_to(arm.robot) for one, _ in nuisance.accepted} - {()}
+        unexplained = _unexplained(nuisance, under)
+        for whole, members in candidate_effects(arm.robot, self.kinds):
+            for effect, singles in shaped(whole, members, arm, unexplained):
+                for cause in self._divided(effect, singles):
+                    own = cause.effect.name, cause.effect.joints
+                    same_body = cause.effect.adds_to(arm.robot) in bodies
+                    if own not in taken | self.fitted and not same_body:
+                        result.append(cause)
+        counts = Counter(cause.key for cause in result)
+        return [cause.of_shapes(counts[cause.key]) for cause in result]
 
-def fitted_anew(
-    arm: ArmModel,
-    data: Sequence[Trajectory],
-    most: int,
-    library: Sequence[str],
-    rng: np.random.Generator,
-    held: Sequence[int] = (),
-    beside: Sequence[Effect] = (),
-) -> Question:
-    """
-    Ask what a model lacks of which only the structure is believed: all values are fitted anew.
+    @property
+    def effects(self) -> Iterator[Effect]:
+        """Yield every effect in every place."""
+        for _, members in candidate_effects(self.nuisance.arm.robot, self.kinds):
+            yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
-    Parameters
-    ----------
-    arm : ArmModel
-        The arm.
-    data : sequence of Trajectory
-        The data.
-    most : int
-        Most causes that are accepted.
-    library : sequence of str
-        Names that may be given.
-    rng : numpy.random.Generator
-        Draws the states from which base parameters are found.
-    held : sequence of int
-        Parameters of the arm that stay as they are, so that a change of them is a candidate.
-    beside : sequence of Effect
-        What is fitted as well, with values of zero: only what is none of the others counts as it.
+    def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
+        """Yield the causes that an effect consists of, whose columns are computed at once."""
+        robot, start = self.nuisance.arm.robot, 0
+        places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
+        for one in singles:
+            size = len(one.parameters(robot))
+            for kept in one.traits.separate or (tuple(range(size)),):
+                places.append((one, kept, [start + k for k in kept]))
+            start += size
+        keys = [(repr(one), kept) for one, kept, _ in places]
+        if not all(key in self._known for key in keys):
+            try:
+                columns = self._columns(effect)
+            except ModelError:
+                return
+            for key, (one, kept, span) in zip(keys, places, strict=True):
+                self._known[key] = self.made(one, kept, [x[:, :, span] for x in columns])
+        yield from filter(None, (self._known[key] for key in keys))
 
-    """
-    arm, nuisance_arm, unknown = _arms(arm, library, beside)
-    base = _excited(arm, data, rng, held)
-    nuisance_base = base if not unknown else _excited(nuisance_arm, data, rng, held)
-    return Question(arm, base, nuisance_arm, nuisance_base, unknown, most)
+    @cached_property
+    def _parts(self) -> list[Trajectory]:
+        arm = self.nuisance.arm
+        return [without_measurement(part, arm) for part in self.nuisance.rows.data]
 
+    def _columns(self, effect: Effect) -> list[FloatArray]:
+        """Return the columns of an effect in each trajectory, (M, n, p)."""
+        return [part.columns(self.nuisance.arm, effect) for part in self._parts]
 
-def _arms(
-    arm: ArmModel, library: Sequence[str], beside: Sequence[Effect]
-) -> tuple[ArmModel, ArmModel, tuple[Effect, ...]]:
-    """Return an arm with more effects, the same with unknown friction before them, and that."""
-    fuller, unknown = with_friction(arm, library)
-    if beside:
-        arm, fuller = (
-            memoized_arm(reduce(ArmModel.with_effect, beside, a)) for a in (arm, fuller)
+    def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
+        """Return a cause in another shape; None where that is not possible or does not show."""
+        try:
+            effect = cause.effect.with_shape(shape)
+            columns = self._columns(effect)
+        except ModelError:
+            return None
+        other = self.made(effect, cause.kept, [x[:, :, list(cause.kept)] for x in columns])
+        if other is None or other.kept != cause.kept:
+            return None
+        return other.of_shapes(cause.shapes)
+
+    def made(
+        self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
+    ) -> Cause | None:
+        """Return the cause of an effect with columns, each (M, n, p); None if none is seen."""
+        rows, robot = self.nuisance.rows, self.nuisance.arm.robot
+        joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
+        torque = np.zeros((len(rows.torque), columns[0].shape[2]))
+        for k in rows.in_question:
+            moving = rows.weight[k][:, joints, np.newaxis] > 0.0
+            torque[joints] += np.sum(columns[k][:, joints] ** 2, axis=0, where=moving)
+        torque = np.sqrt(torque / rows.informative[:, np.newaxis])
+        seen = torque.any(axis=0)
+        if not seen.any():
+            return None
+        spread = effect.spread(robot)[list(kept)]
+        if effect.adds_to(robot):  # a load and an error of a link are bodies alike
+            spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[list(kept)]
+        largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
+        unit = np.minimum(largest, np.where(spread > 0.0, spread, np.inf))
+        own = [x[:, :, seen] for x in columns]
+        weighted = rows.weighted(own, joints)
+        size = int(seen.sum())
+        flat = [x.reshape(-1, size) for x in weighted]
+        theirs = zip(self.nuisance.columns, self.nuisance.residual, flat, strict=True)
+        products, aim = [], []
+        for x, y, z in theirs:
+            products.append(x[joints].reshape(-1, x.shape[2]).T @ z)
+            aim.append(z.T @ y[joints].ravel())
+        return Cause(
+            effect,
+            tuple(kept[k] for k in np.flatnonzero(seen).tolist()),
+            unit[seen],
+            log_prior(effect, robot, self.changed),
+            tuple(joints),
+            tuple(weighted),
+            tuple(products),
+            tuple(z.T @ z for z in flat),
+            tuple(aim),
+            torque[:, seen],
         )
-    return arm, fuller if unknown else arm, unknown
 
 
-def _excited(
-    arm: ArmModel, data: Sequence[Trajectory], rng: np.random.Generator, held: Sequence[int]
-) -> BaseParameters:
-    """Return the base parameters that data excite, without values that are held."""
-    free = np.setdiff1d(np.arange(len(arm.parameters)), held)
-    return excited(arm, arm.base_parameters(rng, free), data)[0]
-
-
-def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Return an arm with all effects that any joint may be taken to have, and those added."""
-    there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
-    added: list[Effect] = []
-    fuller = arm
-    for kind in CATALOGUE.values():
-        joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
-        if kind.traits.everywhere and kind.name in library and joints:
-            fuller = fuller.with_effect(kind.on(arm.robot, joints))
-            added += [kind.on(arm.robot, (joint,)) for joint in joints]
-    return fuller, tuple(added)
-
-
-def _without_values(arm: ArmModel, data: Sequence[Trajectory]) -> BaseParameters | None:
-    """Return the effect parameters with a value of zero, as far as the data determine them."""
-    rigid = len(arm.robot.rigid_parameters)
-    names, theta = arm.parameters, arm.theta
-    free = np.array([k for k in range(rigid, len(names)) if theta[k] == 0.0], dtype=np.intp)  # noqa: RUF069 - an effect without a value
-    if not len(free):
-        return None
-    columns = [part.reduce(arm.effect_columns(part.motion)[:, :, free - rigid]) for part in data]
-    stacked = np.concatenate([block.reshape(-1, len(free)) for block in columns])
-    return group_columns(stacked, tuple(names[k] for k in free), EXCITED).among(names, free)
+def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
+    """Return what is left of the recordings in question, for shapes to begin at."""
+    rows = nuisance.rows
+    values, _ = nuisance.whole(under)
+    motions = [part.motion for part in rows.data]
+    arrays = (
+        np.concatenate([getattr(motion, name) for motion in motions])
+        for name in ('t', 'q', 'dq', 'ddq', 'tau')
+    )
+    weight = np.concatenate(rows.weight)
+    scale = np.where(weight > 0.0, weight, 1.0)
+    rest = np.concatenate([nuisance.rest(values, k) for k in range(len(rows.today))], axis=1).T
+    columns = np.concatenate([x[:, :, : nuisance.rank] for x in nuisance.columns], axis=1)
+    asked = np.concatenate([np.full(len(p.rows), rows.today[p.fold]) for p in rows.data])
+    return Unexplained(
+        Motion(motions[0].joints, *arrays),
+        np.concatenate([part.at_rows.q for part in rows.data]),
+        rest / scale,
+        weight * asked[:, np.newaxis],
+        columns.swapaxes(0, 1) / scale[:, :, np.newaxis],
+    )
 
 
 def candidate_effects(
@@ -245,109 +236,7 @@ def shaped(
         yield whole, [m.with_shape(row) for m, row in zip(members, rows, strict=True)]
 
 
-@dataclass(frozen=True)
-class Candidates:
-    """
-    All candidates with their columns in rows.
-
-    Attributes
-    ----------
-    candidates : tuple of Candidate
-        The candidates.
-    columns : tuple of ndarray, each (M, n, C)
-        Columns of all candidates, per trajectory, filtered and decimated.
-
-    """
-
-    candidates: tuple[Candidate, ...]
-    columns: tuple[FloatArray, ...]
-
-
-def candidates(
-    fitted: Fitted,
-    evidence: Evidence,
-    kinds: Sequence[Kind],
-) -> Candidates:
-    """Compute the columns of every effect that was not named yet."""
-    arm, data = memoized_arm(fitted.arm), evidence.data
-    unexplained = _unexplained(fitted, evidence)
-    taken = {(own.effect.name, own.effect.joints) for own in fitted.named}
-    candidates: list[Candidate] = []
-    blocks: list[list[FloatArray]] = [[] for _ in data]
-    start = 0
-    for effect, members in candidate_effects(arm.robot, kinds):
-        for whole, singles in shaped(effect, members, arm, unexplained):
-            for block, part in zip(blocks, data, strict=True):
-                block.append(part.columns(arm, whole))
-            for single in singles:
-                size = len(single.parameters(arm.robot))
-                if (single.name, single.joints) not in taken:
-                    for kept in single.traits.separate or (tuple(range(size)),):
-                        span = slice(start + kept[0], start + kept[-1] + 1)
-                        candidates.append(Candidate(single, span, kept, arm.robot))
-                start += size
-    return Candidates(tuple(candidates), tuple(np.concatenate(block, axis=2) for block in blocks))
-
-
-def _unexplained(fitted: Fitted, evidence: Evidence) -> Unexplained:
-    """Return the residual of a fitted arm, with its motion, weights and nuisance columns."""
-    data = evidence.data
-    motions = [part.motion for part in data]
-    arrays = (
-        np.concatenate([getattr(motion, name) for motion in motions])
-        for name in ('t', 'q', 'dq', 'ddq', 'tau')
-    )
-    return Unexplained(
-        Motion(motions[0].joints, *arrays),
-        np.concatenate([part.motion.q[part.rows] for part in data]),
-        np.concatenate(fitted.residual),
-        row_weights(data, evidence.sigma),
-        np.concatenate(fitted.columns),
-    )
-
-
-def refine(
-    problem: Problem,
-    projection: Projection,
-    candidate: Candidate,
-    residual: FloatArray,
-    work: Workspace,
-) -> tuple[Candidate, FloatArray]:
-    """
-    Refine the shape of a candidate by variable projection; return it with its columns.
-
-    The nuisance columns are projected out of the residual already.
-
-    """
-    effect, kept = candidate.effect, candidate.kept
-    lower, upper = (bound[list(kept)] for bound in effect.bounds())
-    cache: dict[tuple[float, ...], tuple[float, FloatArray]] = {}
-
-    def gain(shape: FloatArray) -> float:
-        key = tuple(shape.tolist())
-        if key not in cache:
-            try:
-                columns = work.columns(effect.with_shape(shape), kept)
-            except ModelError:
-                return 0.0  # not possible: no gain
-            weighted = (columns * problem.weight[:, :, np.newaxis]).reshape(-1, len(kept))
-            own, aim = projection.products(weighted), weighted.T @ residual.ravel()
-            values = np.linalg.lstsq(own, aim, rcond=1e-9)[0]
-            if len(kept) == 1:  # an impossible value is no gain
-                values = np.clip(values, lower, upper)
-            cache[key] = float(2.0 * values @ aim - values @ own @ values), columns
-        return cache[key][0]
-
-    shape = np.array(effect.shape)
-    gain(shape)
-    for _ in range(_ROUNDS if len(shape) > 1 else 1):
-        for index, kind in enumerate(effect.shapes):
-            shape = _line_search(gain, shape, index, kind)
-    best = max(cache, key=lambda key: cache[key][0])
-    return replace(candidate, effect=effect.with_shape(best)), cache[best][1]
-
-
-def _line_search(
+def line_search(
     gain: Callable[[FloatArray], float], shape: FloatArray, index: int, kind: Shape
 ) -> FloatArray:
     """Search one shape near its present value, over its logarithm if positive (Brent 1973)."""
@@ -382,24 +271,11 @@ def _line_search(
     return at(found.x) if -found.fun > gain(shape) else shape
 
 
-def nuisance_of(
-    found: Candidates, current: Fitted, evidence: Evidence
-) -> tuple[Problem, Nuisance]:
+def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
     """
-    Return the problem of all candidates, and its nuisance parameters, whose columns come last.
+    Return a trajectory with the torque of a model in place of the measured one.
 
-    The prior of the shapes of names is as precise as all data determine them: one fold alone may
-    hardly determine where a strap is fixed, and would predict the others by that.
+    A prediction that contains the measurement explains anything.
 
     """
-    pairs = zip(found.columns, current.columns, strict=True)
-    columns = [np.concatenate(pair, axis=2) for pair in pairs]
-    problem = make_problem(evidence.data, evidence.sigma, current.residual, columns)
-    size = problem.x.shape[2]
-    free = tuple(range(size - current.columns[0].shape[2], size))
-    shaped = np.zeros(len(free))
-    first = len(free) - len(current.estimate.values)
-    shapes = [first + k for _, own in current.places for k in own]
-    shaped[shapes] = np.sum(problem.x[:, :, [free[k] for k in shapes]] ** 2, axis=(0, 1))
-    held = NormalEquations(np.diag(shaped), np.zeros(len(shaped)))
-    return problem, Nuisance(free, current.prior + held)
+    return replace(part, motion=part.motion.with_torque(arm.torque(part.motion)))

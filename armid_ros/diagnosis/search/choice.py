@@ -1,11 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which explanation is given: of the model as given, or of a body that is fitted anew.
+Which explanation is given: of what has changed, or of what a model lacks.
 
-A fit of the whole body has fifty values, and explains a little more of anything. It is the rival
-of last resort: a few causes in the model as given are preferred where they explain as much. With a
-baseline, nothing is named that a body common to both days explains.
+The comparison of causes is the same; a baseline, a misfit that was written down, or the model
+alone differ in what is known of discrepancy and noise.
 
 """
 
@@ -15,26 +14,36 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline, Identified
+from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
 from armid_ros.diagnosis.prepare import Prepared
-from armid_ros.diagnosis.search.candidates import as_given, fitted_anew, Question
+from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.comparison import (
+    CauseComparison,
+    Result,
+    settings_alone,
+    settings_of_baseline,
+    settings_of_misfit,
+)
 from armid_ros.diagnosis.search.explain import explain
 from armid_ros.diagnosis.search.explanation import (
     at_floor,
     Chosen,
     ESTIMATED,
     Explanation,
-    freedom,
     in_model_as_given,
     NOISE,
 )
-from armid_ros.diagnosis.search.trial import Step, Trial
+from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question, with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
+from armid_ros.effects.friction import friction_level
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -43,6 +52,8 @@ OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 #: Data are sampled as often as others if their sampling period is not longer by this factor.
 _AS_OFTEN = 1.2
+#: Share of a torque that the unit of its rows is at the least.
+_LEAST = 1e-4
 #: Note where nothing is known of how well a model was identified.
 _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
@@ -101,33 +112,31 @@ class Explainer:
             return self._since(self.baseline)
         if self.written is not None:
             return self._beside(self.written)
-        prepared, tell, settings = self.prepared, self.tell, self.settings
-        few = settings.thresholds.few_causes
-        given = as_given(self.arm, prepared.data, few, settings.library)
-        described = prepared.described
-        tell(0.2, 'the model as given')
-        first = explain(given, described, settings)
-        nothing = np.zeros(self.arm.robot.n_joints)
-        closed = at_floor(first, settings)
-        if closed and not (
-            len(first.steps) > 1 and any(_may_correct(step) for step in first.steps)
-        ):
-            return Chosen(first, nothing, NOISE)
-        tell(0.4, 'the model fitted anew')
-        anew = self._anew(tuple(prepared.sigma))
-        corrected = at_floor(anew, settings)
-        if corrected and len(first.steps) > 1 and not _stands(first, anew):
-            return Chosen(anew, nothing, NOISE)
-        misfit, words = nothing, NOISE
-        if not (closed or corrected):
-            misfit = np.sqrt(anew.evidence.power(anew.fitted.residual))
-            tell(0.7, 'the model as given')
-            sigma = tuple(np.maximum(one, misfit) for one in prepared.as_described)
-            first = explain(given, replace(described, sigma=sigma), settings)
-            words = ESTIMATED
-        if _as_good(first, anew, settings):
-            return Chosen(first, misfit, words)
-        return Chosen(anew, nothing, words)
+        return self._alone()
+
+    def _alone(self) -> Chosen:
+        """Explain what a model lacks of which nothing else is known."""
+        prepared, settings = self.prepared, self.settings
+        self.tell(0.2, 'what the model lacks')
+        rows = rows_over_noise(Evidence.over_noise(prepared.data, prepared.sigma))
+        unknown = with_friction(self.arm, settings.library)[1]
+        result = self.comparison(rows, settings_alone()).found()
+        if result.under.setting.free:
+            accepted = [one.effect for one, _ in result.nuisance.accepted]
+            changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
+            held = [k for k, p in enumerate(self.arm.parameters) if p in changed]
+            question = fitted_anew(self.arm, prepared.data, self.rng, held=held)
+            evidence = Evidence.over_noise(prepared.data, prepared.sigma)
+        else:
+            question = as_given(self.arm, prepared.data)
+            evidence = prepared.described
+        found = explain(question, evidence, result, settings, unknown)
+        if at_floor(found, settings):
+            return Chosen(found, np.zeros(self.arm.robot.n_joints), NOISE)
+        misfit = np.sqrt(evidence.power(found.fitted.residual))
+        sigma = tuple(np.maximum(one, misfit) for one in evidence.sigma)
+        found = explain(question, replace(evidence, sigma=sigma), result, settings, unknown)
+        return Chosen(found, misfit, ESTIMATED)
 
     def _beside(self, misfit: FloatArray) -> Chosen:
         """
@@ -142,7 +151,10 @@ class Explainer:
         noise = _noise_within(misfit, prepared, 0.0)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         known = None if self.information is None else Identified(self.information)
-        found = self._changes(evidence, misfit, known)
+        rows = Rows(prepared.data, evidence.sigma, 0, (misfit,) * count_recordings(prepared.data))
+        grid = settings_of_misfit(known is not None)
+        result = self.comparison(rows, grid, known).found()
+        found = self._changes(result, evidence, misfit, known)
         usual = settings.thresholds.predicted * evidence.as_good(settings)
         before = evidence.chi2_per_row(found.reference.residual)
         if np.all(before <= usual + evidence.matters(settings)):
@@ -153,30 +165,6 @@ class Explainer:
         notes = (_AS_EXACT,) if known is None else ()
         return replace(chosen, explanation=in_model_as_given(found), rest=found, notes=notes)
 
-    def _anew(self, sigma: tuple[FloatArray, ...]) -> Explanation:
-        """
-        Explain the data jointly with a rigid body and known effects that are fitted anew.
-
-        A described value may be off by a share of itself. One whose fit is farther off has
-        changed: it is held, so that its change is a candidate.
-
-        """
-        arm, data, settings = self.arm, self.prepared.data, self.settings
-        library = settings.library
-        evidence = Evidence(data, sigma, tuple(self.prepared.sigma))
-        many = settings.thresholds.many_causes
-        question = fitted_anew(arm, data, many, library, self.rng)
-        found = explain(question, evidence, settings)
-        rigid, described = len(arm.robot.rigid_parameters), arm.theta
-        change = np.abs(found.fitted.arm.theta[: len(described)] - described)
-        known = (np.arange(len(described)) >= rigid) & (described != 0.0)  # noqa: RUF069 - an effect without a value
-        far = change > settings.thresholds.described * np.abs(described)
-        changed = np.flatnonzero(known & far)
-        if not len(changed):
-            return found
-        question = fitted_anew(arm, data, many, library, self.rng, changed.tolist())
-        return explain(question, evidence, settings)
-
     def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
         prepared = self.prepared
@@ -186,11 +174,9 @@ class Explainer:
         noise = _noise_within(misfit, prepared, usual)
         sigma = tuple(np.maximum(one, misfit) for one in noise)
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
-        more = None
-        if self.unseen:
-            unit = (np.sqrt(np.mean(np.square(sigma), axis=0)),) * len(self.unseen)
-            more = Evidence(tuple(self.unseen), unit, unit, baseline.varies)
-        found = self._changes(evidence, misfit, baseline, more)
+        self.tell(0.2, 'what has changed')
+        result = self.comparison(self._of_both_days(baseline, misfit, sigma), None).found()
+        found = self._changes(result, evidence, misfit, baseline)
         chosen = Chosen(found, misfit, OWN_MISFIT)
         if not found.steps:
             return chosen
@@ -205,21 +191,84 @@ class Explainer:
             untested=untested,
         )
 
+    def _of_both_days(
+        self, baseline: Baseline, misfit: FloatArray, sigma: Sequence[FloatArray]
+    ) -> Rows:
+        """
+        Return the rows of both days, those that nothing is fitted to as well.
+
+        What a model gets wrong grows with what the arm does: with its torque, and its speed.
+
+        """
+        today, more = self.prepared.data, self.unseen
+        faster = louder(_speed([*today, *more]), _speed(baseline.data))
+        first, second = count_recordings(baseline.data), count_recordings(today)
+        mean = np.sqrt(np.mean(np.square(sigma), axis=0))
+        rows = Rows(
+            (
+                *baseline.data,
+                *(replace(part, fold=part.fold + first) for part in today),
+                *(replace(part, fold=part.fold + first + second) for part in more),
+            ),
+            (*(baseline.misfit,) * len(baseline.data), *sigma, *(mean,) * len(more)),
+            first,
+            (
+                *(baseline.misfit,) * first,
+                *(np.maximum(misfit, faster * baseline.misfit),)
+                * (second + count_recordings(more)),
+            ),
+        )
+        least = _LEAST * rows.torque
+        return replace(
+            rows,
+            sigma=tuple(np.maximum(one, least) for one in rows.sigma),
+            amplitude=tuple(np.maximum(one, least) for one in rows.amplitude),
+        )
+
+    def comparison(
+        self, rows: Rows, grid: Sequence[Setting] | None, known: Identified | None = None
+    ) -> CauseComparison:
+        """
+        Return the comparison of all causes.
+
+        Parameters
+        ----------
+        rows : Rows
+            The data.
+        grid : sequence of Setting or None
+            Amplitudes that are compared; None with a baseline.
+        known : Identified or None
+            What is known of the arm in addition to its description.
+
+        """
+        arm, settings = self.arm, self.settings
+        fuller, unknown = with_friction(arm, settings.library)
+        nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known)
+        changed = self.baseline is not None or self.written is not None
+        kinds = list(settings.kinds)
+        if changed:
+            given = zip(arm.effects, arm.values, strict=True)
+            level = friction_level(given, arm.robot, settings.library)
+            kinds = [*(kind.as_change() for kind in kinds), *level]
+        fitted = () if changed else ((effect.name, effect.joints) for effect in unknown)
+        catalogue = Causes(tuple(kinds), nuisance, changed, frozenset(fitted))
+        used = settings_of_baseline(nuisance) if grid is None else tuple(grid)
+        return CauseComparison(nuisance, catalogue, settings.thresholds, used)
+
     def _changes(
         self,
+        result: Result,
         evidence: Evidence,
         misfit: FloatArray,
         known: Baseline | Identified | None,
-        unseen: Evidence | None = None,
     ) -> Explanation:
         """Explain what has changed, beside what any model of the arm gets wrong."""
         settings = self.settings
-        self.tell(0.2, 'what has changed')
         data = [*self.prepared.data, *(() if known is None else known.data)]
         discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit, self.arm)
         question = self._since_then(data, known, [discrepancy])
         baseline = known if isinstance(known, Baseline) else None
-        found = explain(question, evidence, settings, baseline=baseline, unseen=unseen)
+        found = explain(question, evidence, result, settings, baseline=baseline)
         return replace(found.in_arm(self._since_then(data, known)), beside=question)
 
     def _since_then(
@@ -229,16 +278,24 @@ class Explainer:
         beside: Sequence[Effect] = (),
     ) -> Question:
         """Ask what has changed in an arm whose body and friction are as they were known."""
-        arm, library = self.arm, self.settings.library
-        most = 2 * self.settings.thresholds.few_causes
         if known is None:
-            return replace(as_given(arm, data, most, library, beside), since=True)
-        free = fitted_anew(arm, data, most, library, self.rng, beside=beside)
-        assert free.base is not None and free.nuisance_base is not None
-        prior = nuisance_prior = known.prior(free.arm, free.base)
-        if free.unknown:
-            nuisance_prior = known.prior(free.nuisance_arm, free.nuisance_base)
-        return replace(free, prior=prior, nuisance_prior=nuisance_prior, since=True)
+            return as_given(self.arm, data, beside)
+        free = fitted_anew(self.arm, data, self.rng, beside)
+        assert free.base is not None
+        return replace(free, prior=known.prior(free.arm, free.base))
+
+
+def rows_over_noise(evidence: Evidence) -> Rows:
+    """Return data in rows over their noise, discrepancies being measured in torque."""
+    torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
+    sigma = tuple(np.maximum(one, _LEAST * torque) for one in evidence.sigma)
+    return Rows(evidence.data, sigma, 0, (torque,) * count_recordings(evidence.data))
+
+
+def _speed(data: Sequence[Trajectory]) -> FloatArray:
+    """Return the root mean square velocity of each joint, (n,) [rad/s or m/s]."""
+    squares = np.concatenate([part.at_rows.dq**2 for part in data])
+    return np.asarray(np.sqrt(squares.mean(axis=0)))
 
 
 def _noise_within(
@@ -262,72 +319,3 @@ def _noise_within(
             prepared.as_described, prepared.floors, prepared.data, strict=True
         )
     )
-
-
-def _may_correct(step: Step) -> bool:
-    effect, others = step.trial.candidate.effect, [rival.candidate.effect for rival in step.rivals]
-    return effect.traits.corrects or (
-        effect.changes_body and any(one.traits.corrects for one in others)
-    )
-
-
-def _stands(first: Explanation, anew: Explanation) -> bool:
-    """
-    Return whether causes remain causes jointly with a full correction of the description.
-
-    The description is off in more than one of its values if that correction explains the data and
-    either leaves out a cause that it does not hide, or hides more than one, a correction among
-    them counted. One body that has changed is part of any correction, and so are effects without
-    given values.
-
-    """
-    assert anew.survey is not None
-    there = {step.trial.candidate.key[:2] for step in anew.steps}
-    given = zip(first.given.effects, first.given.values, strict=True)
-    open_values = {effect.name for effect, values in given if not np.any(values)}
-    candidates = [
-        step.trial.candidate
-        for step in first.steps
-        if not step.trial.candidate.effect.traits.corrects
-    ]
-    gone = {
-        candidate.key[:2] for candidate in candidates if candidate.effect.name not in open_values
-    } - there
-    wrong = any(_is_correction(step.trial, first.given) for step in first.steps)
-    seen = {trial.candidate.key[:2] for trial in anew.survey.ranking}
-    return gone.isdisjoint(seen) and len(gone) + wrong < 2
-
-
-def _is_correction(trial: Trial, arm: ArmModel) -> bool:
-    """Return whether the values of a cause say that the description is wrong."""
-    effect = trial.candidate.effect
-    values, std = np.zeros((2, len(effect.parameters(arm.robot))))
-    kept = list(trial.candidate.kept)
-    values[kept], std[kept] = trial.values, trial.deviation
-    return effect.is_correction(values, std, arm)
-
-
-def _as_good(first: Explanation, anew: Explanation, settings: DiagnosisSettings) -> bool:
-    """
-    Return whether causes in the model as given explain as much as a body fitted anew.
-
-    Where the body leaves noise, the causes have to leave as little; an assumed noise excuses no
-    residual that the body does not leave. Where the body leaves a gap itself, it is preferred only
-    if it takes more in addition to the causes than its values cost.
-
-    """
-    evidence = first.evidence
-    given, fitted = first.fitted.residual, anew.fitted.residual
-    after, least = evidence.chi2_per_row(given), evidence.chi2_per_row(fitted)
-    more = freedom(anew, settings) - freedom(first, settings)
-    alike = settings.thresholds.same_fit * least
-    if more >= 0.0:
-        alike = alike + evidence.matters(settings)
-        if not evidence.assumed:
-            alike = np.maximum(alike, evidence.limits(given, settings))
-    if np.all(after <= alike):
-        return True
-    if at_floor(anew, settings):
-        return False
-    gap = max(float(evidence.count @ evidence.chi2_per_row(first.reference.residual)), 1e-300)
-    return float(evidence.count @ (after - least)) <= settings.thresholds.price * more * gap

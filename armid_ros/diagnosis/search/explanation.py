@@ -19,10 +19,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.candidates import Question
+from armid_ros.diagnosis.search.deviations import as_change, with_jackknife_std
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
-from armid_ros.diagnosis.search.held_out import as_change, with_jackknife_std
-from armid_ros.diagnosis.search.search_state import cost
+from armid_ros.diagnosis.search.question import Question
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
@@ -61,11 +60,11 @@ class Explanation:
     evidence : Evidence
         The data.
     minor : tuple of Trial
-        Candidates of the last look that are significant and do not matter, for the small print.
+        Causes that are there and do not matter, for the small print.
     prior : Prior or None
-        Information of the baseline about ``base``.
+        CauseInformation of the baseline about ``base``.
     by_chance : float
-        Mean gain per value, over all candidates, on the residual that the names leave.
+        Variance of values by what the names leave, over that for white noise.
     baseline : Baseline or None
         Recordings from before the named effects changed.
     beside : Question or None
@@ -205,12 +204,6 @@ def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
     evidence = explanation.evidence
     limits = evidence.limits(explanation.fitted.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
-
-
-def freedom(explanation: Explanation, settings: DiagnosisSettings) -> float:
-    """Return the number of fitted values, counted as in `cost`, and those of the rigid body."""
-    body = 0 if explanation.base is None else explanation.base.rank
-    return body + sum(cost(step.trial, settings) for step in explanation.steps)
 
 
 def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tuple[str, ...]]:

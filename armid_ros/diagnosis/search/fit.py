@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
-from armid_ros.diagnosis.search.trial import SelectedEffect
 from armid_ros.errors import ModelError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.least_squares import noise_products
@@ -125,7 +125,7 @@ def fit(
     start : Start, optional
         Where to begin; at the arm as it is by default.
     prior : Prior, optional
-        Information of other data about the base parameters.
+        CauseInformation of other data about the base parameters.
 
     """
     start = start or Start()
@@ -168,7 +168,7 @@ def with_values_of(
     base : BaseParameters, optional
         Base parameters that columns are of; they stay as they are.
     prior : Prior, optional
-        Information of other data about them.
+        CauseInformation of other data about them.
 
     """
     state = Patch(arm, found.named, found.values, np.zeros(0 if base is None else base.rank))

@@ -11,7 +11,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.words import place_in, with_named
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.diagnosis.search.trial import SelectedEffect
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.model import BaseParameters

@@ -19,24 +19,15 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.rows import make_problem, project
-from armid_ros.diagnosis.data.trajectory import Workspace
 from armid_ros.diagnosis.prepare import Prepared
-from armid_ros.diagnosis.search.candidates import candidates, Question
-from armid_ros.diagnosis.search.elimination import LinearFit
-from armid_ros.diagnosis.search.explain import explain
+from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.choice import Explainer, Progress, rows_over_noise
+from armid_ros.diagnosis.search.comparison import settings_alone
+from armid_ros.diagnosis.search.explain import explain, Name, survey_of
 from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.fit import fit, Fitted, Start
-from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.screening import screen_candidates
-from armid_ros.diagnosis.search.search_state import Nuisance, SearchState
-from armid_ros.diagnosis.search.trial import (
-    AcceptedCause,
-    Candidate,
-    SelectedEffect,
-    Step,
-    Survey,
-    Trial,
-)
+from armid_ros.diagnosis.search.question import Question
+from armid_ros.diagnosis.search.trial import Judge, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
@@ -241,7 +232,12 @@ def _certainty(fitted: Fitted, *, last: bool = False) -> list[float]:
 
 
 def diagnose_ties(
-    arm: ArmModel, recordings: Sequence[Recording], prepared: Prepared, settings: DiagnosisSettings
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    prepared: Prepared,
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+    tell: Progress,
 ) -> Chosen | None:
     """
     Explain a gap by ties to another machine, and by causes of the residual that they leave.
@@ -263,22 +259,19 @@ def diagnose_ties(
     if not fitted.named:
         return _within_its_noise(arm, prepared, settings)
     reference = ties.fitted(())
-    survey, rivals = _rivals(ties, reference, fitted)
-    view = LinearFit.of(fitted, ties.evidence)
-    share = ties.settings.thresholds.misfit_share
-    steps = []
-    for k in range(len(fitted.named)):
-        again = view.trial_of(k)
-        assert again.trial is not None
-        steps.append(Step(again.trial, rivals, (again.trial,), again.power, survey.tried, share))
+    explainer = Explainer(arm, prepared, None, rng, tell, settings)
+    step, survey = _as_one_cause(ties, explainer, fitted)
+    steps = (step,) * len(fitted.named)
     base: BaseParameters | None = ties.base
-    found = Explanation(ties.arm, base, fitted, reference, tuple(steps), survey, ties.evidence)
+    found = Explanation(ties.arm, base, fitted, reference, steps, survey, ties.evidence)
     if _open(found, settings):
-        most = settings.thresholds.many_causes
-        question = Question(arm, prepared.base, arm, prepared.base, (), most)
-        rows = zip(fitted.named, found.steps, fitted.values, strict=True)
-        known = [AcceptedCause(*row) for row in rows]
-        more = explain(question, found.evidence, settings, known)
+        rest = replace(explainer, arm=memoized_arm(fitted.arm))
+        free = [one for one in settings_alone() if one.free]
+        result = rest.comparison(rows_over_noise(found.evidence), free).found()
+        rows = zip(fitted.named, fitted.values, strict=True)
+        known = [Name(named, step, values) for named, values in rows]
+        question = Question(arm, prepared.base)
+        more = explain(question, found.evidence, result, settings, known=known)
         fitted = ties.surely(more.fitted.named)
         if not any(isinstance(own.effect, Tied) for own in fitted.named):
             return None
@@ -327,39 +320,30 @@ def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings
     return described
 
 
-def _rivals(ties: Ties, reference: Fitted, fitted: Fitted) -> tuple[Survey, tuple[Trial, ...]]:
-    """Try the library against all ties as one candidate; return the survey, and its rivals."""
-    evidence, settings = ties.evidence, ties.settings
-    data, sigma = evidence.data, evidence.sigma
-    found = candidates(reference, evidence, settings.kinds)
-    rank, first = reference.columns[0].shape[2], found.columns[0].shape[2]
-    stiffness = [rank + values.start for values, _ in fitted.places]
-    blocks = [
-        np.concatenate([others, tied[:, :, stiffness], free], axis=2)
-        for others, free, tied in zip(
-            found.columns, reference.columns, fitted.columns, strict=True
-        )
-    ]
-    problem = make_problem(data, sigma, reference.residual, blocks)
-    span = slice(first, first + len(stiffness))
-    free = tuple(range(span.stop, span.stop + rank))
+def _as_one_cause(ties: Ties, explainer: Explainer, fitted: Fitted) -> tuple[Step, Survey]:
+    """Compare all ties as one cause with the library; return how they are named, and the rest."""
+    settings, robot = ties.settings, ties.arm.robot
+    free = [one for one in settings_alone() if one.free]
+    comparison = explainer.comparison(rows_over_noise(ties.evidence), free)
+    result = comparison.found()
     loose = any(own.effect.shapes for own in fitted.named)
     kind = ties.partner.slack if loose else ties.partner.interaction
-    whole = kind.on(ties.arm.robot, [own.effect.joints[0] for own in fitted.named])
+    whole = kind.on(robot, [own.effect.joints[0] for own in fitted.named])
+    if loose:
+        whole = whole.with_shape([own.effect.shape for own in fitted.named])
     each = len(whole.quantities)
     kept = tuple(range(0, each * len(whole.joints), each))
-    candidate = Candidate(whole, span, kept, ties.arm.robot)
-    nuisance = Nuisance(free, reference.prior)
-    trials, power = held_out(problem, free, [candidate], nuisance.prior)
-    work = Workspace(memoized_arm(reference.arm), data)
-    here = SearchState(evidence, work, settings, problem, nuisance, float(power.sum()))
-    look = screen_candidates(found.candidates, here)
-    step, survey = look.step(), look.survey
-    survey = replace(survey, ranking=(*trials, *survey.ranking), tried=survey.tried + 1)
-    if step is None or not trials:
-        return survey, ()
-    others = [step.trial, *step.rivals]
-    return survey, tuple(other for other in others if other.gain >= trials[0].gain)
+    arm, nuisance = memoized_arm(ties.arm), comparison.nuisance
+    columns = [part.columns(arm, whole)[:, :, list(kept)] for part in nuisance.rows.data]
+    cause = comparison.catalogue.made(whole, kept, columns)
+    assert cause is not None
+    one = comparison.ranked(cause, nuisance)
+    judge = Judge(result.first, result.usual, settings.material)
+    rivals = [judge.ranked(other) for other in result.first.ranking if other.data >= one.data]
+    survey = survey_of(result, (), settings)
+    trial = replace(judge.ranked(one), probability=1.0 / (1.0 + len(rivals)))
+    survey = replace(survey, ranking=(trial, *survey.ranking))
+    return Step(trial, tuple(rivals), (trial,)), survey
 
 
 def _with_names_of(found: Explanation, fitted: Fitted) -> Explanation:

@@ -16,17 +16,16 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.elimination import columns_of, LinearFit
+from armid_ros.diagnosis.data.rows import make_problem
 from armid_ros.diagnosis.search.explanation import (
     as_bodies,
     Chosen,
     Explanation,
     in_model_as_given,
 )
-from armid_ros.diagnosis.search.held_out import held_out
-from armid_ros.diagnosis.search.trial import Candidate, contradicts
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.identification.fitting.normal_equations import informative_basis, NormalEquations
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -99,45 +98,78 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
     return left_out if unseen is None else _predicted(explanation, left_out.order, unseen)
 
 
+@dataclass(frozen=True)
+class _Folds:
+    """
+    The linear problem of a fitted arm, of which each fold is predicted from the others.
+
+    Attributes
+    ----------
+    square, aim, power : ndarray, shape (B, f, f), (B, f), (B,)
+        Products of all columns of each block with each other and with the residual that is left
+        without any name, and of the latter with itself.
+    fold : ndarray of int, shape (B,)
+        Fold of each block.
+    prior : NormalEquations
+        Prior of all values.
+
+    """
+
+    square: FloatArray
+    aim: FloatArray
+    power: FloatArray
+    fold: npt.NDArray[np.intp]
+    prior: NormalEquations
+
+    @classmethod
+    def of(cls, explanation: Explanation) -> tuple[_Folds, list[int], list[list[int]]]:
+        """Return the problem, its columns of no name, and those of the values of each name."""
+        fitted, evidence = explanation.fitted, explanation.evidence
+        first = len(fitted.change)
+        named = [[first + k for k in values] for values, _ in fitted.places]
+        problem = make_problem(
+            evidence.data, evidence.sigma, fitted.residual, list(fitted.columns)
+        )
+        every = [column for own in named for column in own]
+        values = fitted.estimate.values[[column - first for column in every]]
+        y = problem.y + problem.x[:, :, every] @ values
+        blocks = list(problem.blocks(problem.x, y))
+        folds = cls(
+            np.array([x.T @ x for x, _ in blocks]),
+            np.array([x.T @ own for x, own in blocks]),
+            np.array([own @ own for _, own in blocks]),
+            problem.fold_of_block,
+            fitted.prior,
+        )
+        return folds, list(range(first)), named
+
+    def left(self, columns: Sequence[int]) -> FloatArray:
+        """Return the held-out squares of each block beside some columns, shape (B,)."""
+        index = list(columns)
+        square, aim = self.square[:, index][:, :, index], self.aim[:, index]
+        prior, result = self.prior.among(index), self.power.copy()
+        for k in np.unique(self.fold):
+            own, others = self.fold == k, self.fold != k
+            basis = informative_basis(square[others].sum(axis=0) + prior.matrix)
+            values = basis @ (basis.T @ (aim[others].sum(axis=0) + prior.vector))
+            result[own] += (square[own] @ values - 2.0 * aim[own]) @ values
+        return result
+
+
 def _left_out(explanation: Explanation) -> Attribution:
     """Predict each fold from the others, adding the name with the largest gain at a time."""
-    view = LinearFit.of(explanation.fitted, explanation.evidence)
-    named = explanation.fitted.named
-    arm = explanation.reference.arm
-    columns = [view.columns(k)[0] for k in range(len(named))]
-    shapes = [c for k in range(len(named)) for c in view.columns(k)[1]]
-    remaining = list(range(len(named)))
-    taken = np.zeros((len(named), 0))
-    order: list[int] = []
-    whole: FloatArray | None = None
+    folds, free, named = _Folds.of(explanation)
+    remaining, order = list(range(len(named))), list[int]()
+    before = whole = folds.left(free)
+    taken = np.zeros((len(named), len(whole)))
     while remaining:
-        best: tuple[float, int, FloatArray] | None = None
-        asked = [c for k in remaining for c in columns[k]]
-        values = [view.value(c) for c in asked]
-        problem, free, prior = view.without(asked, values, shapes)
-        start, candidates = 0, []
-        for k in remaining:
-            span = slice(start, start + len(columns[k]))
-            candidates.append(Candidate(named[k].effect, span, named[k].kept, arm.robot))
-            start = span.stop
-        trials, power = held_out(problem, free, candidates, prior, whole=False)
-        whole = power if whole is None else whole
-        if not taken.size:
-            taken = np.zeros((len(named), len(power)))
-        by_column = {trial.candidate.columns.start: trial for trial in trials}
-        for k, candidate in zip(remaining, candidates, strict=True):
-            trial = by_column.get(candidate.columns.start)
-            if trial is not None and (best is None or trial.gain > best[0]):
-                best = trial.gain, k, trial.gains
-        if best is None:
-            order += remaining
-            break
-        _, k, taken[best[1]] = best
-        order.append(k)
-        remaining.remove(k)
-    if whole is None:
-        whole = view.power
-    return Attribution(tuple(order), whole, taken.reshape(len(named), len(whole)))
+        after = {k: folds.left([*free, *named[k]]) for k in remaining}
+        best = min(remaining, key=lambda k: float(after[k].sum()))
+        taken[best], before = before - after[best], after[best]
+        free = [*free, *named[best]]
+        order.append(best)
+        remaining.remove(best)
+    return Attribution(tuple(order), whole, taken)
 
 
 def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
@@ -168,7 +200,8 @@ def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence)
 def _acts(explanation: Explanation, name: int, evidence: Evidence) -> npt.NDArray[np.bool_]:
     """Return in which joints a name acts, shape (n,)."""
     own, arm = explanation.fitted.named[name], explanation.fitted.arm
-    blocks = [columns_of(own, arm, part) for part in evidence.data]
+    kept = list(own.kept)
+    blocks = [part.columns(arm, own.effect)[:, :, kept] for part in evidence.data]
     return np.asarray(np.any([np.any(block, axis=(0, 2)) for block in blocks], axis=0))
 
 
@@ -227,8 +260,12 @@ class Names:
         every, most = range(len(steps)), thresholds.open_share
         if names.shares.share(every) > most or attribute(names.stated, None).share(every) > most:
             return names
-        rest, stated = (one.with_nothing_named() for one in (names.rest, names.stated))
-        return cls(rest, stated, shares_of(stated, unseen, settings))
+        return names.with_nothing_named(unseen, settings)
+
+    def with_nothing_named(self, unseen: Evidence | None, settings: DiagnosisSettings) -> Names:
+        """Return the same with all names in the small print."""
+        rest, stated = (one.with_nothing_named() for one in (self.rest, self.stated))
+        return Names(rest, stated, shares_of(stated, unseen, settings))
 
 
 def _as_stated(
@@ -346,3 +383,25 @@ def may_be_zero(explanation: Explanation, name: int) -> bool:
     at_shapes = np.linalg.pinv(precision[np.ix_(asked, asked)], hermitian=True)
     deviation = np.sqrt(np.diag(at_shapes))
     return not np.any(excludes_zero(fitted.estimate.values[known[asked]], deviation))
+
+
+def contradicts(cross: FloatArray, square: FloatArray) -> bool:
+    """
+    Return whether data deny a cause: they follow it no more than noise would.
+
+    The slope of the residual on the prediction of the cause is one for a cause, zero for none.
+    Data in which it does nothing do not deny it: the standard deviation of the slope comes from
+    the scatter between blocks, and is no less than for white noise.
+
+    Parameters
+    ----------
+    cross, square : ndarray, shape (B,)
+        x'r and x'x of every block, of the prediction x and the residual r.
+
+    """
+    made = float(square.sum())
+    if made <= 0.0:
+        return False
+    slope = float(cross.sum()) / made
+    wide = 2.0 * float(np.sqrt(max(np.sum((cross - slope * square) ** 2), made))) / made
+    return slope + wide < 1.0 and slope - wide <= 0.0

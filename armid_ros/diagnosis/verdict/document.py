@@ -16,7 +16,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.trial import IDENTIFIABLE, ROUNDING, Survey, Trial
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import ParameterName
@@ -31,6 +31,10 @@ _MOST_CANDIDATES = 20
 #: Standard deviations of a value from which on it is detectable. On a two-link arm, effects of one
 #: to four times the resulting size were named, of half of it none.
 _SHOWS = 5.0
+#: Least resolution of an identifiable value: two that data do not separate have a half or less.
+_IDENTIFIABLE = 0.9
+#: Relative difference of squares below which it is rounding.
+_ROUNDING = 1e-6
 
 
 def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[str, Any]:
@@ -84,12 +88,16 @@ def _finding(finding: Finding) -> dict[str, Any]:
         'share': finding.share,
         'share_interval': list(finding.share_interval),
         'p': finding.p,
+        'probability': finding.probability,
         'parameters': [
             {'name': p.name, 'joint': p.joint, 'value': v, 'std': _finite(std), 'unit': p.unit}
             for p, v, std in rows
         ],
         'ambiguous_with': list(finding.ambiguous_with),
-        'rivals': [{'name': r.name, 'joints': list(r.joints)} for r in finding.rivals],
+        'rivals': [
+            {'name': r.name, 'joints': list(r.joints), 'probability': r.probability}
+            for r in finding.rivals
+        ],
         'experiment': finding.experiment,
         **_ties(finding),
     }
@@ -164,30 +172,19 @@ def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     explanation = diagnosis.explanation
     if explanation is None or explanation.survey is None:
         return []
-    survey, arm = explanation.survey, explanation.given
     return [
         {
-            'name': trial.candidate.effect.said_as,
-            'joints': list(trial.candidate.effect.joints),
-            'share': share_alone(trial, survey),
+            'name': trial.effect.said_as,
+            'joints': list(trial.effect.joints),
+            'share': trial.share,
             'held_out_gain': trial.gain,
             'replicated_in': trial.replicated,
             'visible_fraction': trial.visible,
-            'min_detectable': _finite(_said_size(trial, survey, arm)[1]),
-            'adjusted_p': min(1.0, trial.p * survey.tried),
+            'min_detectable': _finite(_said_size(trial, explanation.given)[1]),
+            'adjusted_p': trial.p,
         }
-        for trial in survey.ranking[:_MOST_CANDIDATES]
+        for trial in explanation.survey.ranking[:_MOST_CANDIDATES]
     ]
-
-
-def share_alone(trial: Trial, survey: Survey) -> float:
-    """
-    Return the share of the gap that a candidate takes if it is alone, at most all of it.
-
-    Where the values of a model are fitted beside it, it may take more than the model alone leaves.
-
-    """
-    return min(trial.gain / max(survey.total, 1e-300), 1.0)
 
 
 def _finite(value: float) -> float | None:
@@ -221,40 +218,38 @@ class Detectable:
     visible: float
 
 
-def smallest_size(trial: Trial, material: FloatArray) -> tuple[int, float]:
+def smallest_size(trial: Trial, robot: Robot) -> tuple[int, float]:
     """
-    Return the first identifiable parameter of a candidate, and its smallest detectable size.
+    Return the first identifiable parameter of a cause, and its smallest detectable size.
 
-    It differs from noise, and is no less than the sizes ``material``, (p,). It is inf where it is
-    larger than the parameter can be.
+    It differs from noise, and matters. It is inf where it is larger than the parameter can be.
 
     """
-    return next(_sizes(trial, material), (trial.candidate.kept[0], float('inf')))
+    return next(_sizes(trial, robot), (trial.named.kept[0], float('inf')))
 
 
-def _sizes(trial: Trial, material: FloatArray) -> Iterator[tuple[int, float]]:
-    """Yield every identifiable parameter of a candidate with its smallest detectable size."""
-    effect, robot = trial.candidate.effect, trial.candidate.robot
-    rows = zip(trial.candidate.kept, trial.std, trial.resolution, material, strict=True)
+def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
+    """Yield every identifiable parameter of a cause with its smallest detectable size."""
+    rows = zip(trial.named.kept, trial.std, trial.resolution, trial.least, strict=True)
     for index, std, resolution, least in rows:
         size = max(_SHOWS * float(std), float(least))
-        if resolution > IDENTIFIABLE and _possible(effect, index, size, robot):
+        if resolution > _IDENTIFIABLE and _possible(trial.effect, index, size, robot):
             yield index, size
 
 
-def _said_size(trial: Trial, survey: Survey, arm: ArmModel) -> tuple[ParameterName, float]:
+def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return a parameter of the effect that a candidate is said as, and its smallest detectable size.
+    Return a parameter of the effect that a cause is said as, and its smallest detectable size.
 
     It is inf where no size that the effect can have is detectable.
 
     """
-    effect, material = trial.candidate.effect, _material(trial, survey)
+    effect = trial.effect
     names = effect.parameters(arm.robot)
     if effect.said_as == effect.name:
-        index, size = smallest_size(trial, material)
+        index, size = smallest_size(trial, arm.robot)
         return names[index], size
-    for index, size in _sizes(trial, material):
+    for index, size in _sizes(trial, arm.robot):
         values = np.where(np.arange(len(names)) == index, size, 0.0)
         for said, theirs in effect.named_as(values, arm):
             most = int(np.argmax(np.abs(theirs)))
@@ -262,13 +257,7 @@ def _said_size(trial: Trial, survey: Survey, arm: ArmModel) -> tuple[ParameterNa
             called_so = said.name == effect.said_as and there > 0.0
             if called_so and _possible(said, most, there, arm.robot):
                 return said.parameters(arm.robot)[most], there
-    return names[trial.candidate.kept[0]], float('inf')
-
-
-def _material(trial: Trial, survey: Survey) -> FloatArray:
-    """Return the sizes of values from which they are material; zero where any size is, (p,)."""
-    always = np.zeros(len(trial.candidate.kept))
-    return survey.material.get(trial.candidate.key, always)
+    return names[trial.named.kept[0]], float('inf')
 
 
 def _possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
@@ -282,7 +271,7 @@ def _possible(effect: Effect, index: int, size: float, robot: Robot) -> bool:
     owner, which = divmod(index, len(effect.quantities))
     quantity = effect.quantities[which]
     largest = quantity.typical[1] if quantity.typical else 1.0
-    return size <= quantity.largest(effect.owners[owner], robot) and ROUNDING * size < largest
+    return size <= quantity.largest(effect.owners[owner], robot) and _ROUNDING * size < largest
 
 
 def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
@@ -291,9 +280,9 @@ def detectable(explanation: Explanation | None) -> tuple[Detectable, ...]:
     if explanation is None or survey is None:
         return ()
     rows = []
-    for trial in (*survey.ranking, *survey.nuisance):
-        effect = trial.candidate.effect
-        parameter, size = _said_size(trial, survey, explanation.given)
+    for trial in survey.ranking:
+        effect = trial.effect
+        parameter, size = _said_size(trial, explanation.given)
         rows.append(Detectable(effect.said_as, effect.joints, parameter, size, trial.visible))
     rows += [Detectable(name, joints, None, float('inf'), 0.0) for name, joints in survey.unseen]
     order = {name: position for position, name in enumerate(CATALOGUE)}

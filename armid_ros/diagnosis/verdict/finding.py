@@ -28,10 +28,11 @@ SAID = 0.01
 
 @dataclass(frozen=True)
 class Rival:
-    """A name that the data do not exclude in place of another, and its joints."""
+    """A name that the data do not exclude in place of another, where, and how likely it is."""
 
     name: str
     joints: tuple[str, ...]
+    probability: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,13 @@ class Finding:
     share_interval : tuple of float
         Its 95 % interval.
     p : float
-        Probability of such a gain by chance, corrected for all candidates that were tried.
+        Probability that it is not there, or has not changed.
     rivals : tuple of Rival
         Names that the data do not exclude in its place, the likeliest first.
     experiment : str
         The experiment that would separate them; empty if there are no rivals.
     gain : float
-        Reduction of the held-out squares.
+        Reduction of the held-out squares; twice the log Bayes factor in the small print.
     sign : str
         What a positive value means, where the name does not say it.
     ties : tuple of Tie
@@ -78,6 +79,8 @@ class Finding:
         where none is known.
     look_at : str
         What to look at for the one cause that several names stand for, instead of what each says.
+    probability : float
+        Among all explanations.
 
     """
 
@@ -99,6 +102,7 @@ class Finding:
     of_joint: tuple[str, float] = ('', 0.0)
     added_to: tuple[float, ...] = ()
     look_at: str = ''
+    probability: float = 0.0
 
     @property
     def had(self) -> tuple[float, ...]:

@@ -206,7 +206,7 @@ def for_a_second(
 
     What comes and goes is little of a whole recording. Squares may be larger on motions that were
     not used, and by as much again in the worst second of such a motion. What a model has more than
-    the given one is not exact to less than a share (`tie`) of its squares.
+    the given one is not exact to less than a share (`inexact`) of its squares.
 
     """
     thresholds, left = settings.thresholds, evidence.residuals(arm)
@@ -216,7 +216,7 @@ def for_a_second(
     pairs = zip(evidence.residuals(given), left, strict=True)
     made, _ = _worst_second(evidence.data, [had - has for had, has in pairs], evidence.sigma)
     limit = np.where(then > 0.0, most * then, np.inf) + evidence.matters(settings)
-    ratio = now / (limit + thresholds.tie * made)
+    ratio = now / (limit + thresholds.inexact * made)
     return Excess(ratio, f'in the second at {times[int(np.argmax(ratio))]}')
 
 

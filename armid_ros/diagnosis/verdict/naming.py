@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.trial import SelectedEffect, Step, Survey, Trial
-from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+from armid_ros.diagnosis.search.trial import Step, Trial
+from armid_ros.diagnosis.verdict.attribution import Attribution
 from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
 from armid_ros.diagnosis.verdict.words import Unnamed
 from armid_ros.effects import CATALOGUE, Effect
@@ -24,6 +25,8 @@ import numpy as np
 
 #: Slope above which a translated value depends on one that the data do not determine.
 _ALONG = 1e-6
+#: Most rivals that are listed for a name: more than two help nobody.
+_RIVALS = 2
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ def findings(
                 tuple(row[2] for row in rows),
                 attribution.share(indices),
                 attribution.interval(indices, rng),
-                max(min(1.0, step.trial.p * step.tried) for step in steps),
+                max(step.trial.p for step in steps),
                 rivals,
                 _separating(name, order, rivals[0]) if rivals else '',
                 float(attribution.taken[indices].sum()),
@@ -89,6 +92,7 @@ def findings(
                 explanation.fitted.named[own[0]].effect.traits.look_at
                 if len(together) > 1
                 else '',
+                min(step.trial.probability for step in steps),
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
@@ -116,18 +120,14 @@ def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> t
     return explanation.given.robot.joints[joint], float(taken[joint])
 
 
-def small_print(
-    trials: Sequence[Trial], total: float, tried: int, arm: ArmModel
-) -> tuple[Finding, ...]:
+def small_print(trials: Sequence[Trial], arm: ArmModel) -> tuple[Finding, ...]:
     """Return findings of causes that are significant, can be, and do not matter."""
     result = []
     for trial in trials:
-        effect, kept = trial.candidate.effect, list(trial.candidate.kept)
+        effect, kept = trial.effect, list(trial.named.kept)
         if not _can_be(trial, arm):
             continue
         names = effect.parameters(arm.robot)
-        spread = np.sqrt(np.sum((trial.gains - trial.gains.mean()) ** 2))
-        share, wide = min(trial.gain / total, 1.0), 2.0 * float(spread) / total
         result.append(
             Finding(
                 effect.said_as,
@@ -135,10 +135,11 @@ def small_print(
                 tuple(names[k] for k in kept),
                 tuple(trial.values.tolist()),
                 tuple(trial.std.tolist()),
-                share,
-                (share - wide, share + wide),
-                min(1.0, trial.p * tried),
+                trial.share,
+                (trial.share, trial.share),
+                trial.p,
                 gain=trial.gain,
+                probability=trial.probability,
                 sign=effect.traits.sign,
                 weighs=effect.traits.weighs,
             )
@@ -148,22 +149,21 @@ def small_print(
 
 def not_named(explanation: Explanation, arm: ArmModel) -> Unnamed:
     """Return the small print, and where nothing is named what may have changed."""
-    total = max(float(attribute(explanation, None).whole.sum()), 1e-300)
     survey, small = explanation.survey, sorted(explanation.minor, key=lambda trial: -trial.gain)
-    minor = small_print(small, total, 1 if survey is None else survey.tried, arm)
+    minor = small_print(small, arm)
     if survey is None or explanation.steps:
         return Unnamed(minor)
-    may_be = (_as_looked_at(one, survey, arm) for one in (survey.suspected, survey.unproven))
-    return Unnamed(minor, *may_be)
+    return Unnamed(
+        minor, *(_as_looked_at(one, arm) for one in (survey.suspected, survey.unproven))
+    )
 
 
-def _as_looked_at(trial: Trial | None, survey: Survey, arm: ArmModel) -> tuple[Finding, ...]:
+def _as_looked_at(trial: Trial | None, arm: ArmModel) -> tuple[Finding, ...]:
     """Return a cause of the first look as one finding for each of its names."""
     if trial is None:
         return ()
-    effect, total = trial.candidate.effect, max(survey.total, 1e-300)
-    words = effect.named_as(np.ones(len(effect.parameters(arm.robot))), arm)
-    found = small_print([trial], total, survey.tried, arm)
+    words = trial.effect.named_as(np.ones(len(trial.effect.parameters(arm.robot))), arm)
+    found = small_print([trial], arm)
     if len(words) == 1:
         return found
     names = {part.name for part, _ in words}
@@ -181,9 +181,7 @@ def _can_be(trial: Trial, arm: ArmModel) -> bool:
     A search lets values be beyond a bound by what noise makes; there is nothing to say of those.
 
     """
-    lower, upper = (
-        bound[list(trial.candidate.kept)] for bound in room(trial.candidate.effect, arm)
-    )
+    lower, upper = (bound[list(trial.named.kept)] for bound in room(trial.effect, arm))
     beyond = (trial.values < lower) | (trial.values > upper)
     return not np.any(beyond & excludes_zero(trial.values, trial.std))
 
@@ -262,7 +260,7 @@ def _rivals(
     steps: Sequence[Step], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
-    Return the rivals of a name in its joints (`own`), the largest gain first, with their joints.
+    Return the likeliest rivals of a name in its joints (`own`), with their joints.
 
     The same name in another joint is a rival as well; the names of other findings are none.
 
@@ -270,16 +268,16 @@ def _rivals(
     best: dict[str, list[Trial]] = {}
     for step in steps:
         here: dict[str, Trial] = {}
-        for trial in sorted(step.rivals, key=lambda trial: -trial.gain):
-            effect = trial.candidate.effect
+        for trial in sorted(step.rivals, key=lambda trial: -trial.probability):
+            effect = trial.effect
             if not (effect.said_as == own.name and set(effect.joints) <= set(own.joints)):
                 here.setdefault(effect.said_as, trial)
         for name in here.keys() - others:
             best.setdefault(name, []).append(here[name])
-    order = sorted(best, key=lambda name: -max(trial.gain for trial in best[name]))
+    likely = {name: max(trial.probability for trial in found) for name, found in best.items()}
     return tuple(
-        Rival(name, _joints([trial.candidate.effect.joints for trial in best[name]], arm))
-        for name in order
+        Rival(name, _joints([trial.effect.joints for trial in best[name]], arm), likely[name])
+        for name in sorted(likely, key=lambda name: -likely[name])[:_RIVALS]
     )
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.candidates import frees_body
 from armid_ros.diagnosis.search.explanation import Chosen, ESTIMATED, Explanation
+from armid_ros.diagnosis.search.question import frees_body
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.attribution import Names
 from armid_ros.diagnosis.verdict.gap import excess_of, for_a_second, harmed, held

@@ -115,7 +115,7 @@ def where_it_is(
         return where_left(explanation, reference, shown, settings)
     before, after = shown.residuals(reference), shown.residuals(fitted)
     taken = shown.chi2_per_row(before) - shown.chi2_per_row(after)
-    least = settings.thresholds.tie * max(float(taken.sum()), 0.0)
+    least = settings.thresholds.inexact * max(float(taken.sum()), 0.0)
     return locate(explanation.given, shown, before, np.where(taken > least, taken, 0.0))
 
 

@@ -10,11 +10,8 @@ from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.search_state import cost
-from armid_ros.diagnosis.search.trial import Survey, Trial
-from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.document import share_alone
-from armid_ros.report.notation import percent, probability, with_interval
+from armid_ros.diagnosis.search.trial import Trial
+from armid_ros.report.notation import percent, with_interval
 from armid_ros.report.page import Section
 import numpy as np
 
@@ -30,9 +27,7 @@ class CandidateRow:
     name: str
     joints: str
     share: str
-    price: str
-    z: str
-    adjusted_p: str
+    odds: str
     value: str
     visible: str
     named: bool
@@ -40,23 +35,12 @@ class CandidateRow:
 
 @dataclass(frozen=True)
 class CandidateTable(Section):
-    """
-    What each cause alone would take of the gap, and what its freedom costs.
-
-    Attributes
-    ----------
-    diagnosis : Diagnosis
-        What was found.
-    settings : DiagnosisSettings
-        What was asked.
-
-    """
+    """What each cause alone would explain."""
 
     title: ClassVar[str] = 'Candidates'
     template: ClassVar[str] = 'candidates.html'
 
     diagnosis: Diagnosis
-    settings: DiagnosisSettings
 
     @property
     def rows(self) -> Sequence[CandidateRow]:
@@ -65,19 +49,16 @@ class CandidateTable(Section):
         survey = None if explanation is None else explanation.survey
         if survey is None:
             return []
-        return [self._row(trial, survey) for trial in survey.ranking[:_MOST]]
+        return [self._row(trial) for trial in survey.ranking[:_MOST]]
 
-    def _row(self, trial: Trial, survey: Survey) -> CandidateRow:
-        effect = trial.candidate.effect
+    def _row(self, trial: Trial) -> CandidateRow:
+        effect = trial.effect
         names = {finding.name for finding in self.diagnosis.findings}
-        price = self.settings.thresholds.price * cost(trial, self.settings)
         return CandidateRow(
             effect.name.replace('_', ' '),
             ', '.join(effect.joints) or 'whole arm',
-            percent(share_alone(trial, survey)) if survey.total > 0.0 else '',
-            percent(price),
-            f'{trial.z:.1f}',
-            probability(min(1.0, trial.p * survey.tried)),
+            percent(trial.share),
+            f'{trial.gain / 2.0:.1f}',
             self._value(trial),
             percent(trial.visible),
             effect.said_as in names,
@@ -85,7 +66,7 @@ class CandidateTable(Section):
 
     def _value(self, trial: Trial) -> str:
         """Return the first value, where it is one that the cause can have."""
-        arm, effect, kept = self.diagnosis.arm, trial.candidate.effect, list(trial.candidate.kept)
+        arm, effect, kept = self.diagnosis.arm, trial.effect, list(trial.named.kept)
         if self.diagnosis.explanation is not None:
             arm = self.diagnosis.explanation.given
         lower, upper = (bound[kept] for bound in room(effect, arm))

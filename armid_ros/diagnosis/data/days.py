@@ -1,0 +1,85 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The recordings of two days in weighted rows, joint by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class Rows:
+    """
+    Recordings in rows over a unit.
+
+    Attributes
+    ----------
+    data : tuple of Trajectory
+        Of the first day and of the day in question, recordings numbered through.
+    sigma : tuple of ndarray, each (n,)
+        Unit of each trajectory [N m].
+    before : int
+        Number of recordings of the first day.
+    amplitude : tuple of ndarray, each (n,)
+        What discrepancies of each recording are measured in [N m].
+
+    """
+
+    data: tuple[Trajectory, ...]
+    sigma: tuple[FloatArray, ...]
+    before: int
+    amplitude: tuple[FloatArray, ...]
+
+    @cached_property
+    def weight(self) -> list[FloatArray]:
+        """Return the weights of each trajectory, (M, n)."""
+        pairs = zip(self.data, self.sigma, strict=True)
+        return [row_weights([part], [sigma]) for part, sigma in pairs]
+
+    @cached_property
+    def today(self) -> npt.NDArray[np.bool_]:
+        """Return which recordings are of the day in question."""
+        return np.arange(max(part.fold for part in self.data) + 1) >= self.before
+
+    @property
+    def repeated(self) -> bool:
+        """Return whether recordings tell what values of one day differ by."""
+        return 0 < self.before and len(self.today) > 2
+
+    @cached_property
+    def in_question(self) -> list[int]:
+        """Return the trajectories of the day in question."""
+        return [k for k, part in enumerate(self.data) if self.today[part.fold]]
+
+    @cached_property
+    def informative(self) -> FloatArray:
+        """Return the number of informative rows of the day in question, at least 1, (n,)."""
+        count = np.sum([(self.weight[k] > 0.0).sum(axis=0) for k in self.in_question], axis=0)
+        return np.asarray(np.maximum(count, 1), dtype=float)
+
+    @cached_property
+    def torque(self) -> FloatArray:
+        """Root mean square torque where joints move, shape (n,) [N m]."""
+        parts = [part.torque[part.informative.any(axis=1)] for part in self.data]
+        rms = np.sqrt(np.mean(np.concatenate(parts) ** 2, axis=0))
+        return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
+
+    def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
+        """Return columns (M, n, p) of trajectories in weighted rows of recordings, (t, M, p)."""
+        index = list(joints)
+        rows = [
+            (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)
+            for own, weight in zip(columns, self.weight, strict=True)
+        ]
+        folds = [part.fold for part in self.data]
+        return [
+            np.concatenate([x for x, fold in zip(rows, folds, strict=True) if fold == k], axis=1)
+            for k in range(len(self.today))
+        ]

@@ -1,0 +1,88 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""A cause that is compared: an effect with a shape in one place, and its columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from armid_ros.effects import Effect
+from armid_ros.motion import FloatArray
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Cause:
+    """
+    An effect on certain joints with one shape.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape included.
+    kept : tuple of int
+        Its parameters that are fitted; the others are zero.
+    unit : ndarray, shape (p,)
+        Values whose torque is that of the joint, or that are as large as such values get.
+    prior : float
+        Log odds before any data.
+    joints : tuple of int
+        The t joints in whose rows it shows.
+    columns : tuple of ndarray, each (t, M, p)
+        Weighted columns in each recording.
+    products, own, aim : tuple of ndarray, each (q, p), (p, p), (p,)
+        Products of these with the nuisance columns, with each other, and with the residual.
+    torque : ndarray, shape (n, p)
+        Torque of a unit of each value on the day in question, root mean square [N m].
+    shapes : int
+        Number of shapes that were tried.
+
+    """
+
+    effect: Effect
+    kept: tuple[int, ...]
+    unit: FloatArray
+    prior: float
+    joints: tuple[int, ...]
+    columns: tuple[FloatArray, ...]
+    products: tuple[FloatArray, ...]
+    own: tuple[FloatArray, ...]
+    aim: tuple[FloatArray, ...]
+    torque: FloatArray
+    shapes: int = 1
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
+        """Name, joints and quantities, which causes of different shapes have in common."""
+        return self.effect.name, self.effect.joints, self.kept
+
+    def products_with(self, other: Cause, recording: int) -> FloatArray:
+        """Return products of the columns with those of another cause, (p, p')."""
+        total = np.zeros((len(self.unit), len(other.unit)))
+        for k, joint in enumerate(self.joints):
+            if joint in other.joints:
+                theirs = other.columns[recording][other.joints.index(joint)]
+                total += self.columns[recording][k].T @ theirs
+        return total
+
+    def of_shapes(self, count: int) -> Cause:
+        """Return the same as one of so many shapes."""
+        return replace(self, shapes=count)
+
+
+@dataclass(frozen=True)
+class SelectedEffect:
+    """
+    A named effect, as it is fitted.
+
+    Attributes
+    ----------
+    effect : Effect
+        Joints and shape.
+    kept : tuple of int
+        Its parameters that are fitted; the others are zero.
+
+    """
+
+    effect: Effect
+    kept: tuple[int, ...]

@@ -1,0 +1,398 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The comparison of causes: the best is accepted while anything is beyond doubt.
+
+Whether anything has changed is decided with the spread of values between recordings. Which cause
+it was is decided by the torque that causes explain, of which two in a hundred are no difference:
+the law of a cause is inexact.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import product
+
+from armid_ros.diagnosis.search.candidates import Causes, line_search
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.nuisance import Marginal, Nuisance, Setting
+from armid_ros.diagnosis.search.odds import (
+    CauseFit,
+    IMPOSSIBLE,
+    odds,
+    OWN_SPREADS,
+    POPULATION_SPREAD,
+    usual_spread,
+)
+from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.effects import Effect
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Amplitudes that are tried over the misfit: of d0, of d_k, and of the noise.
+_SHARED, _OWN = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4), (0.2, 0.4, 0.8)
+#: Of the noise over the misfit, which contains it.
+_NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
+#: Without a baseline: of d0 and d_k over the torque, and the logarithms of their prior odds.
+_SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
+#: The same of the noise over that of two equal periods.
+_FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
+#: Rows of one independent row without a baseline.
+_LASTING = 2.0
+#: Causes whose shapes are refined, that are compared in the end, and that are accepted.
+_REFINED, _COMPARED, _MOST = 5, 14, 5
+#: Of how many causes one is used for the usual spread.
+_SAMPLED = 8
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """
+    A cause that was compared.
+
+    Attributes
+    ----------
+    cause : Cause
+        The cause, in its best shape.
+    fit : CauseFit
+        Its values.
+    data : float
+        Log Bayes factor of the torque that it explains.
+    odds : float
+        Log odds that it is there, or has changed.
+    under : Marginal
+        What it was compared with, under its likeliest setting.
+    probability : float
+        Among all explanations.
+
+    """
+
+    cause: Cause
+    fit: CauseFit
+    data: float
+    odds: float
+    under: Marginal
+    probability: float = 0.0
+
+    @property
+    def worth(self) -> float:
+        """Log posterior probability, but for a constant."""
+        return self.data + self.cause.prior
+
+    @property
+    def left(self) -> float:
+        """Half of the weighted squares that it leaves."""
+        return self.under.loss - self.fit.explained
+
+    def ahead(self, other: Ranked, levels: Thresholds) -> float:
+        """
+        Return the log odds to another cause.
+
+        A lead of a share of what is explained is none, as laws are inexact, unless one leaves so
+        little that the other is no fit then. Then what freedom costs and what is commoner
+        decide.
+
+        """
+        lead = self.fit.explained - other.fit.explained
+        slack = min(
+            levels.inexact * max(self.fit.explained, other.fit.explained),
+            (levels.same_fit - 1.0) * max(min(self.left, other.left), 0.0),
+        )
+        seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
+        return seen + (self.worth - self.fit.explained) - (other.worth - other.fit.explained)
+
+
+@dataclass(frozen=True)
+class Look:
+    """
+    A look at all causes.
+
+    Attributes
+    ----------
+    ranking : tuple of Ranked
+        The best causes in their best shape, the likeliest first.
+    others : tuple of Cause
+        All other causes in the best shape of those that a search starts from.
+    nuisance : Nuisance
+        What they were compared with.
+    under : Marginal
+        The same under the likeliest setting.
+
+    """
+
+    ranking: tuple[Ranked, ...]
+    others: tuple[Cause, ...]
+    nuisance: Nuisance
+    under: Marginal
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """
+    A cause that was found, and what the data do not tell from it.
+
+    Attributes
+    ----------
+    best : Ranked
+        The cause.
+    tied : tuple of Ranked
+        Those within the odds of a tie, the likeliest first.
+    look : Look
+        The look in which it was found.
+
+    """
+
+    best: Ranked
+    tied: tuple[Ranked, ...]
+    look: Look
+
+
+@dataclass(frozen=True)
+class Result:
+    """
+    What a comparison found.
+
+    Attributes
+    ----------
+    accepted : tuple of Accepted
+        The causes, in the order in which they were found.
+    nuisance : Nuisance
+        What is fitted with them, and they themselves.
+    under : Marginal
+        The same under the likeliest setting.
+    first, last : Look
+        The first and the last look.
+    usual : float
+        Usual spread of values between recordings.
+    effects : tuple of Effect
+        Every effect in every place that was looked for.
+
+    """
+
+    accepted: tuple[Accepted, ...]
+    nuisance: Nuisance
+    under: Marginal
+    first: Look
+    last: Look
+    usual: float
+    effects: tuple[Effect, ...]
+
+
+@dataclass(frozen=True)
+class CauseComparison:
+    """
+    Causes of what a model leaves, compared by their evidence.
+
+    Attributes
+    ----------
+    nuisance : Nuisance
+        The data and what causes are compared with.
+    catalogue : Causes
+        The causes.
+    thresholds : Thresholds
+        Odds that decide.
+    grid : tuple of Setting
+        Amplitudes; see `settings_of_baseline`.
+
+    """
+
+    nuisance: Nuisance
+    catalogue: Causes
+    thresholds: Thresholds
+    grid: tuple[Setting, ...]
+    _known: dict[int, tuple[Nuisance, list[Marginal], list[Cause]]] = field(
+        default_factory=dict, compare=False
+    )
+
+    @cached_property
+    def usual(self) -> float:
+        """Return the usual spread of values between recordings."""
+        if not self.nuisance.rows.before:
+            return POPULATION_SPREAD
+        settings, causes = self._at(self.nuisance)
+        return usual_spread(causes[::_SAMPLED], self.nuisance, settings[0])
+
+    def found(self) -> Result:
+        """Accept the best cause as long as any is beyond doubt; drop what others make needless."""
+        accepted, nuisance = list[Accepted](), self.nuisance
+        first = last = self.look(nuisance)
+        while len(accepted) < _MOST:
+            explained = sum(max(one.best.data, 0.0) for one in accepted)
+            best = self.best(last, explained)
+            if best is None:
+                break
+            accepted.append(best)
+            nuisance = nuisance.and_cause(best.best.cause, best.best.fit.size)
+            accepted, nuisance = self._pruned(accepted, nuisance)
+            last = self.look(nuisance)
+        if len(accepted) > 1:
+            accepted, nuisance = self._exchanged(accepted, nuisance)
+        under = self._likeliest(nuisance)
+        effects = tuple(self.catalogue.effects)
+        return Result(tuple(accepted), nuisance, under, first, last, self.usual, effects)
+
+    def best(self, look: Look, explained: float) -> Accepted | None:
+        """Return the best cause of a look with its rivals; None if none is beyond doubt."""
+        levels = self.thresholds
+        telling = [
+            one
+            for one in look.ranking
+            if one.data > min(levels.inexact * explained, (levels.same_fit - 1.0) * one.left)
+        ]
+        able = [one for one in telling if one.odds > levels.alone]
+        if not able or max(one.odds for one in able) < levels.alarm:
+            return None
+        winner = min(able, key=lambda one: able[0].ahead(one, levels))
+        others = [one for one in telling if one is not winner]
+        behind = np.array([-winner.ahead(one, levels) for one in others])
+        total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
+        rated = [replace(winner, probability=float(np.exp(-total)))]
+        for one, odds_to_winner in zip(others, behind, strict=True):
+            if odds_to_winner > -levels.tie:
+                rated.append(replace(one, probability=float(np.exp(odds_to_winner - total))))
+        return Accepted(rated[0], tuple(rated[1:]), look)
+
+    def _exchanged(
+        self, accepted: list[Accepted], nuisance: Nuisance
+    ) -> tuple[list[Accepted], Nuisance]:
+        """
+        Ask anew for each cause but the last, with those that were accepted after it.
+
+        The cause that is accepted first is compared while all the rest is unexplained: one that
+        takes a part of the rest as well is ahead of the right one.
+
+        """
+        for _ in range(len(accepted) - 1):
+            others = nuisance.without(0)
+            again = self.best(self.look(others), 0.0) or accepted[0]
+            accepted = [*accepted[1:], again]
+            nuisance = others.and_cause(again.best.cause, again.best.fit.size)
+        return accepted, nuisance
+
+    def _at(self, nuisance: Nuisance) -> tuple[list[Marginal], list[Cause]]:
+        """Return the nuisance parameters under all settings, and the causes to compare."""
+        if id(nuisance) not in self._known:
+            settings = [nuisance.marginal(one) for one in self.grid]
+            likeliest = max(settings, key=lambda one: one.evidence)
+            causes = self.catalogue.causes(nuisance, likeliest)
+            self._known[id(nuisance)] = nuisance, settings, causes
+        return self._known[id(nuisance)][1:]
+
+    def _likeliest(self, nuisance: Nuisance) -> Marginal:
+        settings = [nuisance.marginal(one) for one in self.grid]
+        return max(settings, key=lambda one: one.evidence)
+
+    def look(self, nuisance: Nuisance) -> Look:
+        """Compare every cause that is not accepted yet, and refine the shapes of the best."""
+        settings, causes = self._at(nuisance)
+        likeliest = max(settings, key=lambda one: one.evidence)
+        first: dict[object, tuple[float, Cause, Marginal]] = {}
+        tried = settings if len(settings) == 1 else _leading(settings)
+        for cause, under in product(causes, tried):
+            worth = odds(cause, nuisance, under).factor + under.evidence + cause.prior
+            if worth > first.get(cause.key, (-np.inf,))[0]:
+                first[cause.key] = worth, cause, under
+        best = sorted(first.values(), key=lambda one: -one[0])
+        result = []
+        for n, (_, cause, under) in enumerate(best[:_COMPARED]):
+            if n < _REFINED and cause.effect.shapes:
+                cause = self._in_best_shape(cause, nuisance, under)
+            result.append(self.ranked(cause, nuisance))
+        ranking = tuple(sorted(result, key=lambda one: -one.worth))
+        others = tuple(cause for _, cause, _ in best[_COMPARED:])
+        return Look(ranking, others, nuisance, likeliest)
+
+    def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
+        """Compare a cause with nothing over all settings."""
+        settings, _ = self._at(nuisance)
+        fits = [(odds(cause, nuisance, one), one) for one in settings]
+        nothing = np.logaddexp.reduce([under.evidence for _, under in fits])
+        total = np.logaddexp.reduce([fit.factor + under.evidence for fit, under in fits])
+        fit, under = max(fits, key=lambda pair: pair[0].factor + pair[1].evidence)
+        data = float(total - nothing)
+        there = data + cause.prior
+        if nuisance.rows.repeated:
+            places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
+            surely = odds(cause, nuisance, settings[0], self.usual, OWN_SPREADS).factor
+            there = surely - float(np.log(cause.shapes * places))
+        return Ranked(cause, fit, data, there, under)
+
+    def _in_best_shape(self, cause: Cause, nuisance: Nuisance, under: Marginal) -> Cause:
+        """Return a cause in the shape near its own that explains most."""
+        best = [(odds(cause, nuisance, under).factor, cause)]
+
+        def gain(shape: FloatArray) -> float:
+            other = self.catalogue.reshaped(cause, shape)
+            if other is None:
+                return IMPOSSIBLE
+            best.append((odds(other, nuisance, under).factor, other))
+            return best[-1][0]
+
+        shape = np.array(cause.effect.shape)
+        for k, kind in enumerate(cause.effect.shapes * len(cause.effect.owners)):
+            shape = line_search(gain, shape, k, kind)
+        return max(best, key=lambda one: one[0])[1]
+
+    def _pruned(
+        self, accepted: list[Accepted], nuisance: Nuisance
+    ) -> tuple[list[Accepted], Nuisance]:
+        """Drop causes, but the last, whose posterior says that they may be zero."""
+        while len(accepted) > 1:
+            values, covariance = nuisance.whole(self._likeliest(nuisance))
+            worth = []
+            for (cause, size), span in zip(nuisance.accepted, nuisance.spans, strict=True):
+                mean, own = values[span], covariance[span, span]
+                gain = float(mean @ np.linalg.solve(own, mean)) + np.linalg.slogdet(own)[1]
+                gain -= 2.0 * float(np.sum(np.log(size * cause.unit)))
+                worth.append(0.5 * gain + cause.prior)
+            least = int(np.argmin(worth))
+            if worth[least] > self.thresholds.alarm or least == len(accepted) - 1:
+                break
+            accepted, nuisance = (
+                [*accepted[:least], *accepted[least + 1 :]],
+                nuisance.without(least),
+            )
+        return accepted, nuisance
+
+
+def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
+    """Return the amplitudes that maximise the evidence of the baseline."""
+    before = np.flatnonzero(~nuisance.rows.today).tolist()
+    lasting = 1.0
+    for _ in range(2):
+        tried = (
+            nuisance.marginal(Setting(True, shared, own, noise, lasting), before)
+            for shared, own, noise in product(_SHARED, _OWN, _NOISE)
+        )
+        found = max(tried, key=lambda one: one.evidence)
+        lasting = nuisance.lasting(found, before, _LASTING)
+    return (replace(found.setting, lasting=lasting),)
+
+
+def settings_alone() -> tuple[Setting, ...]:
+    """Return the amplitudes that are compared without a baseline."""
+    return tuple(
+        Setting(free, share, share, factor, _LASTING, odds + more)
+        for free in (False, True)
+        for share, odds in _SHARES
+        for factor, more in _FACTORS
+    )
+
+
+def settings_of_misfit(free: bool) -> tuple[Setting, ...]:
+    """Return the amplitudes that are compared where only the size of the misfit is known."""
+    return tuple(
+        Setting(free, share, share, noise, _LASTING) for share, noise in product(_OWN, (0.5, 1.1))
+    )
+
+
+def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
+    """Return the best settings of a body as given and of a free one, and those of noise alone."""
+    found = []
+    for free in (False, True):
+        own = [one for one in settings if one.setting.free is free]
+        found += [max(own, key=lambda one: one.evidence), own[0]] if own else []
+    return found

@@ -1,0 +1,412 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What causes are compared with: body, friction, and the discrepancy of the model.
+
+For recording k, in weighted rows, in each joint
+
+    y_k = X_k b + B_k (d0 + d_k) + Z_k (g0 + [k is of the day in question] g + u_k) + e_k
+
+with the body b (prior: the description), the discrepancy d0 that all recordings share and d_k of
+one motion (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001), and the values g
+of a cause. All is Gaussian given the amplitudes of d0, d_k and e_k, so that each d_k is integrated
+out of the normal equations of its recording.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.baseline import described_precision, excited, Identified
+from armid_ros.diagnosis.data.days import Rows
+from armid_ros.diagnosis.data.discrepancy import Discrepancy
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.estimate import ParameterName
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy import linalg
+
+#: Share of a column's squares that its prior is at the least, so that all can be solved for.
+_HELD = 1e-12
+#: Share by which a described value of an effect, or a torque where a model was never tried, may be
+#: off. Values of the laboratory are off by up to 0.1, friction of an arm by 0.2 in a day.
+_DESCRIBED = 0.25
+#: Fewest rows of a correlation, the largest that is none, and the largest lag [rows].
+_FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
+
+
+@dataclass(frozen=True)
+class Setting:
+    """
+    Whether the body is free, and amplitudes.
+
+    Attributes
+    ----------
+    free : bool
+        Whether the body is fitted anew; what has no given values always is.
+    shared, own : float
+        Standard deviations of d0 and d_k.
+    noise : float
+        That of e_k, over the unit of the rows.
+    lasting : float
+        Rows that make one independent row.
+    prior : float
+        Log prior probability.
+
+    """
+
+    free: bool
+    shared: float
+    own: float
+    noise: float
+    lasting: float
+    prior: float = 0.0
+
+    @property
+    def precision(self) -> float:
+        """Precision of a row."""
+        return 1.0 / (self.lasting * self.noise**2)
+
+
+@dataclass(frozen=True)
+class MotionDiscrepancy:
+    """What the discrepancy d_k of one recording leaves: see `Nuisance.marginal`."""
+
+    inverse: FloatArray
+    aim: FloatArray
+    regressed: FloatArray
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """
+    The nuisance parameters under one setting.
+
+    Attributes
+    ----------
+    setting : Setting
+        The setting.
+    used : ndarray of int, shape (u,)
+        Which parameters are fitted.
+    root : ndarray, shape (u, u)
+        R of their covariance R'R.
+    values : ndarray, shape (u,)
+        Their means.
+    evidence : float
+        Log evidence.
+    loss : float
+        Half of the weighted squares that are left.
+    motions : mapping of int to MotionDiscrepancy
+        The discrepancy of each recording.
+
+    """
+
+    setting: Setting
+    used: npt.NDArray[np.intp]
+    root: FloatArray
+    values: FloatArray
+    evidence: float
+    loss: float
+    motions: dict[int, MotionDiscrepancy]
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """
+    Columns of body, friction and discrepancy, in coordinates in which they are apart.
+
+    Attributes
+    ----------
+    rows : Rows
+        The data.
+    arm : ArmModel
+        The model, with friction also in joints for which none is given.
+    parameters : tuple of ParameterName
+        Parameters b of its body and friction, r.
+    turn : ndarray, shape (r, r)
+        Parameters of the columns, b = turn x.
+    described : ndarray, shape (r, r)
+        Prior precision of b.
+    open : ndarray of bool, shape (r,)
+        Which of b have no given value.
+    columns : tuple of ndarray, each (n, M, q)
+        Weighted columns of each recording: body, and the discrepancy of one joint after the other.
+    residual : tuple of ndarray, each (n, M)
+        Weighted residual of the model.
+    accepted : tuple of (Cause, float)
+        Causes that were found, and the standard deviation of the prior of their values.
+
+    """
+
+    rows: Rows
+    arm: ArmModel
+    parameters: tuple[ParameterName, ...]
+    turn: FloatArray
+    described: FloatArray
+    open: npt.NDArray[np.bool_]
+    columns: tuple[FloatArray, ...]
+    residual: tuple[FloatArray, ...]
+    accepted: tuple[tuple[Cause, float], ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        rows: Rows,
+        arm: ArmModel,
+        rng: np.random.Generator,
+        known: Identified | None = None,
+    ) -> Nuisance:
+        """Compute the columns; ``known`` adds to the description."""
+        base, columns = excited(arm, arm.base_parameters(rng), rows.data)
+        described = described_precision(base, arm)
+        if known is not None:
+            described = known.prior(arm, base).described
+        rigid = len(arm.robot.rigid_parameters)
+        values = arm.theta[base.independent]
+        unset = (base.independent >= rigid) & (values == 0.0)  # noqa: RUF069 - no given value
+        given = (base.independent >= rigid) & ~unset
+        described[given, given] += (_DESCRIBED * values[given]) ** -2.0
+        joints = range(arm.robot.n_joints)
+        flat = [x.reshape(-1, base.rank) for x in rows.weighted(columns, joints)]
+        turn = _apart(np.concatenate(flat), described, unset)
+        functions = Discrepancy.over(rows.data, np.ones(arm.robot.n_joints), arm)
+        both = [
+            np.concatenate([x @ turn, part.columns(arm, functions)], axis=2)
+            for x, part in zip(columns, rows.data, strict=True)
+        ]
+        rest = [part.residual(arm)[:, :, np.newaxis] for part in rows.data]
+        return cls(
+            rows,
+            arm,
+            base.parameters,
+            turn,
+            described,
+            unset,
+            tuple(rows.weighted(both, joints)),
+            tuple(x[:, :, 0] for x in rows.weighted(rest, joints)),
+        )
+
+    @property
+    def rank(self) -> int:
+        """Return the number of columns of the body."""
+        return len(self.turn)
+
+    @cached_property
+    def discrepancy(self) -> npt.NDArray[np.intp]:
+        """Columns of the discrepancy of each joint, shape (n, f)."""
+        size = self.columns[0].shape[2]
+        return np.arange(self.rank, size).reshape(len(self.columns[0]), -1)
+
+    @cached_property
+    def count(self) -> list[int]:
+        """Return the number of informative entries of each recording."""
+        seen = [(w > 0.0)[:, :, np.newaxis].astype(float) for w in self.rows.weight]
+        joints = range(len(self.columns[0]))
+        return [int(np.count_nonzero(x)) for x in self.rows.weighted(seen, joints)]
+
+    @cached_property
+    def square(self) -> list[FloatArray]:
+        """Products of the columns of each recording, those of accepted causes last."""
+        found = []
+        for k, x in enumerate(self.columns):
+            flat = x.reshape(-1, x.shape[2])
+            border = self._of_accepted(k, [one.products[k] for one, _ in self.accepted], x)
+            own = [self.among_accepted(one, k) for one, _ in self.accepted]
+            within = np.concatenate(own, axis=1) if own else np.zeros((0, 0))
+            found.append(np.block([[flat.T @ flat, border], [border.T, within]]))
+        return found
+
+    @cached_property
+    def cross(self) -> list[FloatArray]:
+        """Products of the same columns with the residual."""
+        found = []
+        for k, (x, y) in enumerate(zip(self.columns, self.residual, strict=True)):
+            aims = [one.aim[k] * self.rows.today[k] for one, _ in self.accepted]
+            found.append(np.concatenate([x.reshape(-1, x.shape[2]).T @ y.ravel(), *aims]))
+        return found
+
+    def _of_accepted(self, k: int, parts: Sequence[FloatArray], x: FloatArray) -> FloatArray:
+        """Return columns that act in the day in question alone, side by side."""
+        there = float(self.rows.today[k])
+        return np.concatenate([np.zeros((x.shape[2], 0)), *(there * one for one in parts)], axis=1)
+
+    def among_accepted(self, cause: Cause, k: int) -> FloatArray:
+        """Return products of the columns of accepted causes with those of a cause, (a, p)."""
+        there = float(self.rows.today[k])
+        parts = [there * one.products_with(cause, k) for one, _ in self.accepted]
+        return np.concatenate([np.zeros((0, len(cause.unit))), *parts])
+
+    def products(self, cause: Cause, k: int) -> FloatArray:
+        """Return products of all columns of a recording with those of a cause, (q + a, p)."""
+        if not self.accepted:
+            return cause.products[k]
+        return np.concatenate([cause.products[k], self.among_accepted(cause, k)])
+
+    def and_cause(self, cause: Cause, size: float) -> Nuisance:
+        """Return the same with one more cause."""
+        return replace(self, accepted=(*self.accepted, (cause, size)))
+
+    def without(self, name: int) -> Nuisance:
+        """Return the same without one of the accepted causes."""
+        return replace(self, accepted=(*self.accepted[:name], *self.accepted[name + 1 :]))
+
+    @property
+    def spans(self) -> list[slice]:
+        """Return where the values of each accepted cause are among all parameters."""
+        size = self.columns[0].shape[2]
+        stops = size + np.cumsum([len(one.unit) for one, _ in self.accepted], dtype=int)
+        pairs = zip(self.accepted, stops.tolist(), strict=True)
+        return [slice(stop - len(one.unit), stop) for (one, _), stop in pairs]
+
+    @cached_property
+    def reach(self) -> FloatArray:
+        """
+        Return by how much more the discrepancy may be where the first day has not been, (n, f).
+
+        A misfit says what a model gets wrong where it was measured. Elsewhere that is a share of
+        the torque.
+
+        """
+        before = self.rows.before
+        if not before:
+            return np.ones(self.discrepancy.shape)
+        then, now = (
+            np.mean([np.diag(x)[self.discrepancy] for x in part], axis=0)
+            for part in (self.square[:before], self.square[before:])
+        )
+        most = np.maximum(_DESCRIBED * self.rows.torque / self.rows.amplitude[0], 1.0)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            more = np.sqrt(np.where(now > 0.0, now / then, 1.0))
+        return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
+
+    def _precision(self, setting: Setting) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+        """Return the prior precision of the parameters that are fitted, and which these are."""
+        unit = self.rows.amplitude[0]
+        body = self.turn.T @ self.described @ self.turn + _HELD * np.eye(self.rank)
+        size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
+        shared = size.ravel() ** -2.0
+        more = [(size * one.unit) ** -2.0 for one, size in self.accepted]
+        whole = linalg.block_diag(body, np.diag(np.concatenate([shared, *more])))
+        used = np.ones(len(whole), dtype=bool)
+        used[: self.rank] = setting.free | self.open
+        used[self.discrepancy.ravel()] = setting.shared > 0.0
+        kept = np.flatnonzero(used)
+        return whole[np.ix_(kept, kept)], kept
+
+    def marginal(
+        self, setting: Setting, among: Sequence[int] | None = None, more: float = 1.0
+    ) -> Marginal:
+        """
+        Integrate out the discrepancies d_k, and fit what is left.
+
+        Parameters
+        ----------
+        setting : Setting
+            Amplitudes.
+        among : sequence of int, optional
+            The recordings that count; all by default.
+        more : float
+            Factor of d_k on the day in question.
+
+        """
+        whole, kept = self._precision(setting)
+        evidence = 0.5 * np.linalg.slogdet(whole)[1] + setting.prior
+        aim, scale, motions = (
+            np.zeros(len(kept)),
+            setting.precision,
+            dict[int, MotionDiscrepancy](),
+        )
+        loss = 0.0
+        for k in range(len(self.columns)) if among is None else among:
+            own, to = self.square[k][np.ix_(kept, kept)] * scale, self.cross[k][kept] * scale
+            power = float(np.sum(self.residual[k] ** 2)) * scale
+            if setting.own:
+                louder = more if self.rows.today[k] else 1.0
+                size = setting.own * louder * self.rows.amplitude[k]
+                motion, log_size = self._motion(k, kept, scale, size)
+                border = self.square[k][np.ix_(self.discrepancy.ravel(), kept)]
+                own = own - scale * border.T @ motion.regressed
+                to = to - motion.regressed.T @ motion.aim.ravel()
+                made = np.einsum('jf,jfg,jg->', motion.aim, motion.inverse, motion.aim)
+                power, evidence = power - float(made), evidence + log_size
+                motions[k] = motion
+            whole, aim = whole + own, aim + to
+            loss += 0.5 * power
+            evidence -= self.count[k] / setting.lasting * np.log(setting.noise)
+        lower = np.linalg.cholesky(whole)
+        root = linalg.solve_triangular(lower, np.eye(len(kept)), lower=True)
+        values = root.T @ (root @ aim)
+        loss -= 0.5 * float(aim @ values)
+        evidence -= loss + float(np.sum(np.log(np.diag(lower))))
+        return Marginal(setting, kept, root, values, float(evidence), loss, motions)
+
+    def _motion(
+        self, k: int, kept: npt.NDArray[np.intp], scale: float, size: FloatArray
+    ) -> tuple[MotionDiscrepancy, float]:
+        """Return what d_k of a size (n,) takes up, and the logarithm of its integral."""
+        place, functions = self.discrepancy, self.discrepancy.shape[1]
+        own = self.square[k][place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
+        held = own + np.eye(functions) * size[:, np.newaxis, np.newaxis] ** -2.0
+        inverse = np.linalg.inv(held)
+        border = self.square[k][np.ix_(place.ravel(), kept)] * scale
+        regressed = (inverse @ border.reshape(*place.shape, -1)).reshape(place.size, -1)
+        log_size = 0.5 * np.linalg.slogdet(held)[1].sum() + functions * np.log(size).sum()
+        return MotionDiscrepancy(
+            np.asarray(inverse), self.cross[k][place] * scale, regressed
+        ), -float(log_size)
+
+    def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
+        """Return all values under a setting and their covariance, zero of what is not fitted."""
+        size = len(self.cross[0])
+        values, covariance = np.zeros(size), np.zeros((size, size))
+        values[under.used] = under.values
+        covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
+        return values, covariance
+
+    def rest(self, values: FloatArray, k: int) -> FloatArray:
+        """Return the weighted residual of a recording for given values, without d_k, (n, M)."""
+        columns = self.columns[k]
+        rest = self.residual[k] - columns @ values[: columns.shape[2]]
+        for (one, _), span in zip(self.accepted, self.spans, strict=True):
+            if self.rows.today[k]:
+                rest[list(one.joints)] -= one.columns[k] @ values[span]
+        return rest
+
+    def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
+        """Return how many rows of what is left make one independent row, at the median."""
+        found = []
+        values, _ = self.whole(under)
+        for k in recordings:
+            motion = under.motions[k]
+            made = np.einsum('jfg,jg->jf', motion.inverse, motion.aim)
+            own = made - (motion.regressed @ under.values).reshape(made.shape)
+            functions = self.columns[k][:, :, self.rank :].reshape(
+                *self.residual[k].shape, *own.shape
+            )
+            rest = self.rest(values, k) - np.einsum('jmjf,jf->jm', functions, own)
+            for x in rest:
+                x = x[np.abs(x) > 0.0]
+                if len(x) >= _FEW:
+                    lags = np.array([x[lag:] @ x[:-lag] for lag in range(1, _LAGS)]) / (x @ x)
+                    below = lags < _UNCORRELATED
+                    count = int(np.argmax(below)) if below.any() else len(lags)
+                    found.append(1.0 + 2.0 * float(lags[:count].sum()))
+        return max(float(np.median(found)) if found else least, 1.0)
+
+
+def _apart(rows: FloatArray, precision: FloatArray, group: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return coordinates in which columns (S, r) of two groups are orthonormal, (r, r)."""
+    turn = np.zeros_like(precision)
+    for own in (np.flatnonzero(group), np.flatnonzero(~group)):
+        held = precision[np.ix_(own, own)]
+        scale = np.sqrt(np.sum(rows[:, own] ** 2, axis=0) + np.diag(held))
+        scale = np.where(scale > 0.0, scale, 1.0)
+        scaled = rows[:, own] / scale
+        size, axes = np.linalg.eigh(scaled.T @ scaled + held / np.outer(scale, scale))
+        turn[np.ix_(own, own)] = axes / np.sqrt(np.maximum(size, 1e-14)) / scale[:, np.newaxis]
+    return turn

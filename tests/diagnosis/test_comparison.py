@@ -1,0 +1,143 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The evidence of causes is that of normal distributions, written out here."""
+
+from dataclasses import replace
+
+from armid_ros.diagnosis.data.days import Rows
+from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.odds import EQUAL, odds, usual_spread, without
+from armid_ros.diagnosis.search.priors import log_prior, SIZES, THERE
+from armid_ros.effects import CATALOGUE
+from armid_ros.identification.rows.signals import Conditioning
+import numpy as np
+import pytest
+from scipy import linalg, stats
+
+USED = Conditioning(200.0, 5.0, 20)
+MISFIT = np.array([0.2, 0.1])
+
+
+@pytest.fixture(scope='module')
+def nuisance(bench):
+    """Return two recordings of one day and one of the next, of an arm with a dirty elbow."""
+    recordings = bench.recordings(lambda motion, tau: 0.3 * np.sin(3.0 * motion.q), seed=3)
+    data = tuple(trajectories(recordings, USED))
+    rows = Rows(data, (MISFIT,) * 3, 2, (MISFIT,) * 3)
+    return Nuisance.of(rows, bench.arm, np.random.default_rng(0))
+
+
+def covariance(nuisance, setting, more=()):
+    """Return the covariance of all informative rows, and which these are."""
+    blocks, use = [], [np.any(x != 0.0, axis=2).ravel() for x in nuisance.columns]
+    flat = [x.reshape(-1, x.shape[2]) for x in nuisance.columns]
+    rank, functions = nuisance.rank, nuisance.discrepancy.shape[1]
+    body = np.linalg.inv(
+        nuisance.turn.T @ nuisance.described @ nuisance.turn + 1e-12 * np.eye(rank)
+    )
+    unit = np.repeat(MISFIT, functions)
+    whole = np.concatenate(flat)
+    reach = nuisance.reach.ravel()
+    shared = linalg.block_diag(body, np.diag((setting.shared * unit * reach) ** 2))
+    total = whole @ shared @ whole.T
+    for x in flat:
+        own = x[:, rank:] * setting.own * unit
+        blocks.append(own @ own.T + setting.noise**2 * np.eye(len(x)))
+    total += linalg.block_diag(*blocks)
+    for columns, size in more:
+        total += size**2 * columns @ columns.T
+    told = np.concatenate(use)
+    return total[np.ix_(told, told)], told
+
+
+def density(nuisance, setting, more=()):
+    """Return the log density of the residual."""
+    total, told = covariance(nuisance, setting, more)
+    y = np.concatenate([rest.ravel() for rest in nuisance.residual])[told]
+    return stats.multivariate_normal(np.zeros(len(y)), total).logpdf(y)
+
+
+def columns_of(cause, nuisance):
+    """Return all rows of the columns of a cause, (S, p), over its unit."""
+    parts = []
+    for own, rest in zip(cause.columns, nuisance.residual, strict=True):
+        x = np.zeros((*rest.shape, len(cause.unit)))
+        x[list(cause.joints)] = own * cause.unit
+        parts.append(x.reshape(-1, len(cause.unit)))
+    return parts
+
+
+def test_settings_are_compared_by_the_density_of_the_data(nuisance):
+    settings = [Setting(True, 0.4, 0.3, 0.7, 1.0), Setting(True, 1.2, 0.8, 0.4, 1.0)]
+    one, other = (nuisance.marginal(setting).evidence for setting in settings)
+    first, second = (density(nuisance, setting) for setting in settings)
+    assert one - other == pytest.approx(first - second, rel=1e-4, abs=1e-3)
+
+
+def causes_of(nuisance, under, *names):
+    kinds = tuple(CATALOGUE[name] for name in names)
+    return Causes(kinds, nuisance, True, frozenset()).causes(nuisance, under)
+
+
+def test_the_factor_of_a_cause_is_the_ratio_of_densities(nuisance):
+    setting = Setting(True, 0.4, 0.3, 0.7, 1.0)
+    under = nuisance.marginal(setting)
+    for cause in causes_of(nuisance, under, 'torque_offset', 'viscous_friction'):
+        parts = columns_of(cause, nuisance)
+        there = np.concatenate(parts)
+        today = np.concatenate([*(0.0 * x for x in parts[:2]), parts[2]])
+        nothing = density(nuisance, setting, [(there, THERE)])
+        each = [density(nuisance, setting, [(there, THERE), (today, s)]) for s in SIZES]
+        expected = np.logaddexp.reduce(each) - np.log(len(SIZES)) - nothing
+        fit = odds(cause, nuisance, under, 0.0, EQUAL)
+        assert fit.factor == pytest.approx(expected, rel=1e-3, abs=1e-2)
+
+
+def test_an_accepted_cause_is_explained_as_if_it_were_data_of_the_model(nuisance):
+    """Beside itself a cause has nothing left to explain."""
+    setting = Setting(True, 0.4, 0.3, 0.7, 1.0)
+    under = nuisance.marginal(setting)
+    first, _ = causes_of(nuisance, under, 'torque_offset')
+    beside = nuisance.and_cause(first, 1.0)
+    again = odds(first, beside, beside.marginal(setting))
+    assert again.explained < 0.5
+    assert beside.without(0).accepted == ()
+
+
+def test_what_is_integrated_out_is_what_a_normal_distribution_leaves():
+    rng = np.random.default_rng(0)
+    rows, root = rng.normal(size=(40, 5)), rng.normal(size=(5, 3))
+    y = rng.normal(size=40)
+    square, aim, gained = without(rows.T @ rows, rows.T @ y, root)
+    total = np.eye(40) + rows @ root @ root.T @ rows.T
+    inverse = np.linalg.inv(total)
+    np.testing.assert_allclose(square, rows.T @ inverse @ rows, atol=1e-9)
+    np.testing.assert_allclose(aim, rows.T @ inverse @ y, atol=1e-9)
+    expected = 0.5 * (y @ y - y @ inverse @ y) - 0.5 * np.linalg.slogdet(total)[1]
+    assert gained == pytest.approx(expected)
+
+
+def test_one_recording_tells_nothing_of_what_values_differ_by(nuisance):
+    under = nuisance.marginal(Setting(True, 0.4, 0.3, 0.7, 1.0))
+    causes = causes_of(nuisance, under, 'torque_offset')
+    alone = replace(nuisance, rows=replace(nuisance.rows, before=1))
+    assert usual_spread(causes, alone, under) == usual_spread([], nuisance, under) == 1.0
+
+
+@pytest.mark.parametrize(
+    ('common', 'rare'),
+    [
+        (('viscous_friction', ('elbow',)), ('stribeck_friction', ('elbow',))),
+        (('payload', ('elbow',)), ('payload', ('shoulder',))),
+        (('payload', ('elbow',)), ('link_inertia', ('elbow',))),
+        (('torque_drift', ('elbow',)), ('human_interaction', ('elbow',))),
+    ],
+)
+def test_the_common_goes_first(bench, common, rare):
+    odds_of = [
+        log_prior(CATALOGUE[name].on(bench.robot, joints), bench.robot, changed=True)
+        for name, joints in (common, rare)
+    ]
+    assert odds_of[0] > odds_of[1]
