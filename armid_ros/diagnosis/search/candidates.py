@@ -80,7 +80,7 @@ class Causes:
                     if own not in taken | self.fitted and not same_body:
                         result.append(cause)
         counts = Counter(cause.key for cause in result)
-        return [cause.of_shapes(counts[cause.key]) for cause in result]
+        return [replace(cause, shapes=counts[cause.key]) for cause in result]
 
     @property
     def effects(self) -> Iterator[Effect]:
@@ -126,7 +126,7 @@ class Causes:
         other = self.made(effect, cause.kept, [x[:, :, list(cause.kept)] for x in columns])
         if other is None or other.kept != cause.kept:
             return None
-        return other.of_shapes(cause.shapes)
+        return replace(other, shapes=cause.shapes)
 
     def made(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -64,10 +64,6 @@ class Cause:
                 theirs = other.columns[recording][other.joints.index(joint)]
                 total += self.columns[recording][k].T @ theirs
         return total
-
-    def of_shapes(self, count: int) -> Cause:
-        """Return the same as one of so many shapes."""
-        return replace(self, shapes=count)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ from armid_ros.diagnosis.search.odds import (
     IMPOSSIBLE,
     odds,
     OWN_SPREADS,
-    POPULATION_SPREAD,
     usual_spread,
 )
 from armid_ros.diagnosis.settings import Thresholds
@@ -163,8 +162,8 @@ class Result:
         What is fitted with them, and they themselves.
     under : Marginal
         The same under the likeliest setting.
-    first, last : Look
-        The first and the last look.
+    first : Look
+        The first look.
     usual : float
         Usual spread of values between recordings.
     effects : tuple of Effect
@@ -176,7 +175,6 @@ class Result:
     nuisance: Nuisance
     under: Marginal
     first: Look
-    last: Look
     usual: float
     effects: tuple[Effect, ...]
 
@@ -203,36 +201,41 @@ class CauseComparison:
     catalogue: Causes
     thresholds: Thresholds
     grid: tuple[Setting, ...]
-    _known: dict[int, tuple[Nuisance, list[Marginal], list[Cause]]] = field(
+    _marginals: dict[int, tuple[Nuisance, list[Marginal]]] = field(
         default_factory=dict, compare=False
     )
+    _causes: dict[int, list[Cause]] = field(default_factory=dict, compare=False)
 
     @cached_property
     def usual(self) -> float:
         """Return the usual spread of values between recordings."""
-        if not self.nuisance.rows.before:
-            return POPULATION_SPREAD
-        settings, causes = self._at(self.nuisance)
-        return usual_spread(causes[::_SAMPLED], self.nuisance, settings[0])
+        under = self._likeliest(self.nuisance)
+        return usual_spread(self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, under)
+
+    def first(self) -> Result:
+        """Look at all causes, and accept none."""
+        look = self.look(self.nuisance)
+        effects = tuple(self.catalogue.effects)
+        return Result((), self.nuisance, look.under, look, self.usual, effects)
 
     def found(self) -> Result:
         """Accept the best cause as long as any is beyond doubt; drop what others make needless."""
         accepted, nuisance = list[Accepted](), self.nuisance
-        first = last = self.look(nuisance)
+        result = self.first()
+        look = result.first
         while len(accepted) < _MOST:
             explained = sum(max(one.best.data, 0.0) for one in accepted)
-            best = self.best(last, explained)
+            best = self.best(look, explained)
             if best is None:
                 break
             accepted.append(best)
             nuisance = nuisance.and_cause(best.best.cause, best.best.fit.size)
             accepted, nuisance = self._pruned(accepted, nuisance)
-            last = self.look(nuisance)
+            look = self.look(nuisance)
         if len(accepted) > 1:
             accepted, nuisance = self._exchanged(accepted, nuisance)
         under = self._likeliest(nuisance)
-        effects = tuple(self.catalogue.effects)
-        return Result(tuple(accepted), nuisance, under, first, last, self.usual, effects)
+        return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
 
     def best(self, look: Look, explained: float) -> Accepted | None:
         """Return the best cause of a look with its rivals; None if none is beyond doubt."""
@@ -272,26 +275,28 @@ class CauseComparison:
             nuisance = others.and_cause(again.best.cause, again.best.fit.size)
         return accepted, nuisance
 
-    def _at(self, nuisance: Nuisance) -> tuple[list[Marginal], list[Cause]]:
-        """Return the nuisance parameters under all settings, and the causes to compare."""
-        if id(nuisance) not in self._known:
-            settings = [nuisance.marginal(one) for one in self.grid]
-            likeliest = max(settings, key=lambda one: one.evidence)
-            causes = self.catalogue.causes(nuisance, likeliest)
-            self._known[id(nuisance)] = nuisance, settings, causes
-        return self._known[id(nuisance)][1:]
+    def _settings(self, nuisance: Nuisance) -> list[Marginal]:
+        """Return the nuisance parameters under all settings."""
+        if id(nuisance) not in self._marginals:
+            self._marginals[id(nuisance)] = nuisance, [nuisance.marginal(x) for x in self.grid]
+        return self._marginals[id(nuisance)][1]
 
     def _likeliest(self, nuisance: Nuisance) -> Marginal:
-        settings = [nuisance.marginal(one) for one in self.grid]
-        return max(settings, key=lambda one: one.evidence)
+        return max(self._settings(nuisance), key=lambda one: one.evidence)
+
+    def _causes_of(self, nuisance: Nuisance) -> list[Cause]:
+        """Return the causes to compare."""
+        if id(nuisance) not in self._causes:
+            likeliest = self._likeliest(nuisance)
+            self._causes[id(nuisance)] = self.catalogue.causes(nuisance, likeliest)
+        return self._causes[id(nuisance)]
 
     def look(self, nuisance: Nuisance) -> Look:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
-        settings, causes = self._at(nuisance)
-        likeliest = max(settings, key=lambda one: one.evidence)
+        settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
         first: dict[object, tuple[float, Cause, Marginal]] = {}
         tried = settings if len(settings) == 1 else _leading(settings)
-        for cause, under in product(causes, tried):
+        for cause, under in product(self._causes_of(nuisance), tried):
             worth = odds(cause, nuisance, under).factor + under.evidence + cause.prior
             if worth > first.get(cause.key, (-np.inf,))[0]:
                 first[cause.key] = worth, cause, under
@@ -307,7 +312,7 @@ class CauseComparison:
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
         """Compare a cause with nothing over all settings."""
-        settings, _ = self._at(nuisance)
+        settings = self._settings(nuisance)
         fits = [(odds(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([under.evidence for _, under in fits])
         total = np.logaddexp.reduce([fit.factor + under.evidence for fit, under in fits])

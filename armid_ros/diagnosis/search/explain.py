@@ -22,7 +22,7 @@ from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Precision of a value of which nothing is known, over the torque of the joint.
+#: Precision of a value of which nothing is known before.
 _UNKNOWN = 1e-12
 #: Causes of a look that are kept with a name.
 _KEPT = 10

@@ -138,6 +138,8 @@ class Nuisance:
         Weighted columns of each recording: body, and the discrepancy of one joint after the other.
     residual : tuple of ndarray, each (n, M)
         Weighted residual of the model.
+    fixed : tuple of (ndarray, shape (q, q), ndarray, shape (q,))
+        Products of these columns with each other and with the residual.
     accepted : tuple of (Cause, float)
         Causes that were found, and the standard deviation of the prior of their values.
 
@@ -151,6 +153,7 @@ class Nuisance:
     open: npt.NDArray[np.bool_]
     columns: tuple[FloatArray, ...]
     residual: tuple[FloatArray, ...]
+    fixed: tuple[tuple[FloatArray, FloatArray], ...]
     accepted: tuple[tuple[Cause, float], ...] = ()
 
     @classmethod
@@ -180,6 +183,10 @@ class Nuisance:
             for x, part in zip(columns, rows.data, strict=True)
         ]
         rest = [part.residual(arm)[:, :, np.newaxis] for part in rows.data]
+        weighted = rows.weighted(both, joints)
+        residual = [x[:, :, 0] for x in rows.weighted(rest, joints)]
+        size = weighted[0].shape[2]
+        pairs = [(x.reshape(-1, size), y.ravel()) for x, y in zip(weighted, residual, strict=True)]
         return cls(
             rows,
             arm,
@@ -187,8 +194,9 @@ class Nuisance:
             turn,
             described,
             unset,
-            tuple(rows.weighted(both, joints)),
-            tuple(x[:, :, 0] for x in rows.weighted(rest, joints)),
+            tuple(weighted),
+            tuple(residual),
+            tuple((x.T @ x, x.T @ y) for x, y in pairs),
         )
 
     @property
@@ -213,27 +221,23 @@ class Nuisance:
     def square(self) -> list[FloatArray]:
         """Products of the columns of each recording, those of accepted causes last."""
         found = []
-        for k, x in enumerate(self.columns):
-            flat = x.reshape(-1, x.shape[2])
-            border = self._of_accepted(k, [one.products[k] for one, _ in self.accepted], x)
+        for k, (fixed, _) in enumerate(self.fixed):
+            there = float(self.rows.today[k])
+            parts = [there * one.products[k] for one, _ in self.accepted]
+            border = np.concatenate([np.zeros((len(fixed), 0)), *parts], axis=1)
             own = [self.among_accepted(one, k) for one, _ in self.accepted]
             within = np.concatenate(own, axis=1) if own else np.zeros((0, 0))
-            found.append(np.block([[flat.T @ flat, border], [border.T, within]]))
+            found.append(np.block([[fixed, border], [border.T, within]]))
         return found
 
     @cached_property
     def cross(self) -> list[FloatArray]:
         """Products of the same columns with the residual."""
         found = []
-        for k, (x, y) in enumerate(zip(self.columns, self.residual, strict=True)):
+        for k, (_, fixed) in enumerate(self.fixed):
             aims = [one.aim[k] * self.rows.today[k] for one, _ in self.accepted]
-            found.append(np.concatenate([x.reshape(-1, x.shape[2]).T @ y.ravel(), *aims]))
+            found.append(np.concatenate([fixed, *aims]))
         return found
-
-    def _of_accepted(self, k: int, parts: Sequence[FloatArray], x: FloatArray) -> FloatArray:
-        """Return columns that act in the day in question alone, side by side."""
-        there = float(self.rows.today[k])
-        return np.concatenate([np.zeros((x.shape[2], 0)), *(there * one for one in parts)], axis=1)
 
     def among_accepted(self, cause: Cause, k: int) -> FloatArray:
         """Return products of the columns of accepted causes with those of a cause, (a, p)."""
@@ -298,9 +302,7 @@ class Nuisance:
         kept = np.flatnonzero(used)
         return whole[np.ix_(kept, kept)], kept
 
-    def marginal(
-        self, setting: Setting, among: Sequence[int] | None = None, more: float = 1.0
-    ) -> Marginal:
+    def marginal(self, setting: Setting, among: Sequence[int] | None = None) -> Marginal:
         """
         Integrate out the discrepancies d_k, and fit what is left.
 
@@ -310,24 +312,17 @@ class Nuisance:
             Amplitudes.
         among : sequence of int, optional
             The recordings that count; all by default.
-        more : float
-            Factor of d_k on the day in question.
 
         """
         whole, kept = self._precision(setting)
         evidence = 0.5 * np.linalg.slogdet(whole)[1] + setting.prior
-        aim, scale, motions = (
-            np.zeros(len(kept)),
-            setting.precision,
-            dict[int, MotionDiscrepancy](),
-        )
-        loss = 0.0
+        aim, scale, loss = np.zeros(len(kept)), setting.precision, 0.0
+        motions = dict[int, MotionDiscrepancy]()
         for k in range(len(self.columns)) if among is None else among:
             own, to = self.square[k][np.ix_(kept, kept)] * scale, self.cross[k][kept] * scale
             power = float(np.sum(self.residual[k] ** 2)) * scale
             if setting.own:
-                louder = more if self.rows.today[k] else 1.0
-                size = setting.own * louder * self.rows.amplitude[k]
+                size = setting.own * self.rows.amplitude[k]
                 motion, log_size = self._motion(k, kept, scale, size)
                 border = self.square[k][np.ix_(self.discrepancy.ravel(), kept)]
                 own = own - scale * border.T @ motion.regressed

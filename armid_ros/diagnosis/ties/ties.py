@@ -325,7 +325,7 @@ def _as_one_cause(ties: Ties, explainer: Explainer, fitted: Fitted) -> tuple[Ste
     settings, robot = ties.settings, ties.arm.robot
     free = [one for one in settings_alone() if one.free]
     comparison = explainer.comparison(rows_over_noise(ties.evidence), free)
-    result = comparison.found()
+    result = comparison.first()
     loose = any(own.effect.shapes for own in fitted.named)
     kind = ties.partner.slack if loose else ties.partner.interaction
     whole = kind.on(robot, [own.effect.joints[0] for own in fitted.named])
