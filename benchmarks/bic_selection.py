@@ -15,14 +15,13 @@ from collections.abc import Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
-from armid_ros.diagnosis.data.baseline import excited
+from armid_ros.diagnosis.data.baseline import excited, refitted
+from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.candidates import Causes
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.choice import rows_over_noise
-from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
 from armid_ros.diagnosis.search.odds import CauseInformation
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -63,9 +62,9 @@ def bic_selection(
     data = trajectories(recordings, used)
     base, _ = excited(arm, arm.base_parameters(rng), data)
     one = [np.ones(arm.robot.n_joints)] * len(data)
-    reference = fit(arm, (), Evidence.over_noise(data, one), base)
-    alike = np.sqrt(Evidence.over_noise(data, one).power(reference.residual))
-    rows = rows_over_noise(Evidence.over_noise(data, [alike] * len(data)))
+    pooled_rows = Evidence.over_noise(data, one)
+    alike = np.sqrt(pooled_rows.power(pooled_rows.residuals(refitted(arm, base, data, one))))
+    rows = Rows.over_noise(Evidence.over_noise(data, [alike] * len(data)))
     nuisance = Nuisance.of(rows, memoized_arm(arm), rng)
     catalogue = Causes(settings.kinds, nuisance, False, frozenset())
     pooled = Setting(True, 0.0, 0.0, 1.0, 1.0)
@@ -73,7 +72,7 @@ def bic_selection(
     chosen: list[Cause] = []
     while True:
         under = nuisance.marginal(pooled)
-        values, _ = nuisance.whole(under)
+        values = nuisance.means(under)
         squares = sum(float(np.sum(nuisance.rest(values, k) ** 2)) for k in range(len(rows.today)))
         best, cause = 0.0, None
         for candidate in catalogue.causes(nuisance, under):

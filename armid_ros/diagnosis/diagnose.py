@@ -222,25 +222,26 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
     """Return the diagnosis of an explanation, measured on held-out data."""
     arm, settings = asked.arm, asked.settings
     asked.tell(0.85, 'held-out gap')
-    explanation, said = as_bodies(chosen.explanation, arm)
+    explanation, said = as_bodies(chosen.explanation)
     notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
     evidence = explanation.evidence
     unseen = _unseen(asked, explanation, chosen)
-    names = Names.of(replace(chosen, explanation=explanation), unseen, arm, settings)
+    names = Names.of(replace(chosen, explanation=explanation), unseen, settings)
     measured = RemainingMisfit(chosen, unseen, asked.before, arm, settings)
-    names = _telling(names, measured, unseen, settings)
+    if _mostly_open(names, measured, chosen, settings):
+        names = names.with_nothing_named(unseen, settings)
     hardly = unseen is not None and not names.shares.predicted
-    explanation, notes = names.stated, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
+    explanation, notes = names.explanation, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
     found = findings(explanation, names.shares, arm, asked.rng)
     refitted = measured.as_it_is(explanation)
-    as_it_is = measured.patched(names) if found else refitted
+    as_it_is = measured.patched(explanation) if found else refitted
     worse = measured.harmed(explanation)
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
-    left, resting = measured.beside(names), measured.resting(names)
+    left, resting = measured.beside(explanation), measured.resting(explanation)
     open_gap = any(one.ratio.max() > 1.0 for one in (*left, *resting))
     asked = asked.doubting(found, None if open_gap else as_it_is, chosen.floor_in_words)
     unnamed, matters = not_named(explanation, arm), settings.material * evidence.torque_rms
-    hides = None if chosen.measured else hiding(names.rest, settings)
+    hides = None if chosen.measured else hiding(explanation, settings)
     blind = blind_joints(evidence, arm.robot.joints, hides)
     word = decide(
         found,
@@ -281,18 +282,21 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
     )
 
 
-def _telling(
-    names: Names,
-    measured: RemainingMisfit,
-    unseen: Evidence | None,
-    settings: DiagnosisSettings,
-) -> Names:
-    """Return names, or none where most of a gap stays open: what is there is none of them."""
-    count = len(names.stated.steps)
-    if not count or names.shares.share(range(count)) > settings.thresholds.open_share:
-        return names
-    still = max(one.ratio.max() for one in measured.beside(names))
-    return names if still <= 1.0 else names.with_nothing_named(unseen, settings)
+def _mostly_open(
+    names: Names, measured: RemainingMisfit, chosen: Chosen, settings: DiagnosisSettings
+) -> bool:
+    """
+    Return whether names take less than half of a gap, so that what is there is none of them.
+
+    That counts where the rest is a gap, or where recordings do not separate a change from another
+    motion's misfit.
+
+    """
+    if not names.explanation.steps or names.share > settings.thresholds.open_share:
+        return False
+    if chosen.untested:
+        return names.largest_share <= settings.thresholds.open_share
+    return max(float(one.ratio.max()) for one in measured.beside(names.explanation)) > 1.0
 
 
 def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.baseline import excited
+from armid_ros.diagnosis.data.baseline import excited, refitted
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, NoiseFloor
 from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Trajectory, UNSURE
-from armid_ros.diagnosis.search.fit import fit
-from armid_ros.diagnosis.search.question import with_friction
 from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import Conditioning, conditioning, MODEL_BANDS
@@ -142,6 +141,19 @@ def prepare(
     return _measured(arm, prepared.used, wider, whole)
 
 
+def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
+    """Return an arm with all effects that any joint may be taken to have, and those added."""
+    there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
+    added: list[Effect] = []
+    fuller = arm
+    for kind in CATALOGUE.values():
+        joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
+        if kind.traits.everywhere and kind.name in library and joints:
+            fuller = fuller.with_effect(kind.on(arm.robot, joints))
+            added += [kind.on(arm.robot, (joint,)) for joint in joints]
+    return fuller, tuple(added)
+
+
 def _informative_share(data: Sequence[Trajectory]) -> FloatArray:
     """Return the share of the rows of each joint that are informative, shape (n,)."""
     return np.asarray(np.concatenate([part.informative for part in data]).mean(axis=0))
@@ -152,8 +164,8 @@ def _measured(
 ) -> Prepared:
     base, _ = excited(arm, whole, data)
     first = [noise_floor(part, arm) for part in data]
-    refit = fit(arm, (), Evidence.over_noise(data, [floor.sigma for floor in first]), base)
-    floors = tuple(noise_floor(part, refit.arm) for part in data)
+    refit = refitted(arm, base, data, [floor.sigma for floor in first])
+    floors = tuple(noise_floor(part, refit) for part in data)
     as_described = tuple((a if a.period else b).sigma for a, b in zip(first, floors, strict=True))
     return Prepared(used, tuple(data), base, floors, as_described)
 
@@ -164,7 +176,7 @@ def _noise_over_friction(
     """Return the noise of rows over the fitted dry friction, both root mean square, (n,)."""
     data, sigma = prepared.data, prepared.sigma
     base, _ = excited(arm, arm.base_parameters(rng), data)
-    arm = fit(arm, (), Evidence.over_noise(data, sigma), base).arm
+    arm = refitted(arm, base, data, sigma)
     friction = arm.action().dry_friction
     if friction is None:
         return np.full(arm.robot.n_joints, np.inf)

@@ -4,8 +4,8 @@
 
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.search.fit import fit
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -20,12 +20,10 @@ def test_what_does_nothing_along_the_motion_is_not_told(bench):
     strap = CATALOGUE['interface_slack'].on(bench.robot, ('elbow',))
     shape = strap.shape_values.copy()
     shape[:, -1] = 5.0
-    fitted = fit(
-        bench.arm,
-        [SelectedEffect(strap.with_shape(shape), (0,))],
-        Evidence.over_noise(data, sigma),
-        None,
+    problem = JointFit.over_noise(
+        bench.arm, Evidence.over_noise(data, sigma), np.random.default_rng(0)
     )
+    fitted = problem.fit([SelectedEffect(strap.with_shape(shape), (0,))], [np.zeros(1)])
     assert np.all(np.isinf(fitted.estimate.std))
 
 
@@ -42,8 +40,8 @@ def test_columns_of_a_shape_are_the_derivative_of_the_torque(bench, name, shape,
     (part,) = cut(bench.recordings()[:1])
     effect = CATALOGUE[name].on(bench.robot, ('elbow',)).with_shape(shape)
     kept = tuple(range(len(values)))
-    state = Patch(bench.arm, (SelectedEffect(effect, kept),), (np.array(values),), np.zeros(0))
-    columns = patch_columns(state, part, None)[:, :, len(values) :]
+    state = Patch(bench.arm, (SelectedEffect(effect, kept),), (np.array(values),))
+    columns = patch_columns(state, part)[0][:, :, len(values) :]
     for index in range(len(shape)):
         step = 1e-3 * max(abs(shape[index]), 0.01) * np.eye(len(shape))[index]
         ahead, behind = (

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis import diagnose, known_misfit
-from armid_ros.diagnosis.data.baseline import described_precision, excited, Identified
+from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import identify, SignalSettings
@@ -41,20 +41,18 @@ def told_of(found):
 
 def test_base_parameters_are_as_sure_as_they_were_identified(bench):
     found = identify(bench.arm, bench.recordings(), rng=np.random.default_rng(0))
-    prior = Identified(told_of(found)).prior(found.arm, found.base)
-    std = np.sqrt(np.diag(np.linalg.inv(prior.described)))
+    precision = described_precision(found.base, found.arm, told_of(found))
+    std = np.sqrt(np.diag(np.linalg.inv(precision)))
     np.testing.assert_allclose(std, found.estimate.std, rtol=0.01)  # the description tells little
-    assert prior.columns.shape == (0, found.base.rank)
-    assert not np.any(prior.of_change.matrix)
 
 
 def test_what_was_not_identified_is_as_sure_as_its_description(bench, data, discrepancy):
     size = len(bench.arm.parameters)
     arm = memoized_arm(bench.arm.with_effect(discrepancy))
     base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
-    prior = Identified(1e12 * np.eye(size)).prior(arm, base)
+    precision = described_precision(base, arm, 1e12 * np.eye(size))
     told = np.any(base.grouping[:, :size] != 0.0, axis=1)
-    covariance = np.linalg.inv(prior.described)[np.ix_(~told, ~told)]
+    covariance = np.linalg.inv(precision)[np.ix_(~told, ~told)]
     grouping, spread = base.grouping[~told][:, size:], discrepancy.spread(bench.robot)
     np.testing.assert_allclose(covariance, (grouping * spread**2) @ grouping.T, rtol=1e-3)
 
@@ -68,19 +66,19 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     told[np.ix_(off, off)] = np.linalg.inv(own)
     recordings = bench.recordings(lambda m, tau: np.array([0.0, 0.4]) * m.q)
     data = tuple(trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm))
-    evidence = Evidence.over_noise(data, tuple(np.full(2, 0.3) for _ in data))
+    evidence = Evidence.over_noise(data, tuple(np.full(2, 0.03) for _ in data))
     named = [SelectedEffect(CATALOGUE['joint_spring'].on(bench.robot, ('elbow',)), (0, 1))]
-    base, _ = excited(bench.arm, bench.arm.base_parameters(np.random.default_rng(0)), data)
-    errors = []
+    errors, as_exact = [], []
     for _ in range(40):
         theta = bench.arm.theta
         theta[off] += rng.multivariate_normal(np.zeros(2), own)
         arm = bench.arm.with_theta(theta)
-        found = fit(arm, named, evidence, base, prior=Identified(told).prior(arm, base))
-        errors.append((found.estimate.values[0] - 0.4) / found.estimate.std[0])
-    alone = fit(bench.arm, named, evidence, None).estimate.std[0]
-    assert found.estimate.std[0] > 1.2 * alone
+        problem = JointFit.over_noise(arm, evidence, np.random.default_rng(0), told)
+        for fits, found in ((problem, errors), (problem.as_described(), as_exact)):
+            estimate = fits.fit(named, [np.zeros(2)]).estimate
+            found.append((estimate.values[0] - 0.4) / estimate.std[0])
     assert np.mean(np.abs(errors) < 2.0) >= 0.9
+    assert np.mean(np.abs(as_exact) < 2.0) < 0.7, as_exact
 
 
 def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench, discrepancy):

@@ -11,7 +11,7 @@ from armid_ros.diagnosis import diagnose, next_run
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, Separation
 from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -146,12 +146,14 @@ def test_the_run_separates_the_names_as_far_as_was_said(bench, doubtful, chosen)
     sigma = [noise_floor(data[0], bench.arm).sigma]
     rows = data[0].informative.sum(axis=0)
 
+    evidence = Evidence.over_noise(data, sigma)
+    problem = JointFit.over_noise(bench.arm, evidence, np.random.default_rng(0)).as_described()
+
     def squares(name):
         effect = CATALOGUE[name].on(bench.robot, ('elbow',))
         kept = tuple(range(len(effect.parameters(bench.robot))))
-        evidence = Evidence.over_noise(data, sigma)
-        fitted = fit(bench.arm, [SelectedEffect(effect, kept)], evidence, None)
-        return float(np.sum(evidence.chi2_per_row(fitted.residual) * rows))
+        fitted = problem.fit([SelectedEffect(effect, kept)], [np.zeros(len(kept))])
+        return float(np.sum(evidence.chi2_per_row(evidence.residuals(fitted.arm)) * rows))
 
     own = squares('torque_offset')
     for pair in chosen.separations:

@@ -4,12 +4,12 @@
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
-from armid_ros.diagnosis.data.baseline import excited
+from armid_ros.diagnosis.data.baseline import excited, refitted
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.search.fit import fit
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.papers.elastic.identification.transmission import fit_transmission
 from armid_ros.recording import read_recording
@@ -99,9 +99,10 @@ def test_friction_of_a_tx40_goes_with_the_load_in_both_halves_of_its_recording(
         data = trajectories([recording.select(half)], used)
         base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
         rough = [noise_floor(part, arm).sigma for part in data]
-        nearer = fit(arm, (), Evidence.over_noise(data, rough), base).arm
-        sigma = [noise_floor(part, nearer).sigma for part in data]
-        fitted = fit(arm, [SelectedEffect(friction, (0,))], Evidence.over_noise(data, sigma), base)
+        nearer = refitted(arm, base, data, rough)
+        evidence = Evidence.over_noise(data, [noise_floor(one, nearer).sigma for one in data])
+        problem = JointFit.over_noise(arm, evidence, np.random.default_rng(0))
+        fitted = problem.fit([SelectedEffect(friction, (0,))], [np.zeros(1)])
         values.append(fitted.estimate.values[0])
         std.append(fitted.estimate.std[0])
     assert np.all(np.array(values) > 4.0 * np.array(std))

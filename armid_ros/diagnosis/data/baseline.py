@@ -13,84 +13,21 @@ a description can be believed: a joint may have been moved in one recording alon
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_rows
-from armid_ros.effects import Effect
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.normal_equations import NormalEquations, scaled_inverse
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.fitting.normal_equations import informative_solution, scaled_inverse
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
 #: A column of which the other free columns leave less than this share of its length is grouped.
 EXCITED = 1e-4
-
-
-@dataclass(frozen=True)
-class Prior:
-    """
-    Prior of base parameters, given by the rows of other data.
-
-    Attributes
-    ----------
-    data : tuple of Trajectory
-        The other data.
-    rows : tuple of ndarray, each (M, n, r)
-        Their columns of the base parameters, weighted.
-    rest : tuple of ndarray, each (M, n)
-        The residual that the arm leaves of them, weighted.
-    described : ndarray, shape (r, r)
-        Precision of the base parameters without these rows.
-
-    """
-
-    data: tuple[Trajectory, ...]
-    rows: tuple[FloatArray, ...]
-    rest: tuple[FloatArray, ...]
-    described: FloatArray
-
-    @cached_property
-    def columns(self) -> FloatArray:
-        """Return the weighted columns, a row for every joint and row of data, shape (S, r)."""
-        rank = len(self.described)
-        return np.concatenate([np.empty((0, rank)), *(r.reshape(-1, rank) for r in self.rows)])
-
-    @cached_property
-    def residual(self) -> FloatArray:
-        """Return the weighted residual in these rows, shape (S,)."""
-        return np.concatenate([np.empty(0), *(rest.ravel() for rest in self.rest)])
-
-    @cached_property
-    def of_change(self) -> NormalEquations:
-        """Return the normal equations of a change of the r base parameters."""
-        return NormalEquations.of_rows(self.columns, self.residual)
-
-    def recordings(self, change: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Yield the columns of each recording, (S, r), and its residual after a change, (S,)."""
-        for fold in sorted({part.fold for part in self.data}):
-            own = [k for k, part in enumerate(self.data) if part.fold == fold]
-            rows = np.concatenate([self.rows[k].reshape(-1, len(change)) for k in own])
-            yield rows, np.concatenate([self.rest[k].ravel() for k in own]) - rows @ change
-
-    def regressions(self, change: FloatArray, named: int) -> list[Regression]:
-        """Return the data as regressions in which the columns of `named` more values are zero."""
-        return [
-            Regression(
-                part.source,
-                part.at_rows.with_torque(rest - rows @ change),
-                part.informative,
-                np.concatenate([rows, np.zeros((*rest.shape, named))], axis=2),
-            )
-            for part, rows, rest in zip(self.data, self.rows, self.rest, strict=True)
-        ]
 
 
 def excited(
@@ -112,37 +49,55 @@ def excited(
     return base, [block[:, :, kept.independent] for block in columns]
 
 
-def described_precision(base: BaseParameters, arm: ArmModel) -> FloatArray:
+def described_precision(
+    base: BaseParameters, arm: ArmModel, known: FloatArray | None = None
+) -> FloatArray:
     """
     Return the precision of the base parameters in the description, shape (r, r).
 
     The description is believed to a factor or so: data decide what they determine, and what they
     hardly determine stays where it predicts other motions well. A value of zero of an effect is
-    no description, but for what the effect knows of its size.
+    no description, but for what the effect knows of its size. One of infinite variance leaves
+    what it does not act on: a precision of zero along its column of the grouping.
+
+    Parameters
+    ----------
+    base : BaseParameters
+        The parameters.
+    arm : ArmModel
+        The arm as described.
+    known : ndarray, shape (P, P), optional
+        Information on its first parameters by recordings that are not there any more.
 
     """
     spread = _described_spread(arm)
-    known = np.isfinite(spread)
-    return _precision(base, known, np.diag(spread[known] ** 2))
-
-
-def _precision(
-    base: BaseParameters, known: npt.NDArray[np.bool_], covariance: FloatArray
-) -> FloatArray:
-    """
-    Return the precision of base parameters, (r, r), of standard ones of which some are untold.
-
-    An untold one, of infinite variance, leaves what it does not act on: a precision of zero along
-    its column of the grouping.
-
-    """
-    seen = (
-        scipy.linalg.null_space(base.grouping[:, ~known].T)
-        if not known.all()
-        else np.eye(base.rank)
-    )
-    within = seen.T @ base.grouping[:, known]
+    told = np.isfinite(spread)
+    covariance = np.diag(spread[told] ** 2)
+    if known is not None:
+        precision = np.diag(spread**-2.0)
+        precision[: len(known), : len(known)] += known
+        told = np.diag(precision) > 0.0
+        covariance = scaled_inverse(precision[np.ix_(told, told)])
+    seen = np.eye(base.rank) if told.all() else scipy.linalg.null_space(base.grouping[:, ~told].T)
+    within = seen.T @ base.grouping[:, told]
     return np.asarray(seen @ scaled_inverse(within @ covariance @ within.T) @ seen.T)
+
+
+def refitted(
+    arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
+) -> ArmModel:
+    """Return an arm with base parameters fitted to data of noise (n,) [N m] each."""
+    matrix, vector = described_precision(base, arm), np.zeros(base.rank)
+    columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
+    rows = weighted_rows(columns, data, sigma)
+    rest = weighted_rows([part.residual(arm) for part in data], data, sigma)
+    for x, y in zip(rows, rest, strict=True):
+        flat = x.reshape(-1, base.rank)
+        matrix += flat.T @ flat
+        vector += flat.T @ y.ravel()
+    theta = arm.theta
+    change = informative_solution(matrix, vector)
+    return arm.with_theta(base.lift(base.values(theta) + change, theta))
 
 
 def _described_spread(arm: ArmModel) -> FloatArray:
@@ -152,31 +107,6 @@ def _described_spread(arm: ArmModel) -> FloatArray:
     own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
     effects = np.where(known > 0.0, known, own)
     return np.concatenate([described_spread(arm.robot).ravel(), effects])
-
-
-@dataclass(frozen=True)
-class Identified:
-    """
-    What is known of a model from recordings that are not there any more.
-
-    Attributes
-    ----------
-    information : ndarray, shape (P, P)
-        Precision of its parameters by those recordings.
-
-    """
-
-    information: FloatArray
-    data: tuple[Trajectory, ...] = ()
-
-    def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
-        """Return the same of base parameters of the arm, or of that with more effects."""
-        size = len(self.information)
-        precision = np.diag(_described_spread(arm) ** -2.0)
-        precision[:size, :size] += self.information
-        known = np.diag(precision) > 0.0
-        described = _precision(base, known, scaled_inverse(precision[np.ix_(known, known)]))
-        return Prior((), (), (), described)
 
 
 @dataclass(frozen=True)
@@ -252,22 +182,3 @@ class Baseline:
         torque = rows.count * np.maximum(rows.torque_rms**2, 1e-300)
         whole = (each**2 @ torque) / max(float(torque.sum()), 1e-300)
         return float(np.sqrt(whole)), each
-
-    def prior(self, arm: ArmModel, base: BaseParameters) -> Prior:
-        """
-        Return these recordings as a prior of the base parameters of an arm.
-
-        It is the arm whose misfit was measured, or that with more effects whose values are zero.
-
-        """
-        rows = [part.base_columns(arm, arm.effects, base.independent) for part in self.data]
-        rest = self._weighted(self.residual)
-        return Prior(self.data, self._weighted(rows), rest, described_precision(base, arm))
-
-    def columns(self, arm: ArmModel, effect: Effect, kept: Sequence[int]) -> FloatArray:
-        """Return the columns of an effect over the misfit, one row per row and joint, (S, p)."""
-        rows = [part.columns(arm, effect)[:, :, list(kept)] for part in self.data]
-        return np.concatenate([part.reshape(-1, len(kept)) for part in self._weighted(rows)])
-
-    def _weighted(self, rows: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-        return tuple(weighted_rows(rows, self.data, [self.misfit] * len(self.data)))

@@ -5,13 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
-from armid_ros.diagnosis.data.trajectory import row_weights, Trajectory
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import count_recordings, row_weights, Trajectory
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
+
+#: Share of a torque that the unit of its rows is at the least.
+_LEAST = 1e-4
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,22 @@ class Rows:
     sigma: tuple[FloatArray, ...]
     before: int
     amplitude: tuple[FloatArray, ...]
+
+    @classmethod
+    def over_noise(cls, evidence: Evidence) -> Rows:
+        """Return data of one day over their noise, discrepancies being measured in torque."""
+        torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
+        amplitude = (torque,) * count_recordings(evidence.data)
+        return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
+
+    def not_below_rounding(self) -> Rows:
+        """Return the same with units of no less than rounding of the torque."""
+        least = _LEAST * self.torque
+        return replace(
+            self,
+            sigma=tuple(np.maximum(one, least) for one in self.sigma),
+            amplitude=tuple(np.maximum(one, least) for one in self.amplitude),
+        )
 
     @cached_property
     def weight(self) -> list[FloatArray]:

@@ -17,8 +17,9 @@ from functools import cached_property
 from itertools import pairwise, product
 
 from armid_ros.arm import ArmModel
+from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.nuisance import Marginal, Nuisance
 from armid_ros.diagnosis.search.priors import log_prior
 from armid_ros.effects import Effect, Kind, Shape
@@ -69,8 +70,9 @@ class Causes:
     def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
         """Return every cause that is not accepted yet, in every shape a search starts from."""
         arm, result = nuisance.arm, list[Cause]()
-        taken = {(one.effect.name, one.effect.joints) for one, _ in nuisance.accepted}
-        bodies = {one.effect.adds_to(arm.robot) for one, _ in nuisance.accepted} - {()}
+        there = [term.cause.effect for term in nuisance.accepted]
+        taken = {(one.name, one.joints) for one in there}
+        bodies = {one.adds_to(arm.robot) for one in there} - {()}
         unexplained = _unexplained(nuisance, under)
         for whole, members in candidate_effects(arm.robot, self.kinds):
             for effect, singles in shaped(whole, members, arm, unexplained):
@@ -133,47 +135,105 @@ class Causes:
     ) -> Cause | None:
         """Return the cause of an effect with columns, each (M, n, p); None if none is seen."""
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
-        joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
-        torque = np.zeros((len(rows.torque), columns[0].shape[2]))
-        for k in rows.in_question:
-            moving = rows.weight[k][:, joints, np.newaxis] > 0.0
-            torque[joints] += np.sum(columns[k][:, joints] ** 2, axis=0, where=moving)
-        torque = np.sqrt(torque / rows.informative[:, np.newaxis])
+        torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
         if not seen.any():
             return None
-        spread = effect.spread(robot)[list(kept)]
-        if effect.adds_to(robot):  # a load and an error of a link are bodies alike
-            spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[list(kept)]
-        largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
-        unit = np.minimum(largest, np.where(spread > 0.0, spread, np.inf))
-        own = [x[:, :, seen] for x in columns]
-        weighted = rows.weighted(own, joints)
-        size = int(seen.sum())
-        flat = [x.reshape(-1, size) for x in weighted]
-        theirs = zip(self.nuisance.columns, self.nuisance.residual, flat, strict=True)
-        products, aim = [], []
-        for x, y, z in theirs:
-            products.append(x[joints].reshape(-1, x.shape[2]).T @ z)
-            aim.append(z.T @ y[joints].ravel())
-        return Cause(
-            effect,
-            tuple(kept[k] for k in np.flatnonzero(seen).tolist()),
-            unit[seen],
+        return cause_of(
+            self.nuisance,
+            SelectedEffect(effect, tuple(kept[k] for k in np.flatnonzero(seen).tolist())),
+            [x[:, :, seen] for x in columns],
+            _unit(SelectedEffect(effect, kept), torque, rows, robot)[seen],
             log_prior(effect, robot, self.changed),
-            tuple(joints),
-            tuple(weighted),
-            tuple(products),
-            tuple(z.T @ z for z in flat),
-            tuple(aim),
             torque[:, seen],
         )
+
+
+def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
+    """Return the torque of a unit of columns (M, n, p) on the day in question, (n, p) [N m]."""
+    squares = np.zeros((len(rows.torque), columns[0].shape[2]))
+    for k in rows.in_question:
+        moving = rows.weight[k][:, :, np.newaxis] > 0.0
+        squares += np.sum(columns[k] ** 2, axis=0, where=moving)
+    return np.asarray(np.sqrt(squares / rows.informative[:, np.newaxis]))
+
+
+def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
+    """Return values whose torque is that of a joint, or that are as large as such values get."""
+    effect, kept = own.effect, list(own.kept)
+    spread = effect.spread(robot)[kept]
+    if effect.adds_to(robot):  # a load and an error of a link are bodies alike
+        spread = (float(robot.rigid_parameters[::10].sum()) * _BODY)[kept]
+    largest = 1.0 / np.maximum(np.max(torque / rows.torque[:, np.newaxis], axis=0), 1e-12)
+    return np.asarray(np.minimum(largest, np.where(spread > 0.0, spread, np.inf)))
+
+
+def value_unit(
+    nuisance: Nuisance, own: SelectedEffect, columns: Sequence[FloatArray]
+) -> FloatArray:
+    """Return the unit of the values of an effect, (p,), of columns (M, n, p) in trajectories."""
+    rows = nuisance.rows
+    return _unit(own, _torque_of(columns, rows), rows, nuisance.arm.robot)
+
+
+def cause_of(
+    nuisance: Nuisance,
+    own: SelectedEffect,
+    columns: Sequence[FloatArray],
+    unit: FloatArray,
+    prior: float = 0.0,
+    torque: FloatArray | None = None,
+) -> Cause:
+    """
+    Return a cause with the products of its columns with those of the nuisance parameters.
+
+    Parameters
+    ----------
+    nuisance : Nuisance
+        The data.
+    own : SelectedEffect
+        Effect and values.
+    columns : sequence of ndarray, each (M, n, p)
+        Columns in each trajectory.
+    unit : ndarray, shape (p,)
+        Unit of each value.
+    prior : float
+        Log odds before any data.
+    torque : ndarray, shape (n, p), optional
+        Torque of a unit of each value on the day in question [N m].
+
+    """
+    joints = np.flatnonzero(np.any([x.any(axis=(0, 2)) for x in columns], axis=0)).tolist()
+    weighted = nuisance.rows.weighted(columns, joints)
+    products, aim, squares = [], [], []
+    for x, y, z in zip(nuisance.columns, nuisance.residual, weighted, strict=True):
+        products.append(
+            sum(
+                (x[joint].T @ own_rows for joint, own_rows in zip(joints, z, strict=True)),
+                start=np.zeros((x.shape[2], len(unit))),
+            )
+        )
+        flat = z.reshape(-1, len(unit))
+        aim.append(flat.T @ y[joints].ravel())
+        squares.append(flat.T @ flat)
+    return Cause(
+        own.effect,
+        own.kept,
+        unit,
+        prior,
+        tuple(joints),
+        tuple(weighted),
+        tuple(products),
+        tuple(squares),
+        tuple(aim),
+        np.zeros((len(nuisance.rows.torque), len(unit))) if torque is None else torque,
+    )
 
 
 def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
     """Return what is left of the recordings in question, for shapes to begin at."""
     rows = nuisance.rows
-    values, _ = nuisance.whole(under)
+    values = nuisance.means(under)
     motions = [part.motion for part in rows.data]
     arrays = (
         np.concatenate([getattr(motion, name) for motion in motions])

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -55,6 +56,13 @@ class Cause:
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
         """Name, joints and quantities, which causes of different shapes have in common."""
         return self.effect.name, self.effect.joints, self.kept
+
+    def aimed_at(self, residual: Sequence[FloatArray]) -> Cause:
+        """Return the same with products with another residual, (n, M) of each recording."""
+        joints = list(self.joints)
+        pairs = zip(self.columns, residual, strict=True)
+        aim = tuple(np.einsum('tmp,tm->p', x, y[joints]) for x, y in pairs)
+        return replace(self, aim=aim)
 
     def products_with(self, other: Cause, recording: int) -> FloatArray:
         """Return products of the columns with those of another cause, (p, p')."""

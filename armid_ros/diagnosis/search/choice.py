@@ -16,12 +16,11 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
-from armid_ros.diagnosis.data.baseline import Baseline, Identified
+from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.days import Rows
-from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.trajectory import count_recordings, Trajectory
-from armid_ros.diagnosis.prepare import Prepared
+from armid_ros.diagnosis.prepare import Prepared, with_friction
 from armid_ros.diagnosis.search.candidates import Causes
 from armid_ros.diagnosis.search.comparison import (
     CauseComparison,
@@ -36,13 +35,11 @@ from armid_ros.diagnosis.search.explanation import (
     Chosen,
     ESTIMATED,
     Explanation,
-    in_model_as_given,
     NOISE,
 )
 from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
-from armid_ros.diagnosis.search.question import as_given, fitted_anew, Question, with_friction
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.effects import Effect
 from armid_ros.effects.friction import friction_level
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -52,8 +49,6 @@ OWN_MISFIT = 'the misfit that the model had before'
 WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 #: Data are sampled as often as others if their sampling period is not longer by this factor.
 _AS_OFTEN = 1.2
-#: Share of a torque that the unit of its rows is at the least.
-_LEAST = 1e-4
 #: Note where nothing is known of how well a model was identified.
 _AS_EXACT = (
     'values of the model are taken as exact, as identification.json is not beside it: what they '
@@ -118,24 +113,26 @@ class Explainer:
         """Explain what a model lacks of which nothing else is known."""
         prepared, settings = self.prepared, self.settings
         self.tell(0.2, 'what the model lacks')
-        rows = rows_over_noise(Evidence.over_noise(prepared.data, prepared.sigma))
+        evidence = Evidence.over_noise(prepared.data, prepared.sigma)
+        rows = Rows.over_noise(evidence)
         unknown = with_friction(self.arm, settings.library)[1]
         result = self.comparison(rows, settings_alone()).found()
-        if result.under.setting.free:
-            accepted = [one.effect for one, _ in result.nuisance.accepted]
+        setting, held = result.under.setting, list[int]()
+        if setting.free:
+            accepted = [one.cause.effect for one in result.nuisance.accepted]
             changed = [p for effect in accepted for p in effect.parameters(self.arm.robot)]
             held = [k for k, p in enumerate(self.arm.parameters) if p in changed]
-            question = fitted_anew(self.arm, prepared.data, self.rng, held=held)
-            evidence = Evidence.over_noise(prepared.data, prepared.sigma)
         else:
-            question = as_given(self.arm, prepared.data)
             evidence = prepared.described
-        found = explain(question, evidence, result, settings, unknown)
+        nuisance = Nuisance.of(rows, memoized_arm(self.arm), self.rng, held=held)
+        every = tuple(range(len(rows.today)))
+        problem = JointFit(nuisance.arm, nuisance, setting, every, stated=True)
+        found = explain(problem, evidence, result, settings, unknown)
         if at_floor(found, settings):
             return Chosen(found, np.zeros(self.arm.robot.n_joints), NOISE)
-        misfit = np.sqrt(evidence.power(found.fitted.residual))
+        misfit = np.sqrt(evidence.power(found.residual))
         sigma = tuple(np.maximum(one, misfit) for one in evidence.sigma)
-        found = explain(question, replace(evidence, sigma=sigma), result, settings, unknown)
+        found = replace(found, evidence=replace(evidence, sigma=sigma))
         return Chosen(found, misfit, ESTIMATED)
 
     def _beside(self, misfit: FloatArray) -> Chosen:
@@ -147,23 +144,19 @@ class Explainer:
         named.
 
         """
-        prepared, settings = self.prepared, self.settings
+        prepared, settings, known = self.prepared, self.settings, self.information
         noise = _noise_within(misfit, prepared, 0.0)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
-        known = None if self.information is None else Identified(self.information)
         rows = Rows(prepared.data, evidence.sigma, 0, (misfit,) * count_recordings(prepared.data))
         grid = settings_of_misfit(known is not None)
         result = self.comparison(rows, grid, known).found()
-        found = self._changes(result, evidence, misfit, known)
+        found = self._changes(result, evidence, 0.0)
         usual = settings.thresholds.predicted * evidence.as_good(settings)
-        before = evidence.chi2_per_row(found.reference.residual)
+        before = evidence.chi2_per_row(evidence.residuals(self.arm))
         if np.all(before <= usual + evidence.matters(settings)):
             found = found.with_nothing_named()
-        chosen = Chosen(found, misfit, WRITTEN_MISFIT, untested=_NO_BASELINE)
-        if not found.steps:
-            return chosen
-        notes = (_AS_EXACT,) if known is None else ()
-        return replace(chosen, explanation=in_model_as_given(found), rest=found, notes=notes)
+        notes = (_AS_EXACT,) if found.steps and known is None else ()
+        return Chosen(found, misfit, WRITTEN_MISFIT, notes, _NO_BASELINE)
 
     def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
@@ -176,20 +169,19 @@ class Explainer:
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         self.tell(0.2, 'what has changed')
         result = self.comparison(self._of_both_days(baseline, misfit, sigma), None).found()
-        found = self._changes(result, evidence, misfit, baseline)
-        chosen = Chosen(found, misfit, OWN_MISFIT)
-        if not found.steps:
-            return chosen
+        found = self._changes(result, evidence, result.usual)
         first = count_recordings(baseline.data)
         second = count_recordings(prepared.data) + count_recordings(self.unseen)
-        untested = _ONE_EACH if first == second == 1 else ''
-        return replace(
-            chosen,
-            explanation=in_model_as_given(found),
-            rest=found,
-            notes=(untested,) if untested else (),
-            untested=untested,
-        )
+        untested = _ONE_EACH if found.steps and first == second == 1 else ''
+        return Chosen(found, misfit, OWN_MISFIT, (untested,) if untested else (), untested)
+
+    def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
+        """Explain what has changed in a model that stays as given."""
+        nuisance = replace(result.nuisance, accepted=())
+        fitted = tuple(range(nuisance.rows.before + count_recordings(self.prepared.data)))
+        setting = result.under.setting
+        problem = JointFit(self.arm, nuisance, setting, fitted, stated=False, spread=spread)
+        return explain(problem, evidence, result, self.settings)
 
     def _of_both_days(
         self, baseline: Baseline, misfit: FloatArray, sigma: Sequence[FloatArray]
@@ -218,15 +210,10 @@ class Explainer:
                 * (second + count_recordings(more)),
             ),
         )
-        least = _LEAST * rows.torque
-        return replace(
-            rows,
-            sigma=tuple(np.maximum(one, least) for one in rows.sigma),
-            amplitude=tuple(np.maximum(one, least) for one in rows.amplitude),
-        )
+        return rows.not_below_rounding()
 
     def comparison(
-        self, rows: Rows, grid: Sequence[Setting] | None, known: Identified | None = None
+        self, rows: Rows, grid: Sequence[Setting] | None, known: FloatArray | None = None
     ) -> CauseComparison:
         """
         Return the comparison of all causes.
@@ -237,8 +224,8 @@ class Explainer:
             The data.
         grid : sequence of Setting or None
             Amplitudes that are compared; None with a baseline.
-        known : Identified or None
-            What is known of the arm in addition to its description.
+        known : ndarray, shape (P, P), optional
+            Information on the parameters of the arm, which adds to its description.
 
         """
         arm, settings = self.arm, self.settings
@@ -254,42 +241,6 @@ class Explainer:
         catalogue = Causes(tuple(kinds), nuisance, changed, frozenset(fitted))
         used = settings_of_baseline(nuisance) if grid is None else tuple(grid)
         return CauseComparison(nuisance, catalogue, settings.thresholds, used)
-
-    def _changes(
-        self,
-        result: Result,
-        evidence: Evidence,
-        misfit: FloatArray,
-        known: Baseline | Identified | None,
-    ) -> Explanation:
-        """Explain what has changed, beside what any model of the arm gets wrong."""
-        settings = self.settings
-        data = [*self.prepared.data, *(() if known is None else known.data)]
-        discrepancy = Discrepancy.over(data, settings.thresholds.of_state * misfit, self.arm)
-        question = self._since_then(data, known, [discrepancy])
-        baseline = known if isinstance(known, Baseline) else None
-        found = explain(question, evidence, result, settings, baseline=baseline)
-        return replace(found.in_arm(self._since_then(data, known)), beside=question)
-
-    def _since_then(
-        self,
-        data: Sequence[Trajectory],
-        known: Baseline | Identified | None,
-        beside: Sequence[Effect] = (),
-    ) -> Question:
-        """Ask what has changed in an arm whose body and friction are as they were known."""
-        if known is None:
-            return as_given(self.arm, data, beside)
-        free = fitted_anew(self.arm, data, self.rng, beside)
-        assert free.base is not None
-        return replace(free, prior=known.prior(free.arm, free.base))
-
-
-def rows_over_noise(evidence: Evidence) -> Rows:
-    """Return data in rows over their noise, discrepancies being measured in torque."""
-    torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
-    sigma = tuple(np.maximum(one, _LEAST * torque) for one in evidence.sigma)
-    return Rows(evidence.data, sigma, 0, (torque,) * count_recordings(evidence.data))
 
 
 def _speed(data: Sequence[Trajectory]) -> FloatArray:

@@ -18,7 +18,7 @@ from itertools import product
 
 from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.nuisance import Marginal, Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import LASTING, Marginal, Nuisance, Setting
 from armid_ros.diagnosis.search.odds import (
     CauseFit,
     IMPOSSIBLE,
@@ -39,8 +39,6 @@ _NOISE = (0.15, 0.3, 0.5, 0.8, 1.1)
 _SHARES = ((0.0, 0.0), (0.02, -1.0), (0.06, -2.0), (0.15, -3.0))
 #: The same of the noise over that of two equal periods.
 _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
-#: Rows of one independent row without a baseline.
-_LASTING = 2.0
 #: Causes whose shapes are refined, that are compared in the end, and that are accepted.
 _REFINED, _COMPARED, _MOST = 5, 14, 5
 #: Of how many causes one is used for the usual spread.
@@ -348,7 +346,8 @@ class CauseComparison:
         while len(accepted) > 1:
             values, covariance = nuisance.whole(self._likeliest(nuisance))
             worth = []
-            for (cause, size), span in zip(nuisance.accepted, nuisance.spans, strict=True):
+            for one, span in zip(nuisance.accepted, nuisance.spans, strict=True):
+                cause, size = one.cause, one.size
                 mean, own = values[span], covariance[span, span]
                 gain = float(mean @ np.linalg.solve(own, mean)) + np.linalg.slogdet(own)[1]
                 gain -= 2.0 * float(np.sum(np.log(size * cause.unit)))
@@ -373,14 +372,14 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
             for shared, own, noise in product(_SHARED, _OWN, _NOISE)
         )
         found = max(tried, key=lambda one: one.evidence)
-        lasting = nuisance.lasting(found, before, _LASTING)
+        lasting = nuisance.lasting(found, before, LASTING)
     return (replace(found.setting, lasting=lasting),)
 
 
 def settings_alone() -> tuple[Setting, ...]:
     """Return the amplitudes that are compared without a baseline."""
     return tuple(
-        Setting(free, share, share, factor, _LASTING, odds + more)
+        Setting(free, share, share, factor, LASTING, odds + more)
         for free in (False, True)
         for share, odds in _SHARES
         for factor, more in _FACTORS
@@ -390,7 +389,7 @@ def settings_alone() -> tuple[Setting, ...]:
 def settings_of_misfit(free: bool) -> tuple[Setting, ...]:
     """Return the amplitudes that are compared where only the size of the misfit is known."""
     return tuple(
-        Setting(free, share, share, noise, _LASTING) for share, noise in product(_OWN, (0.5, 1.1))
+        Setting(free, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
     )
 
 

@@ -8,14 +8,11 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.comparison import Accepted, Result
-from armid_ros.diagnosis.search.deviations import with_jackknife_std
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.fit import fit, Start
-from armid_ros.diagnosis.search.question import Question
+from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.search.trial import Judge, Key, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
@@ -38,12 +35,11 @@ class Name:
 
 
 def explain(
-    question: Question,
+    problem: JointFit,
     evidence: Evidence,
     result: Result,
     settings: DiagnosisSettings,
     unknown: Sequence[Effect] = (),
-    baseline: Baseline | None = None,
     known: Sequence[Name] = (),
 ) -> Explanation:
     """
@@ -51,8 +47,8 @@ def explain(
 
     Parameters
     ----------
-    question : Question
-        What is asked of which arm.
+    problem : JointFit
+        What values are fitted in.
     evidence : Evidence
         The data.
     result : Result
@@ -61,19 +57,17 @@ def explain(
         Which share of a torque matters.
     unknown : sequence of Effect
         Friction and offsets without given values, which are named where they are there.
-    baseline : Baseline or None
-        Recordings from when nothing was wrong.
     known : sequence of Name
         Causes that were named before.
 
     """
     material = settings.material
     names, small = list(known), list[Trial]()
-    values, _ = result.nuisance.whole(result.under)
+    values = result.nuisance.means(result.under)
     for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
         step = _step(one, result.usual, material)
         if _matters(one.best.cause, values[span], result, material):
-            names.append(_name(step, one.best.cause, values[span], question.arm))
+            names.append(_name(step, one.best.cause, values[span], problem.arm))
         else:
             small.append(step.trial)
     for effect, trial in _open(result, unknown, settings):
@@ -81,24 +75,16 @@ def explain(
             small += [trial] if trial.odds > settings.thresholds.alarm else []
         elif trial.odds > settings.thresholds.alarm:
             names.append(Name(SelectedEffect(effect, (0,)), Step(trial), trial.values))
-    start = Start([one.values for one in names])
-    fitted = fit(
-        question.arm, [n.named for n in names], evidence, question.base, start, question.prior
-    )
-    setting = result.under.setting
-    chance = (1.0 + (result.usual if baseline is not None else 0.0)) / setting.precision
     return Explanation(
-        question.arm,
-        question.base,
-        with_jackknife_std(fitted, evidence, question.prior, chance),
-        fit(question.arm, (), evidence, question.base, prior=question.prior),
+        problem.arm,
+        problem.fit([one.named for one in names], [one.values for one in names]),
+        problem.fit(),
         tuple(one.step for one in names),
         survey_of(result, unknown, settings, [one.step.trial.key for one in names]),
         evidence,
         tuple(small),
-        question.prior,
-        chance,
-        baseline,
+        problem,
+        problem.refits_body,
     )
 
 
@@ -140,7 +126,7 @@ def _open(
     today, joints = np.flatnonzero(nuisance.rows.today).tolist(), nuisance.arm.robot.joints
     back = np.linalg.inv(turn)
     left = float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today))
-    names = [(one.name, one.joint) for one in nuisance.parameters]
+    names = [(one.name, one.joint) for one in nuisance.base.parameters]
     for effect in unknown:
         parameter = effect.parameters(nuisance.arm.robot)[0]
         if (parameter.name, parameter.joint) not in names:

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-An explanation of a gap: the names, the fitted arm, and its residual.
+An explanation of a gap: the names, and the arm with them.
 
 A fit of base parameters gives standard parameters that no body may have. What the data determine
 stays: of all physically consistent links that fit as well, those nearest to the description are
@@ -17,16 +17,13 @@ from functools import cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
-from armid_ros.diagnosis.data.baseline import Baseline, Prior
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.deviations import as_change, with_jackknife_std
-from armid_ros.diagnosis.search.fit import fit, Fitted, Start, with_values_of
-from armid_ros.diagnosis.search.question import Question
+from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
-from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg
@@ -41,14 +38,12 @@ _ALIKE = 1.05
 @dataclass(frozen=True)
 class Explanation:
     """
-    The result of a search.
+    The names that are given, with their values.
 
     Attributes
     ----------
     given : ArmModel
         The arm as given.
-    base : BaseParameters or None
-        Base parameters of it that were fitted; None where it stayed as given.
     fitted : Fitted
         The arm with all named effects.
     reference : Fitted
@@ -61,30 +56,22 @@ class Explanation:
         The data.
     minor : tuple of Trial
         Causes that are there and do not matter, for the small print.
-    prior : Prior or None
-        CauseInformation of the baseline about ``base``.
-    by_chance : float
-        Variance of values by what the names leave, over that for white noise.
-    baseline : Baseline or None
-        Recordings from before the named effects changed.
-    beside : Question or None
-        The same question with a model discrepancy, beside which stated values are fitted; None
-        where there is none.
+    problem : JointFit or None
+        What values are fitted in; None where that is not needed any more.
+    refitted : bool
+        Whether the rigid body was fitted anew.
 
     """
 
     given: ArmModel
-    base: BaseParameters | None
     fitted: Fitted
     reference: Fitted
     steps: tuple[Step, ...]
     survey: Survey | None
     evidence: Evidence
     minor: tuple[Trial, ...] = ()
-    prior: Prior | None = None
-    by_chance: float = 0.0
-    baseline: Baseline | None = None
-    beside: Question | None = None
+    problem: JointFit | None = None
+    refitted: bool = False
 
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
@@ -93,26 +80,20 @@ class Explanation:
 
     def only(self, keep: Sequence[int]) -> Explanation:
         """Return the explanation with some of its names, in this order, fitted anew."""
-        fitted = fit(
-            self.given,
-            [self.fitted.named[k] for k in keep],
-            self.evidence,
-            self.base,
-            Start([self.fitted.values[k] for k in keep], self.fitted.change),
-            self.prior,
-        )
-        fitted = with_jackknife_std(fitted, self.evidence, self.prior, self.by_chance)
+        own = self.fitted
+        fitted = self._fit([own.named[k] for k in keep], [own.values[k] for k in keep])
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
-    def in_arm(self, question: Question) -> Explanation:
-        """Return what the names explain of another question, all fitted anew."""
-        arm, base, prior = question.arm, question.base, question.prior
-        reference = fit(arm, (), self.evidence, base, prior=prior)
-        moved = replace(self, given=arm, base=base, prior=prior, reference=reference)
-        if not self.steps:
-            return replace(moved, fitted=reference)
-        start = replace(self.fitted, change=np.zeros_like(reference.change))
-        return replace(moved, fitted=start).only(range(len(self.steps)))
+    def _fit(self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]) -> Fitted:
+        assert self.problem is not None
+        return self.problem.fit(named, values)
+
+    def in_common_body(self) -> Explanation:
+        """Return the same names in an arm with the body and friction that both days have."""
+        assert self.problem is not None
+        problem = replace(self.problem, arm=self.problem.nuisance.arm, stated=True)
+        moved = replace(self, problem=problem, reference=problem.fit(), refitted=True)
+        return moved.only(range(len(self.steps)))
 
     def with_nothing_named(self) -> Explanation:
         """Return the explanation with all of its names in the small print."""
@@ -120,24 +101,24 @@ class Explanation:
         return replace(self, fitted=self.reference, steps=(), minor=(*small, *self.minor))
 
     def forgetting(self) -> Explanation:
-        """Return the explanation with arms that do not cache what they have computed."""
+        """Return the explanation without what it was computed from."""
         return replace(
             self,
             given=plain_arm(self.given),
             fitted=replace(self.fitted, arm=plain_arm(self.fitted.arm)),
             reference=replace(self.reference, arm=plain_arm(self.reference.arm)),
-            beside=None,
+            problem=None,
         )
 
     @cached_property
-    def beside_discrepancy(self) -> Explanation:
-        """Return the names fitted with the model discrepancy; itself where there is none."""
-        return self if self.beside is None else self.in_arm(self.beside)
+    def residual(self) -> list[FloatArray]:
+        """Residual of the arm with the names, (M, n) of each trajectory [N m]."""
+        return self.evidence.residuals(self.fitted.arm)
 
     @property
     def chi2_per_row(self) -> FloatArray:
         """Mean weighted square of the residual of the patched model, shape (n,)."""
-        return self.evidence.chi2_per_row(self.fitted.residual)
+        return self.evidence.chi2_per_row(self.residual)
 
 
 @dataclass(frozen=True)
@@ -155,12 +136,9 @@ class Chosen:
         What the floor of the gap is.
     notes : tuple of str
         What a reader should know.
-    rest : Explanation or None
-        The same names fitted jointly with a body common to both days: its residual is what they
-        leave.
     untested : str
-        What would tell a change from another motion's misfit, a sentence; empty if the recordings
-        do. Where they do not, names have to take most of the gap.
+        What would separate a change from another motion's misfit, a sentence; empty if the
+        recordings do. Where they do not, names have to take most of the gap.
 
     """
 
@@ -168,13 +146,7 @@ class Chosen:
     misfit: FloatArray
     floor_in_words: str
     notes: tuple[str, ...] = ()
-    rest: Explanation | None = None
     untested: str = ''
-
-    @property
-    def tested(self) -> bool:
-        """Whether names were tested for a change in all recordings, also those not used."""
-        return self.rest is not None and not self.untested
 
     @property
     def measured(self) -> bool:
@@ -182,50 +154,22 @@ class Chosen:
         return self.floor_in_words in (NOISE, ESTIMATED)
 
 
-def in_model_as_given(found: Explanation) -> Explanation:
-    """
-    Return what the names explain while the rigid body stays as it is.
-
-    Their values are those of a joint fit with the body and the model discrepancy: what the model
-    lacks in every motion is not taken for a part of what has changed.
-
-    """
-    arm, evidence = found.given, found.evidence
-    found = found.beside_discrepancy
-    fitted = found.fitted
-    if found.prior is not None and found.baseline is not None:
-        fitted = as_change(fitted, evidence, found.prior, found.baseline)
-    alone, reference = with_values_of(fitted, arm, evidence), fit(arm, (), evidence, None)
-    return replace(found, given=arm, base=None, prior=None, fitted=alone, reference=reference)
-
-
 def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
     """Return whether the residual of an explanation is no gap in any joint."""
-    evidence = explanation.evidence
-    limits = evidence.limits(explanation.fitted.residual, settings)
+    limits = explanation.evidence.limits(explanation.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
 
 
-def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tuple[str, ...]]:
-    """
-    Return an explanation with physically consistent links, if any fit as well, and a note.
-
-    Parameters
-    ----------
-    explanation : Explanation
-        What was found.
-    arm : ArmModel
-        The arm as described.
-
-    """
-    base, fitted = explanation.base, explanation.fitted
-    rigid = len(arm.robot.rigid_parameters)
-    if base is None or not base.rank or base.independent.min() >= rigid:
+def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
+    """Return an explanation with physically consistent links, if any fit as well, and a note."""
+    problem, fitted = explanation.problem, explanation.fitted
+    if problem is None or not problem.refits_body:
         return explanation, ()
-    evidence = explanation.evidence
+    base, arm = problem.nuisance.base, problem.arm
+    if not base.rank or base.independent.min() >= len(arm.robot.rigid_parameters):
+        return explanation, ()
     known = len(arm.parameters)
-    values = base.values(fitted.arm.theta[:known])
-    triangle, count = _triangle(explanation, values)
+    triangle, count = _triangle(problem, fitted)
     program, _ = physical_program(arm, base, PhysicalSettings())
     for weight in _WEIGHTS:
         try:
@@ -233,38 +177,32 @@ def as_bodies(explanation: Explanation, arm: ArmModel) -> tuple[Explanation, tup
         except IdentificationError:
             continue
         changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
-        residual = tuple(evidence.residuals(changed))
-        bodily = replace(fitted, arm=changed, residual=residual)
-        allowed = np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)
-        if np.all(evidence.chi2_per_row(residual) <= allowed):
-            return replace(explanation, fitted=bodily), ()
+        bodily = replace(explanation, fitted=replace(fitted, arm=changed))
+        if np.all(bodily.chi2_per_row <= np.maximum(_ALIKE * explanation.chi2_per_row, 1.0)):
+            return bodily, ()
     return explanation, (
         'no links that are bodies explain the data as well: what was named, or not found, is in '
         'the inertias; the patched model may not be simulable',
     )
 
 
-def _triangle(explanation: Explanation, values: FloatArray) -> tuple[FloatArray, float]:
-    """
-    Return the triangular factor of the base columns and their target, and the number of rows.
-
-    Rows of the baseline are part of the factor.
-
-    """
-    fitted, rank, evidence = explanation.fitted, len(values), explanation.evidence
-    blocks = []
-    for columns, own_residual in zip(fitted.columns, fitted.residual, strict=True):
-        own = columns[:, :, :rank]
-        target = own_residual + own @ values
-        blocks.append(np.concatenate([own, target[:, :, np.newaxis]], axis=2))
-    factors = [
-        scipy.linalg.qr(rows.reshape(-1, rank + 1), mode='r')[0][: rank + 1]
-        for rows in evidence.weighted(blocks)
-    ]
-    prior = explanation.prior
-    if prior is not None:
-        own, own_residual = prior.columns, prior.residual - prior.columns @ fitted.change
-        factors.append(np.column_stack([own, own_residual + own @ values]))
+def _triangle(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
+    """Return the triangular factor of the base columns and their target, and the rows."""
+    nuisance = problem.nuisance
+    rows, rank, base = nuisance.rows, nuisance.rank, nuisance.base
+    back = np.linalg.inv(nuisance.turn)
+    then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
+    rest = [part.residual(fitted.arm)[:, :, np.newaxis] for part in rows.data]
+    left = rows.weighted(rest, range(len(rows.torque)))
+    factors, count = [], 0
+    for k, columns in enumerate(nuisance.columns):
+        own = columns[:, :, :rank] @ back
+        residual, values = (
+            (left[k][:, :, 0], now) if rows.today[k] else (nuisance.residual[k], then)
+        )
+        both = np.concatenate([own, (residual + own @ values)[:, :, np.newaxis]], axis=2)
+        flat = both.reshape(-1, rank + 1)
+        factors.append(scipy.linalg.qr(flat, mode='r')[0][: rank + 1])
+        count += nuisance.count[k]
     whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
-    parts = [*evidence.data, *(() if prior is None else prior.data)]
-    return np.asarray(whole), float(sum(part.informative.sum() for part in parts))
+    return np.asarray(whole), float(count)

@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.baseline import described_precision, excited, Identified
+from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.estimate import ParameterName
+from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,8 @@ _HELD = 1e-12
 #: Share by which a described value of an effect, or a torque where a model was never tried, may be
 #: off. Values of the laboratory are off by up to 0.1, friction of an arm by 0.2 in a day.
 _DESCRIBED = 0.25
+#: Rows of one independent row without a baseline.
+LASTING = 2.0
 #: Fewest rows of a correlation, the largest that is none, and the largest lag [rows].
 _FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
 
@@ -116,6 +118,27 @@ class Marginal:
 
 
 @dataclass(frozen=True)
+class Term:
+    """
+    A cause among the nuisance columns.
+
+    Attributes
+    ----------
+    cause : Cause
+        The cause.
+    size : float
+        Standard deviation of the prior of its values, over their unit.
+    acts : ndarray of bool, shape (K,)
+        In which recordings it acts.
+
+    """
+
+    cause: Cause
+    size: float
+    acts: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
 class Nuisance:
     """
     Columns of body, friction and discrepancy, in coordinates in which they are apart.
@@ -126,7 +149,7 @@ class Nuisance:
         The data.
     arm : ArmModel
         The model, with friction also in joints for which none is given.
-    parameters : tuple of ParameterName
+    base : BaseParameters
         Parameters b of its body and friction, r.
     turn : ndarray, shape (r, r)
         Parameters of the columns, b = turn x.
@@ -140,21 +163,21 @@ class Nuisance:
         Weighted residual of the model.
     fixed : tuple of (ndarray, shape (q, q), ndarray, shape (q,))
         Products of these columns with each other and with the residual.
-    accepted : tuple of (Cause, float)
-        Causes that were found, and the standard deviation of the prior of their values.
+    accepted : tuple of Term
+        Causes that were found.
 
     """
 
     rows: Rows
     arm: ArmModel
-    parameters: tuple[ParameterName, ...]
+    base: BaseParameters
     turn: FloatArray
     described: FloatArray
     open: npt.NDArray[np.bool_]
     columns: tuple[FloatArray, ...]
     residual: tuple[FloatArray, ...]
     fixed: tuple[tuple[FloatArray, FloatArray], ...]
-    accepted: tuple[tuple[Cause, float], ...] = ()
+    accepted: tuple[Term, ...] = ()
 
     @classmethod
     def of(
@@ -162,13 +185,29 @@ class Nuisance:
         rows: Rows,
         arm: ArmModel,
         rng: np.random.Generator,
-        known: Identified | None = None,
+        known: FloatArray | None = None,
+        held: Sequence[int] = (),
     ) -> Nuisance:
-        """Compute the columns; ``known`` adds to the description."""
-        base, columns = excited(arm, arm.base_parameters(rng), rows.data)
-        described = described_precision(base, arm)
-        if known is not None:
-            described = known.prior(arm, base).described
+        """
+        Compute the columns.
+
+        Parameters
+        ----------
+        rows : Rows
+            The data.
+        arm : ArmModel
+            The model.
+        rng : numpy.random.Generator
+            Draws the states from which base parameters are found.
+        known : ndarray, shape (P, P), optional
+            Information on the first parameters of the arm, which adds to the description.
+        held : sequence of int
+            Parameters of the arm that stay as they are, as a change of them is a cause.
+
+        """
+        free = np.setdiff1d(np.arange(len(arm.parameters)), held)
+        base, columns = excited(arm, arm.base_parameters(rng, free), rows.data)
+        described = described_precision(base, arm, known)
         rigid = len(arm.robot.rigid_parameters)
         values = arm.theta[base.independent]
         unset = (base.independent >= rigid) & (values == 0.0)  # noqa: RUF069 - no given value
@@ -190,7 +229,7 @@ class Nuisance:
         return cls(
             rows,
             arm,
-            base.parameters,
+            base,
             turn,
             described,
             unset,
@@ -222,10 +261,9 @@ class Nuisance:
         """Products of the columns of each recording, those of accepted causes last."""
         found = []
         for k, (fixed, _) in enumerate(self.fixed):
-            there = float(self.rows.today[k])
-            parts = [there * one.products[k] for one, _ in self.accepted]
+            parts = [float(one.acts[k]) * one.cause.products[k] for one in self.accepted]
             border = np.concatenate([np.zeros((len(fixed), 0)), *parts], axis=1)
-            own = [self.among_accepted(one, k) for one, _ in self.accepted]
+            own = [float(one.acts[k]) * self.among_accepted(one.cause, k) for one in self.accepted]
             within = np.concatenate(own, axis=1) if own else np.zeros((0, 0))
             found.append(np.block([[fixed, border], [border.T, within]]))
         return found
@@ -235,14 +273,13 @@ class Nuisance:
         """Products of the same columns with the residual."""
         found = []
         for k, (_, fixed) in enumerate(self.fixed):
-            aims = [one.aim[k] * self.rows.today[k] for one, _ in self.accepted]
+            aims = [one.cause.aim[k] * one.acts[k] for one in self.accepted]
             found.append(np.concatenate([fixed, *aims]))
         return found
 
     def among_accepted(self, cause: Cause, k: int) -> FloatArray:
         """Return products of the columns of accepted causes with those of a cause, (a, p)."""
-        there = float(self.rows.today[k])
-        parts = [there * one.products_with(cause, k) for one, _ in self.accepted]
+        parts = [float(one.acts[k]) * one.cause.products_with(cause, k) for one in self.accepted]
         return np.concatenate([np.zeros((0, len(cause.unit))), *parts])
 
     def products(self, cause: Cause, k: int) -> FloatArray:
@@ -251,21 +288,31 @@ class Nuisance:
             return cause.products[k]
         return np.concatenate([cause.products[k], self.among_accepted(cause, k)])
 
-    def and_cause(self, cause: Cause, size: float) -> Nuisance:
-        """Return the same with one more cause."""
-        return replace(self, accepted=(*self.accepted, (cause, size)))
+    def and_cause(
+        self, cause: Cause, size: float, acts: npt.NDArray[np.bool_] | None = None
+    ) -> Nuisance:
+        """Return the same with one more cause, which acts on the day in question by default."""
+        term = Term(cause, size, self.rows.today if acts is None else acts)
+        return replace(self, accepted=(*self.accepted, term))
 
     def without(self, name: int) -> Nuisance:
         """Return the same without one of the accepted causes."""
         return replace(self, accepted=(*self.accepted[:name], *self.accepted[name + 1 :]))
 
+    def with_residual(self, residual: Sequence[FloatArray]) -> Nuisance:
+        """Return the same with another weighted residual, (n, M) of each recording."""
+        pairs = zip(self.fixed, self.columns, residual, strict=True)
+        fixed = tuple((own, x.reshape(-1, x.shape[2]).T @ y.ravel()) for (own, _), x, y in pairs)
+        accepted = [replace(one, cause=one.cause.aimed_at(residual)) for one in self.accepted]
+        return replace(self, residual=tuple(residual), fixed=fixed, accepted=tuple(accepted))
+
     @property
     def spans(self) -> list[slice]:
         """Return where the values of each accepted cause are among all parameters."""
         size = self.columns[0].shape[2]
-        stops = size + np.cumsum([len(one.unit) for one, _ in self.accepted], dtype=int)
-        pairs = zip(self.accepted, stops.tolist(), strict=True)
-        return [slice(stop - len(one.unit), stop) for (one, _), stop in pairs]
+        counts = [len(one.cause.unit) for one in self.accepted]
+        stops = size + np.cumsum(counts, dtype=int)
+        return [slice(s - count, s) for count, s in zip(counts, stops.tolist(), strict=True)]
 
     @cached_property
     def reach(self) -> FloatArray:
@@ -294,7 +341,7 @@ class Nuisance:
         body = self.turn.T @ self.described @ self.turn + _HELD * np.eye(self.rank)
         size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
         shared = size.ravel() ** -2.0
-        more = [(size * one.unit) ** -2.0 for one, size in self.accepted]
+        more = [(one.size * one.cause.unit) ** -2.0 for one in self.accepted]
         whole = linalg.block_diag(body, np.diag(np.concatenate([shared, *more])))
         used = np.ones(len(whole), dtype=bool)
         used[: self.rank] = setting.free | self.open
@@ -302,7 +349,23 @@ class Nuisance:
         kept = np.flatnonzero(used)
         return whole[np.ix_(kept, kept)], kept
 
-    def marginal(self, setting: Setting, among: Sequence[int] | None = None) -> Marginal:
+    def rows_of(self, k: int) -> FloatArray:
+        """Return the weighted columns of all parameters in a recording, (M, n, q + a)."""
+        joints, rows, _ = self.columns[k].shape
+        blocks = [self.columns[k]]
+        for one in self.accepted:
+            own = np.zeros((joints, rows, len(one.cause.unit)))
+            if one.acts[k]:
+                own[list(one.cause.joints)] = one.cause.columns[k]
+            blocks.append(own)
+        return np.concatenate(blocks, axis=2).swapaxes(0, 1)
+
+    def marginal(
+        self,
+        setting: Setting,
+        among: Sequence[int] | None = None,
+        less: tuple[int, FloatArray, FloatArray] | None = None,
+    ) -> Marginal:
         """
         Integrate out the discrepancies d_k, and fit what is left.
 
@@ -312,6 +375,8 @@ class Nuisance:
             Amplitudes.
         among : sequence of int, optional
             The recordings that count; all by default.
+        less : (int, ndarray, shape (S, q + a), ndarray, shape (S,)), optional
+            Rows of a recording that do not count, with their residual.
 
         """
         whole, kept = self._precision(setting)
@@ -319,12 +384,17 @@ class Nuisance:
         aim, scale, loss = np.zeros(len(kept)), setting.precision, 0.0
         motions = dict[int, MotionDiscrepancy]()
         for k in range(len(self.columns)) if among is None else among:
-            own, to = self.square[k][np.ix_(kept, kept)] * scale, self.cross[k][kept] * scale
+            square, cross, count = self.square[k], self.cross[k], self.count[k]
             power = float(np.sum(self.residual[k] ** 2)) * scale
+            if less is not None and less[0] == k:
+                _, x, y = less
+                square, cross, count = square - x.T @ x, cross - x.T @ y, count - len(y)
+                power -= float(y @ y) * scale
+            own, to = square[np.ix_(kept, kept)] * scale, cross[kept] * scale
             if setting.own:
                 size = setting.own * self.rows.amplitude[k]
-                motion, log_size = self._motion(k, kept, scale, size)
-                border = self.square[k][np.ix_(self.discrepancy.ravel(), kept)]
+                motion, log_size = self._motion(square, cross, kept, scale, size)
+                border = square[np.ix_(self.discrepancy.ravel(), kept)]
                 own = own - scale * border.T @ motion.regressed
                 to = to - motion.regressed.T @ motion.aim.ravel()
                 made = np.einsum('jf,jfg,jg->', motion.aim, motion.inverse, motion.aim)
@@ -332,7 +402,7 @@ class Nuisance:
                 motions[k] = motion
             whole, aim = whole + own, aim + to
             loss += 0.5 * power
-            evidence -= self.count[k] / setting.lasting * np.log(setting.noise)
+            evidence -= count / setting.lasting * np.log(setting.noise)
         lower = np.linalg.cholesky(whole)
         root = linalg.solve_triangular(lower, np.eye(len(kept)), lower=True)
         values = root.T @ (root @ aim)
@@ -341,49 +411,71 @@ class Nuisance:
         return Marginal(setting, kept, root, values, float(evidence), loss, motions)
 
     def _motion(
-        self, k: int, kept: npt.NDArray[np.intp], scale: float, size: FloatArray
+        self,
+        square: FloatArray,
+        cross: FloatArray,
+        kept: npt.NDArray[np.intp],
+        scale: float,
+        size: FloatArray,
     ) -> tuple[MotionDiscrepancy, float]:
         """Return what d_k of a size (n,) takes up, and the logarithm of its integral."""
         place, functions = self.discrepancy, self.discrepancy.shape[1]
-        own = self.square[k][place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
+        own = square[place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
         held = own + np.eye(functions) * size[:, np.newaxis, np.newaxis] ** -2.0
         inverse = np.linalg.inv(held)
-        border = self.square[k][np.ix_(place.ravel(), kept)] * scale
+        border = square[np.ix_(place.ravel(), kept)] * scale
         regressed = (inverse @ border.reshape(*place.shape, -1)).reshape(place.size, -1)
         log_size = 0.5 * np.linalg.slogdet(held)[1].sum() + functions * np.log(size).sum()
-        return MotionDiscrepancy(
-            np.asarray(inverse), self.cross[k][place] * scale, regressed
-        ), -float(log_size)
+        return MotionDiscrepancy(np.asarray(inverse), cross[place] * scale, regressed), -float(
+            log_size
+        )
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
         """Return all values under a setting and their covariance, zero of what is not fitted."""
         size = len(self.cross[0])
-        values, covariance = np.zeros(size), np.zeros((size, size))
-        values[under.used] = under.values
+        covariance = np.zeros((size, size))
         covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
-        return values, covariance
+        return self.means(under), covariance
+
+    def means(self, under: Marginal) -> FloatArray:
+        """Return all values under a setting, zero of what is not fitted."""
+        values = np.zeros(len(self.cross[0]))
+        values[under.used] = under.values
+        return values
 
     def rest(self, values: FloatArray, k: int) -> FloatArray:
-        """Return the weighted residual of a recording for given values, without d_k, (n, M)."""
+        """Return the weighted residual of a recording for given values, d_k in it, (n, M)."""
         columns = self.columns[k]
         rest = self.residual[k] - columns @ values[: columns.shape[2]]
-        for (one, _), span in zip(self.accepted, self.spans, strict=True):
-            if self.rows.today[k]:
-                rest[list(one.joints)] -= one.columns[k] @ values[span]
+        for one, span in zip(self.accepted, self.spans, strict=True):
+            if one.acts[k]:
+                rest[list(one.cause.joints)] -= one.cause.columns[k] @ values[span]
         return rest
+
+    def unexplained(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
+        """Return the same without what the discrepancy d_k of that motion takes up, (n, M)."""
+        rest = self.rest(values, k)
+        if not setting.own:
+            return rest
+        size = setting.own * self.rows.amplitude[k]
+        for joint, place in enumerate(self.discrepancy):
+            functions = self.columns[k][joint][:, place]
+            held = setting.precision * functions.T @ functions
+            held += np.eye(len(place)) * size[joint] ** -2.0
+            aim = setting.precision * functions.T @ rest[joint]
+            rest[joint] -= functions @ np.linalg.solve(held, aim)
+        return rest
+
+    def body_change(self, values: FloatArray) -> FloatArray:
+        """Return the change of the base parameters, (r,), of all values."""
+        return np.asarray(self.turn @ values[: self.rank])
 
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
         """Return how many rows of what is left make one independent row, at the median."""
         found = []
-        values, _ = self.whole(under)
+        values = self.means(under)
         for k in recordings:
-            motion = under.motions[k]
-            made = np.einsum('jfg,jg->jf', motion.inverse, motion.aim)
-            own = made - (motion.regressed @ under.values).reshape(made.shape)
-            functions = self.columns[k][:, :, self.rank :].reshape(
-                *self.residual[k].shape, *own.shape
-            )
-            rest = self.rest(values, k) - np.einsum('jmjf,jf->jm', functions, own)
+            rest = self.unexplained(values, under.setting, k)
             for x in rest:
                 x = x[np.abs(x) > 0.0]
                 if len(x) >= _FEW:

@@ -14,7 +14,6 @@ from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
-from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
@@ -33,20 +32,17 @@ class Patch:
     Attributes
     ----------
     arm : ArmModel
-        The arm without the named effects, with the present values of its own parameters.
+        The arm without the named effects.
     named : tuple of SelectedEffect
         Effects, with their present shapes.
     values : tuple of ndarray
         All parameters of each effect.
-    change : ndarray, shape (r,)
-        Change of the fitted base parameters from the given ones.
 
     """
 
     arm: ArmModel
     named: tuple[SelectedEffect, ...]
     values: tuple[FloatArray, ...]
-    change: FloatArray
 
     @cached_property
     def model(self) -> ArmModel:
@@ -56,21 +52,12 @@ class Patch:
             model = with_named(model, own.effect, values)
         return model
 
-    def with_change(self, change: FloatArray, base: BaseParameters) -> Patch:
-        """Return the patch after a further change of the base parameters, shape (r,)."""
-        theta = self.arm.theta
-        arm = self.arm.with_theta(base.lift(base.values(theta) + change, theta))
-        return Patch(arm, self.named, self.values, self.change + change)
-
-    def moved(self, change: FloatArray, base: BaseParameters | None) -> Patch:
+    def moved(self, change: FloatArray) -> Patch:
         """Return the patch after a step of all fitted parameters, within bounds."""
-        start = len(self.change)
-        body = self if base is None else self.with_change(change[:start], base)
-        arm = body.arm
-        named, values = [], []
+        start, named, values = 0, list[SelectedEffect](), list[FloatArray]()
         for own, old in zip(self.named, self.values, strict=True):
             effect, kept = own.effect, list(own.kept)
-            lower, upper = room(effect, arm)
+            lower, upper = room(effect, self.arm)
             new = old.copy()
             new[kept] += change[start : start + len(kept)]
             values.append(np.clip(new, lower, upper))
@@ -84,12 +71,12 @@ class Patch:
                 effect = effect.with_shape(np.clip(shape, low, high))
                 start += count
             named.append(SelectedEffect(effect, own.kept))
-        return Patch(arm, tuple(named), tuple(values), body.change)
+        return Patch(self.arm, tuple(named), tuple(values))
 
     @property
     def linear(self) -> npt.NDArray[np.bool_]:
         """Which of the fitted parameters are no shapes, (f,)."""
-        own = [np.ones(len(self.change), dtype=bool)]
+        own = [np.zeros(0, dtype=bool)]
         for named in self.named:
             own += [np.ones(len(named.kept), dtype=bool), np.zeros(len(named.effect.shape), bool)]
         return np.concatenate(own)
@@ -127,19 +114,17 @@ def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
     return low, high, _STEP * np.maximum(np.abs(np.array(effect.shape)), 0.1 * size)
 
 
-def patch_columns(state: Patch, part: Trajectory, base: BaseParameters | None) -> FloatArray:
-    """Return the Jacobian of base parameters, values and shapes in rows, shape (M, n, f)."""
-    model, motion = memoized_arm(state.model), part.motion
-    blocks = [np.empty((len(part.rows), motion.n_joints, 0))]
-    if base is not None:
-        blocks.append(part.base_columns(model, state.arm.effects, base.independent))
+def patch_columns(state: Patch, part: Trajectory) -> list[FloatArray]:
+    """Return the Jacobian of values and shapes of each named effect in rows, (M, n, p) each."""
+    model, blocks = memoized_arm(state.model), []
+    motion = part.motion
     for named in state.named:
-        columns = model.columns_of(named.effect, motion)[:, :, list(named.kept)]
-        blocks.append(part.reduce(columns))
+        columns = [model.columns_of(named.effect, motion)[:, :, list(named.kept)]]
         if named.effect.shape:
             position = len(model.effects) - 1 - model.effects[::-1].index(named.effect)
-            blocks.append(part.reduce(_shape_columns(model, position, motion)))
-    return np.concatenate(blocks, axis=2)
+            columns.append(_shape_columns(model, position, motion))
+        blocks.append(part.reduce(np.concatenate(columns, axis=2)))
+    return blocks
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:

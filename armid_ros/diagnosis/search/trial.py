@@ -184,7 +184,7 @@ class Judge:
     def _left(self) -> float:
         """Squares of the residual of the day in question."""
         nuisance = self.look.nuisance
-        values, _ = nuisance.whole(self.look.under)
+        values = nuisance.means(self.look.under)
         today = np.flatnonzero(nuisance.rows.today).tolist()
         return max(float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
 

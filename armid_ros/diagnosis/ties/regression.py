@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.fit import Fitted
+from armid_ros.diagnosis.search.posterior import Fitted
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.tied import Tied, TiedInteraction
 from armid_ros.errors import IdentificationError
@@ -175,7 +175,8 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     the larger ones then.
 
     """
-    fitted, base = explanation.fitted, explanation.base
+    fitted, problem = explanation.fitted, explanation.problem
+    assert problem is not None
     listed = {(name.name, name.joint) for name in fitted.estimate.parameters}
     own = [
         k
@@ -186,27 +187,19 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
     stiffness, std = found.stiffness[own], found.std[own]
     values, covariance = fitted.estimate.values.copy(), fitted.estimate.covariance
     where = [_place(spring, fitted.estimate.parameters) for spring in springs]
-    change = stiffness - values[where]
     values[where] = stiffness
     wider = np.ones(len(values))
     wider[where] = std / np.sqrt(np.diag(covariance)[where])
     if any(not isinstance(name.effect, Tied) for name in fitted.named):
         wider = np.maximum(wider, 1.0)
-    theta = fitted.arm.theta.copy()
-    theta[[_place(spring, fitted.arm.parameters) for spring in springs]] = stiffness
-    if base is not None:
-        known, rank = len(base.standard), base.rank
-        weighted = np.concatenate(list(explanation.evidence.weighted(fitted.columns)))
-        rows = weighted.reshape(-1, weighted.shape[2])
-        away = rows[:, rank:][:, where] @ change
-        moved = np.linalg.lstsq(rows[:, :rank], -away, rcond=None)[0]
-        theta[:known] = base.lift(base.values(theta[:known]) + moved, theta[:known])
-    patched = fitted.arm.with_theta(theta)
+    each = [one.copy() for one in fitted.values]
+    for name, own_values, place in zip(fitted.named, each, fitted.places, strict=True):
+        own_values[list(name.kept)] = values[list(place[0])]
     return replace(
         fitted,
-        arm=patched,
+        arm=problem.with_names_at(fitted.named, each),
+        values=tuple(each),
         estimate=Estimate(fitted.estimate.parameters, values, covariance * np.outer(wider, wider)),
-        residual=tuple(explanation.evidence.residuals(patched)),
     )
 
 

@@ -13,26 +13,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
-from armid_ros.diagnosis.data.rows import make_problem, project
 from armid_ros.diagnosis.prepare import Prepared
+from armid_ros.diagnosis.search.candidates import cause_of, value_unit
 from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.search.choice import Explainer, Progress, rows_over_noise
+from armid_ros.diagnosis.search.choice import Explainer, Progress
 from armid_ros.diagnosis.search.comparison import settings_alone
 from armid_ros.diagnosis.search.explain import explain, Name, survey_of
 from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
-from armid_ros.diagnosis.search.fit import fit, Fitted, Start
-from armid_ros.diagnosis.search.question import Question
+from armid_ros.diagnosis.search.odds import CauseInformation
+from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Judge, Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
 from armid_ros.identification.ties.stiffness import LEAST_Z
-from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -60,8 +60,8 @@ class Ties:
         Where there may be ties.
     evidence : Evidence
         The data, and their noise.
-    base : BaseParameters or None
-        Base parameters that are fitted jointly; None keeps the arm as described.
+    rng : numpy.random.Generator
+        Draws the states from which base parameters are found.
     settings : DiagnosisSettings
         Thresholds.
     sure : callable
@@ -73,9 +73,14 @@ class Ties:
     arm: ArmModel
     partner: Partner
     evidence: Evidence
-    base: BaseParameters | None
+    rng: np.random.Generator
     settings: DiagnosisSettings
     sure: Callable[[float], frozenset[str]]
+
+    @cached_property
+    def problem(self) -> JointFit:
+        """Return what values are fitted in: body, friction and ties, beside noise alone."""
+        return JointFit.over_noise(self.arm, self.evidence, self.rng)
 
     def find(self) -> tuple[Ties, Fitted]:
         """
@@ -133,12 +138,13 @@ class Ties:
         return found if gain > _LEAST_GAIN * noise else taut
 
     def fitted(self, named: Sequence[SelectedEffect], start: Sequence[FloatArray] = ()) -> Fitted:
-        """Fit the arm with named effects, from start values."""
-        return fit(self.arm, named, self.evidence, self.base, Start(start))
+        """Fit the arm with named effects, from start values; zero by default."""
+        zeros = [np.zeros(len(one.effect.parameters(self.arm.robot))) for one in named]
+        return self.problem.fit(named, start or zeros)
 
     def chi2_per_row(self, fitted: Fitted) -> FloatArray:
         """Return the loss of each joint, shape (n,)."""
-        return self.evidence.chi2_per_row(fitted.residual)
+        return self.evidence.chi2_per_row(self.evidence.residuals(fitted.arm))
 
     def surely(self, named: Sequence[SelectedEffect]) -> Fitted:
         """Fit, and remove ties, the weakest first, until all are significant."""
@@ -171,22 +177,20 @@ class Ties:
 
     def _common_slack(self, joints: Sequence[str]) -> tuple[float, FloatArray, FloatArray]:
         """Return the common slack of all straps that explains most; stiffnesses, and their z."""
-        reference, arm = self.fitted(()), memoized_arm(self.arm)
-        data, sigma = self.evidence.data, self.evidence.sigma
-        problem = make_problem(data, sigma, reference.residual, list(reference.columns))
-        projection = project(problem, range(problem.x.shape[2]))
-        left = projection.rest(problem.y).ravel()
+        nuisance = self.problem.nuisance
+        under = nuisance.marginal(self.problem.setting)
 
         def solved(slack: float) -> tuple[float, FloatArray, FloatArray]:
             straps = self.partner.slack.on(self.arm.robot, tuple(joints)).with_shape([slack])
-            rows = np.concatenate([part.columns(arm, straps) for part in data])
-            own = projection.rest(rows * problem.weight[:, :, np.newaxis]).reshape(len(left), -1)
-            scale = np.maximum(np.linalg.norm(own, axis=0), 1e-300)
-            inverse = np.linalg.pinv((own / scale).T @ (own / scale), hermitian=True)
-            aim = (own / scale).T @ left
-            values = inverse @ aim
+            columns = [part.columns(nuisance.arm, straps) for part in nuisance.rows.data]
+            own = SelectedEffect(straps, tuple(range(columns[0].shape[2])))
+            unit = value_unit(nuisance, own, columns)
+            cause = cause_of(nuisance, own, columns, unit)
+            known = CauseInformation.of(cause, nuisance, under, by_day=True)
+            inverse = np.linalg.pinv(known.matrix, hermitian=True)
+            values = inverse @ known.vector
             z = values / np.sqrt(np.maximum(np.diag(inverse), 1e-300))
-            return float(values @ aim), values / scale, z
+            return float(values @ known.vector), values * unit, z
 
         tried = [0.0, *TiedSlack.shapes[0].grid]
         best = int(np.argmax([solved(slack)[0] for slack in tried]))
@@ -203,8 +207,9 @@ class Ties:
 
     def _damped(self, fitted: Fitted) -> Fitted:
         """Return springs, with dampers where a gap is left and they are significant."""
-        limits = self.evidence.limits(fitted.residual, self.settings)
-        if np.all(self.chi2_per_row(fitted) < limits):
+        residual = self.evidence.residuals(fitted.arm)
+        limits = self.evidence.limits(residual, self.settings)
+        if np.all(self.evidence.chi2_per_row(residual) < limits):
             return fitted
         springs = [isinstance(own.effect, TiedInteraction) for own in fitted.named]
         both = [
@@ -254,39 +259,44 @@ def diagnose_ties(
     regression = TieRegression(arm, tuple(recordings), prepared.used, settings)
     sure = cache(regression.sure)
     evidence = Evidence.over_noise(prepared.data, prepared.sigma)
-    start = Ties(arm, settings.partner, evidence, prepared.base, settings, sure)
+    start = Ties(arm, settings.partner, evidence, rng, settings, sure)
     ties, fitted = start.find()
     if not fitted.named:
-        return _within_its_noise(arm, prepared, settings)
+        return _within_its_noise(start, prepared)
     reference = ties.fitted(())
     explainer = Explainer(arm, prepared, None, rng, tell, settings)
     step, survey = _as_one_cause(ties, explainer, fitted)
     steps = (step,) * len(fitted.named)
-    base: BaseParameters | None = ties.base
-    found = Explanation(ties.arm, base, fitted, reference, steps, survey, ties.evidence)
+    found = Explanation(
+        ties.arm,
+        fitted,
+        reference,
+        steps,
+        survey,
+        ties.evidence,
+        problem=ties.problem,
+        refitted=True,
+    )
     if _open(found, settings):
         rest = replace(explainer, arm=memoized_arm(fitted.arm))
         free = [one for one in settings_alone() if one.free]
-        result = rest.comparison(rows_over_noise(found.evidence), free).found()
+        result = rest.comparison(Rows.over_noise(found.evidence), free).found()
         rows = zip(fitted.named, fitted.values, strict=True)
         known = [Name(named, step, values) for named, values in rows]
-        question = Question(arm, prepared.base)
-        more = explain(question, found.evidence, result, settings, known=known)
+        more = explain(ties.problem, found.evidence, result, settings, known=known)
         fitted = ties.surely(more.fitted.named)
         if not any(isinstance(own.effect, Tied) for own in fitted.named):
             return None
         found = _with_names_of(replace(more, survey=found.survey), fitted)
     springs = regression.springs(found, 'free')
     if rightly_described(regression.springs(found, 'known'), springs):
-        found = _as_described(found, arm, settings)
-        if found.base is None:
+        found = _as_described(found, settings)
+        if not found.refitted:
             springs = regression.springs(found, 'known')
     return Chosen(without_bias(found, springs), nothing, NOISE)
 
 
-def _within_its_noise(
-    arm: ArmModel, prepared: Prepared, settings: DiagnosisSettings
-) -> Chosen | None:
+def _within_its_noise(ties: Ties, prepared: Prepared) -> Chosen | None:
     """
     Return the arm as described, if it leaves no more than the noise of its own residual.
 
@@ -294,27 +304,31 @@ def _within_its_noise(
     noise in the residual of the fitted arm, the described one would seem to be wrong.
 
     """
-    evidence = prepared.described
-    described = fit(arm, (), evidence, None)
-    found = Explanation(arm, None, described, described, (), None, evidence)
-    if _open(found, settings):
+    arm = replace(ties, evidence=prepared.described).problem.as_described()
+    described = arm.fit()
+    found = Explanation(ties.arm, described, described, (), None, prepared.described, problem=arm)
+    if _open(found, ties.settings):
         return None
-    return Chosen(found, np.zeros(arm.robot.n_joints), NOISE)
+    return Chosen(found, np.zeros(ties.arm.robot.n_joints), NOISE)
 
 
 def _open(found: Explanation, settings: DiagnosisSettings) -> bool:
-    limits = found.evidence.limits(found.fitted.residual, replace(settings, material=0.0))
+    limits = found.evidence.limits(found.residual, replace(settings, material=0.0))
     return bool(np.any(found.chi2_per_row > np.maximum(limits, settings.thresholds.same_fit)))
 
 
-def _as_described(found: Explanation, arm: ArmModel, settings: DiagnosisSettings) -> Explanation:
+def _as_described(found: Explanation, settings: DiagnosisSettings) -> Explanation:
     """Return the same names in the arm as described, where that explains as much."""
-    evidence = found.evidence
-    own = found.fitted
-    fitted = fit(arm, own.named, evidence, None, Start(own.values))
-    reference = fit(arm, (), evidence, None)
-    described = replace(found, base=None, fitted=fitted, reference=reference)
-    limits = evidence.limits(fitted.residual, settings)
+    assert found.problem is not None
+    problem, own = found.problem.as_described(), found.fitted
+    described = replace(
+        found,
+        fitted=problem.fit(own.named, own.values),
+        reference=problem.fit(),
+        problem=problem,
+        refitted=False,
+    )
+    limits = found.evidence.limits(described.residual, settings)
     if np.any(described.chi2_per_row > np.maximum(limits, _ALIKE * found.chi2_per_row)):
         return found
     return described
@@ -324,7 +338,7 @@ def _as_one_cause(ties: Ties, explainer: Explainer, fitted: Fitted) -> tuple[Ste
     """Compare all ties as one cause with the library; return how they are named, and the rest."""
     settings, robot = ties.settings, ties.arm.robot
     free = [one for one in settings_alone() if one.free]
-    comparison = explainer.comparison(rows_over_noise(ties.evidence), free)
+    comparison = explainer.comparison(Rows.over_noise(ties.evidence), free)
     result = comparison.first()
     loose = any(own.effect.shapes for own in fitted.named)
     kind = ties.partner.slack if loose else ties.partner.interaction

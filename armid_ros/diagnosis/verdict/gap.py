@@ -128,14 +128,13 @@ def _worse(
 
 
 def excess_of(
-    arm: ArmModel,
+    residual: Sequence[FloatArray],
     evidence: Evidence,
     settings: DiagnosisSettings,
     more: float = 1.0,
     where: str = 'the recordings',
 ) -> Excess:
-    """Return the loss that an arm leaves over so many times the limit up to which it is no gap."""
-    residual = evidence.residuals(arm)
+    """Return the loss of a residual over so many times the limit up to which it is no gap."""
     ratio = evidence.chi2_per_row(residual) / evidence.limits(residual, settings) / more
     worst = int(np.argmax(ratio))
     return Excess(ratio, f'in {where}', _at_times(evidence, residual, worst))
@@ -195,7 +194,7 @@ def held(
 
 
 def for_a_second(
-    arm: ArmModel,
+    left: Sequence[FloatArray],
     evidence: Evidence,
     before: Baseline,
     given: ArmModel,
@@ -209,7 +208,7 @@ def for_a_second(
     the given one is not exact to less than a share (`inexact`) of its squares.
 
     """
-    thresholds, left = settings.thresholds, evidence.residuals(arm)
+    thresholds = settings.thresholds
     most = thresholds.other_motion * thresholds.predicted
     then, _ = _worst_second(before.data, before.residual, (before.misfit,) * len(before.data))
     now, times = _worst_second(evidence.data, left, evidence.sigma)
@@ -298,7 +297,7 @@ def standing(
 def hiding(explanation: Explanation, settings: DiagnosisSettings) -> Hiding:
     """Return how much may change beside a misfit before what is left is a gap."""
     evidence = explanation.evidence
-    limits = evidence.limits(explanation.fitted.residual, settings) * settings.thresholds.predicted
+    limits = evidence.limits(explanation.residual, settings) * settings.thresholds.predicted
     misfit = np.sqrt(np.mean([own**2 for own in evidence.sigma], axis=0))
     still = at_rest(evidence.data, explanation.given.robot.joints)
     asked = (evidence.count > 0) & ~np.isin(explanation.given.robot.joints, still)

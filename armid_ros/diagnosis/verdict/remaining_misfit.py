@@ -11,11 +11,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.explanation import Chosen, ESTIMATED, Explanation
-from armid_ros.diagnosis.search.question import frees_body
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.attribution import Names
 from armid_ros.diagnosis.verdict.gap import excess_of, for_a_second, harmed, held
 from armid_ros.diagnosis.verdict.where import Excess
+from armid_ros.motion import FloatArray
 import numpy as np
 
 
@@ -45,41 +44,49 @@ class RemainingMisfit:
     given: ArmModel
     settings: DiagnosisSettings
 
-    def beside(self, names: Names) -> list[Excess]:
+    def beside(self, explanation: Explanation) -> list[Excess]:
         """
-        Return what names leave beside a body common to both days, each kind for all data.
+        Return what names leave, each kind for all data.
 
-        Something is missing where it is so with a model discrepancy and without: another motion
-        visits other states, in which a model has another misfit.
+        Where the model stays as given, it is what they leave beside the body, friction and
+        discrepancy of both days: another motion visits other states, in which a model has another
+        misfit.
 
         """
-        found = self._of_rest(names.rest)
-        if names.rest.beside is None or max(one.ratio.max() for one in found) <= 1.0:
+        problem, parts = explanation.problem, self._parts(explanation.evidence)
+        left = [part.residuals(explanation.fitted.arm) for part in parts]
+        if problem is not None and not self.chosen.measured:
+            rest = problem.rest(explanation.fitted)
+            first = len(explanation.evidence.data)
+            left = [rest[:first], *(rest[first:] or one for one in left[1:])]
+        found = self._of_data(explanation.evidence, left)
+        if self.before is None:
             return found
-        others = self._of_rest(names.rest.beside_discrepancy)
-        return [
-            replace(one, ratio=np.minimum(one.ratio, other.ratio))
-            for one, other in zip(found, others, strict=True)
+        return found + [
+            for_a_second(one, part, self.before, self.given, self.settings)
+            for one, part in zip(left, parts, strict=True)
         ]
 
-    def resting(self, names: Names) -> list[Excess]:
+    def resting(self, explanation: Explanation) -> list[Excess]:
         """Return by how much joints at rest are held by more than friction, for all data."""
         if self.settings.partner is not None:
             return []
-        arm, before, given = names.rest.fitted.arm, self.before, self.given
-        parts = self._parts(names.rest.evidence)
+        arm, before, given = explanation.fitted.arm, self.before, self.given
+        parts = self._parts(explanation.evidence)
         return [held(arm, part, before, given, self.settings) for part in parts]
 
-    def patched(self, names: Names) -> Excess:
+    def patched(self, explanation: Explanation) -> Excess:
         """Return what the patched model leaves, whose body may be as it was given."""
-        left = self._of_data(names.stated)
+        arm, evidence = explanation.fitted.arm, explanation.evidence
+        left = self._of_data(evidence, [one.residuals(arm) for one in self._parts(evidence)])
         return Excess(np.max([one.ratio for one in left], axis=0), '')
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
         """Return what the given model leaves; None if its rigid body is not fitted anew."""
-        if not frees_body(explanation.base, explanation.given):
+        if not explanation.refitted:
             return None
-        return self._of_whole(self.given, explanation.evidence)
+        evidence = explanation.evidence
+        return self._of_whole(evidence.residuals(self.given), evidence)
 
     def harmed(self, explanation: Explanation) -> tuple[str, ...]:
         """Return the joints in which the patched model is worse than the given one."""
@@ -96,27 +103,18 @@ class RemainingMisfit:
     def _parts(self, evidence: Evidence) -> list[Evidence]:
         return [evidence] if self.unseen is None else [evidence, self.unseen]
 
-    def _of_rest(self, fit: Explanation) -> list[Excess]:
-        """Return what a fit leaves of the data, in all and in the worst second."""
-        left, before, arm = self._of_data(fit), self.before, fit.fitted.arm
-        if before is None:
-            return left
-        parts = self._parts(fit.evidence)
-        return left + [for_a_second(arm, p, before, self.given, self.settings) for p in parts]
-
-    def _of_data(self, fit: Explanation) -> list[Excess]:
-        """Return what a fit leaves of the data, and of those that nothing was fitted to."""
-        left = [self._of_whole(fit.fitted.arm, fit.evidence)]
+    def _of_data(self, evidence: Evidence, left: Sequence[Sequence[FloatArray]]) -> list[Excess]:
+        """Return residuals of the data, and of those that nothing was fitted to."""
+        found = [self._of_whole(left[0], evidence)]
         if self.unseen is not None:
             more, where = self.settings.thresholds.predicted, 'recordings that were not used'
-            unseen = self._sure(self.unseen)
-            left.append(excess_of(fit.fitted.arm, unseen, self.settings, more, where))
-        return left
+            found.append(excess_of(left[1], self._sure(self.unseen), self.settings, more, where))
+        return found
 
-    def _of_whole(self, arm: ArmModel, evidence: Evidence) -> Excess:
-        """Return what an arm leaves of the data: a misfit varies from motion to motion."""
+    def _of_whole(self, residual: Sequence[FloatArray], evidence: Evidence) -> Excess:
+        """Return a residual of the data: a misfit varies from motion to motion."""
         usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
-        return excess_of(arm, self._sure(evidence), self.settings, usual)
+        return excess_of(residual, self._sure(evidence), self.settings, usual)
 
     def _sure(self, evidence: Evidence) -> Evidence:
         """Return data in units of noise if the misfit is only estimated, which excuses nothing."""

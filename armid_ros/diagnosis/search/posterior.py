@@ -1,0 +1,325 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Values of the named effects: the mean and the covariance of their posterior.
+
+They are those of the model in which causes are compared (`Nuisance`), with body, friction and
+discrepancy integrated out, and with values that were there before. Encoder offsets, delays and
+elasticities are linear to the first order only, and so are shapes: the columns are computed anew
+at each mean (Gauss-Newton), and values stay within their physical bounds.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.diagnosis.data.days import Rows
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.search.candidates import cause_of, value_unit
+from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
+from armid_ros.diagnosis.search.nuisance import LASTING, Marginal, Nuisance, Setting
+from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.estimate import Estimate
+from armid_ros.motion import FloatArray
+import numpy as np
+
+#: Most Gauss-Newton steps; shapes are near already.
+_MOST_ROUNDS = 4
+#: Shares of a step that are tried until the loss falls.
+_SHARES = (1.0, 0.5, 0.2)
+#: Relative change of the loss that is none.
+_SETTLED = 1e-4
+#: Standard deviation of a shape before, over its value: the comparison has refined it already.
+_SHAPE = 0.3
+#: Size of a shape without a default, such as a position that was held [rad or m].
+_NO_DEFAULT = 0.1
+#: Least size that a value had before, over its unit.
+_LEAST = 1e-3
+#: Least share of the variance of a value that data have to take away for it to be determined.
+_DETERMINED = 0.5
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """
+    An arm with named effects at their posterior means.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm; the named effects are its last ones.
+    named : tuple of SelectedEffect
+        The named effects, with their fitted shapes.
+    values : tuple of ndarray
+        All values of each named effect.
+    estimate : Estimate
+        Of the fitted parameters of the named effects, shapes included; a variance is infinite
+        where data do not determine a value.
+    means : ndarray, shape (q,)
+        Means of the nuisance parameters.
+
+    """
+
+    arm: ArmModel
+    named: tuple[SelectedEffect, ...]
+    values: tuple[FloatArray, ...]
+    estimate: Estimate
+    means: FloatArray
+
+    @property
+    def places(self) -> tuple[tuple[range, range], ...]:
+        """Positions in the estimate of the values of each name, and of its shapes."""
+        places, start = [], 0
+        for own in self.named:
+            shapes = start + len(own.kept)
+            stop = shapes + len(own.effect.shape)
+            places.append((range(start, shapes), range(shapes, stop)))
+            start = stop
+        return tuple(places)
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """
+    Values of named effects, fitted jointly with the nuisance parameters.
+
+    Attributes
+    ----------
+    arm : ArmModel
+        The arm without names.
+    nuisance : Nuisance
+        Data and nuisance columns, no cause among them.
+    setting : Setting
+        Amplitudes.
+    recordings : tuple of int
+        Recordings that are fitted.
+    stated : bool
+        Whether the change of body and friction is part of the arm, and not only allowed for.
+    spread : float
+        Variance of values between recordings, over that of the mean for white noise.
+
+    """
+
+    arm: ArmModel
+    nuisance: Nuisance
+    setting: Setting
+    recordings: tuple[int, ...]
+    stated: bool
+    spread: float = 0.0
+
+    @classmethod
+    def over_noise(
+        cls,
+        arm: ArmModel,
+        evidence: Evidence,
+        rng: np.random.Generator,
+        known: FloatArray | None = None,
+    ) -> JointFit:
+        """
+        Return the fit of an arm beside nothing but noise, its body being fitted anew.
+
+        Parameters
+        ----------
+        arm : ArmModel
+            The arm.
+        evidence : Evidence
+            Data and their noise.
+        rng : numpy.random.Generator
+            Draws the states from which base parameters are found.
+        known : ndarray, shape (P, P), optional
+            Information on its parameters, which adds to the description.
+
+        """
+        nuisance = Nuisance.of(Rows.over_noise(evidence), memoized_arm(arm), rng, known)
+        every = tuple(range(len(nuisance.columns)))
+        setting = Setting(True, 0.0, 0.0, 1.0, LASTING)
+        return cls(nuisance.arm, nuisance, setting, every, stated=True)
+
+    @property
+    def refits_body(self) -> bool:
+        """Whether the body of the arm is not that of the given one."""
+        return self.stated and self.setting.free
+
+    def fit(
+        self, named: Sequence[SelectedEffect] = (), values: Sequence[FloatArray] = ()
+    ) -> Fitted:
+        """
+        Fit the values of named effects.
+
+        Parameters
+        ----------
+        named : sequence of SelectedEffect
+            The effects.
+        values : sequence of ndarray
+            All values of each, to begin at.
+
+        """
+        state = Patch(self.arm, tuple(named), tuple(values))
+        linear = self._linear(state)
+        under = linear.marginal(self.setting, self.recordings)
+        loss = self._loss(state)
+        for _ in range(_MOST_ROUNDS if named else 0):
+            means = linear.means(under)
+            step = means[linear.spans[0].start : linear.spans[len(named) - 1].stop]
+            step = step - self._present(state)
+            tried = (state.moved(share * step) for share in _SHARES)
+            better = ((self._loss(one), one) for one in tried)
+            new, moved = next(((x, one) for x, one in better if x < loss), (loss, state))
+            if moved is state:
+                break
+            settled = loss - new < _SETTLED * max(abs(new), 1e-12)
+            state, linear = moved, self._linear(moved)
+            under, loss = linear.marginal(self.setting, self.recordings), new
+            if settled:
+                break
+        return self._fitted(state, linear, under)
+
+    def _fitted(self, state: Patch, linear: Nuisance, under: Marginal) -> Fitted:
+        means, covariance = linear.whole(under)
+        size = self.nuisance.columns[0].shape[2]
+        arm = self._arm(state, means)
+        names, numbers = state.parameters()
+        moved = self._moved(linear, means)
+        found = covariance[size:, size:] * (1.0 + self.spread) + np.diag(moved**2)
+        units = [one.cause.unit for one in linear.accepted]
+        before = np.concatenate([np.zeros(0), *units]) ** 2
+        open_ones = np.diag(covariance)[size:] > (1.0 - _DETERMINED) * before
+        found[open_ones], found[:, open_ones] = 0.0, 0.0
+        found[open_ones, open_ones] = np.inf
+        return Fitted(
+            arm, state.named, state.values, Estimate(names, numbers, found), means[:size]
+        )
+
+    def _arm(self, state: Patch, means: FloatArray) -> ArmModel:
+        """Return the arm with names, and with the means of body and friction if stated."""
+        change = self.nuisance.body_change(means)
+        if not (self.stated and np.any(change)):
+            return state.model
+        base, theta = self.nuisance.base, self.arm.theta
+        moved = self.arm.with_theta(base.lift(base.values(theta) + change, theta))
+        return Patch(moved, state.named, state.values).model
+
+    def with_names_at(
+        self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]
+    ) -> ArmModel:
+        """Return the arm with names at given values, all else fitted."""
+        state = Patch(self.arm, tuple(named), tuple(values))
+        there = self.nuisance.with_residual(self._weighted(state.model))
+        return self._arm(state, there.means(there.marginal(self.setting, self.recordings)))
+
+    def as_described(self) -> JointFit:
+        """Return the same with the body as it is described."""
+        return replace(self, setting=replace(self.setting, free=False))
+
+    def rest(self, fitted: Fitted) -> list[FloatArray]:
+        """
+        Return what is left beside body and discrepancy on the day in question.
+
+        Returns
+        -------
+        list of ndarray, each (M, n)
+            Residual of each trajectory, zero in rows that are not informative [N m].
+
+        """
+        rows = self.nuisance.rows
+        there = self.nuisance.with_residual(self._weighted(fitted.arm))
+        means = fitted.means.copy()
+        means[: self.nuisance.rank] *= not self.stated
+        found = []
+        for k in np.flatnonzero(rows.today).tolist():
+            whole, start = there.unexplained(means, self.setting, k), 0
+            for part, weight in zip(rows.data, rows.weight, strict=True):
+                if part.fold == k:
+                    own = whole[:, start : start + len(weight)].T
+                    found.append(own / np.where(weight > 0.0, weight, 1.0))
+                    start += len(weight)
+        return found
+
+    def _present(self, state: Patch) -> FloatArray:
+        """Return the values of a state, and zero for each shape."""
+        parts = [np.zeros(0)]
+        for own, values in zip(state.named, state.values, strict=True):
+            parts += [values[list(own.kept)], np.zeros(len(own.effect.shape))]
+        return np.concatenate(parts)
+
+    def _weighted(self, model: ArmModel) -> list[FloatArray]:
+        """Return the weighted residual of each recording, (n, M), with an arm as it is today."""
+        rows = self.nuisance.rows
+        rest = [
+            part.residual(model) if rows.today[part.fold] else np.zeros_like(part.unsure)
+            for part in rows.data
+        ]
+        joints = range(rest[0].shape[1])
+        weighted = rows.weighted([own[:, :, np.newaxis] for own in rest], joints)
+        return [
+            own[:, :, 0] if today else before
+            for own, before, today in zip(
+                weighted, self.nuisance.residual, rows.today, strict=True
+            )
+        ]
+
+    def linear(self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]) -> Nuisance:
+        """Return the nuisance columns with those of named effects, linear at their values."""
+        return self._linear(Patch(self.arm, tuple(named), tuple(values)))
+
+    def _loss(self, state: Patch) -> float:
+        """Return minus the log likelihood of values, the nuisance parameters integrated out."""
+        there = self.nuisance.with_residual(self._weighted(state.model))
+        return there.marginal(self.setting, self.recordings).loss
+
+    def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
+        """
+        Return how far values move if they had been there before, and still are.
+
+        No value is expected to have been larger than now: its present size is the standard
+        deviation of its prior, about zero.
+
+        """
+        size, both = self.nuisance.columns[0].shape[2], linear
+        if not self.nuisance.rows.before:
+            return np.zeros(len(means) - size)
+        for one, span in zip(linear.accepted, linear.spans, strict=True):
+            unit = np.clip(np.abs(means[span]), _LEAST * one.cause.unit, one.cause.unit)
+            before = replace(one.cause, unit=unit)
+            both = both.and_cause(before, 1.0, np.ones_like(one.acts))
+        under = both.marginal(self.setting, self.recordings)
+        return both.means(under)[size : len(means)] - means[size:]
+
+    def _linear(self, state: Patch) -> Nuisance:
+        """Return the nuisance columns with those of the names, linear in values at a state."""
+        if not state.named:
+            return self.nuisance
+        rows, result = self.nuisance.rows, self.nuisance
+        fitted = [k for k, part in enumerate(rows.data) if part.fold in self.recordings]
+        blocks = {k: patch_columns(state, rows.data[k]) for k in fitted}
+        made = list[Cause]()
+        torque = [np.zeros((*part.unsure.shape, 1)) for part in rows.data]
+        for n, (own, values) in enumerate(zip(state.named, state.values, strict=True)):
+            count, kept = blocks[fitted[0]][n].shape[2], list(own.kept)
+            columns = [
+                blocks[k][n] if k in blocks else np.zeros((*part.unsure.shape, count))
+                for k, part in enumerate(rows.data)
+            ]
+            only = [x[:, :, : len(kept)] for x in columns]
+            unit = value_unit(self.nuisance, own, only)
+            least = [abs(s.default) or _NO_DEFAULT for s in own.effect.shapes]
+            size = np.tile(least, len(own.effect.owners))
+            shapes = _SHAPE * np.maximum(np.abs(own.effect.shape), size)
+            made.append(cause_of(result, own, columns, np.concatenate([unit, shapes])))
+            for total, x in zip(torque, only, strict=True):
+                total[:, :, 0] += x @ values[kept]
+        for cause in made:
+            result = result.and_cause(cause, 1.0)
+        present = rows.weighted(torque, range(len(rows.torque)))
+        return result.with_residual(
+            [
+                rest + x[:, :, 0] if today else rest
+                for rest, x, today in zip(
+                    self._weighted(state.model), present, rows.today, strict=True
+                )
+            ]
+        )
