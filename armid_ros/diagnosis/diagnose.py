@@ -22,6 +22,7 @@ from armid_ros.diagnosis.doubt import doubt_as_it_is, doubt_of, doubt_of_names
 from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import as_bodies, Chosen, Explanation, NOISE
+from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
 from armid_ros.diagnosis.verdict.attribution import Names
@@ -44,6 +45,8 @@ from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 
+#: Verdicts by which a gap stays open.
+OPEN = ('unknown', 'partial')
 #: Called with the share that is done and what is being done.
 Progress = Callable[[float, str], None]
 
@@ -58,6 +61,8 @@ _NO_MODEL = (
     'it is that of another arm, or has other units; identify the arm from the baseline, and give '
     'that model'
 )
+#: Time by which the beginning and the end of a span are uncertain [s].
+_UNSURE = 0.25
 #: Note where shares and gap are of the data that names were found in, though others were given.
 _HARDLY_SHOWN = (
     'the recordings to validate hardly show what is named: gap and shares are of the recordings '
@@ -153,8 +158,37 @@ def diagnose(
         found = diagnose_ties(arm, recordings, prepared, settings, rng, tell)
         if found is not None:
             return _said(found, notes, asked)
-    result = _said(_explainer(asked, misfit).chosen(), notes, asked)
+    chosen = _explainer(asked, misfit).chosen()
+    result = _said(chosen, notes, asked)
+    if result.verdict in OPEN and settings.spans and chosen.look is not None:
+        spans = acting_spans(chosen.look, settings.thresholds)
+        shorter = _within(spans, recordings)
+        if shorter and not all(one.whole for one in spans):
+            within = diagnose(
+                given,
+                shorter,
+                validate=_within(spans[len(recordings) :], validate),
+                baseline=baseline,
+                misfit=misfit,
+                settings=replace(settings, spans=False),
+                rng=rng,
+                progress=tell,
+            )
+            if within.findings and within.verdict not in OPEN:
+                return within.acting_in([one for one in spans if one.stop > one.start])
     return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
+
+
+def _within(spans: Sequence[Span], recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the parts of recordings in which a cause acts throughout; none of the others."""
+    parts = []
+    for span, one in zip(spans, recordings, strict=False):
+        if span.whole:
+            parts.append(one)
+        elif span.stop > span.start:
+            inside = (one.t >= span.start + _UNSURE) & (one.t <= span.stop - _UNSURE)
+            parts.append(one.select(inside))
+    return parts
 
 
 def _explainer(asked: _Request, misfit: Misfit | None) -> Explainer:
@@ -170,7 +204,7 @@ def _each_alone(
     result: Diagnosis, days: Iterable[Sequence[Recording]], used: Conditioning, asked: _Request
 ) -> Diagnosis:
     """Return a result, or that single recordings are at fault, where something stays open."""
-    open_or_doubted = result.verdict in ('unknown', 'partial') or bool(result.doubt)
+    open_or_doubted = result.verdict in OPEN or bool(result.doubt)
     if not open_or_doubted or asked.settings.partner is not None:
         return result
     apart = [one for day in days for one in _apart(asked.arm, day, used)]

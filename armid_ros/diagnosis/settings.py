@@ -111,6 +111,8 @@ class DiagnosisSettings:
         Share of a joint's torque, root mean square, below which a cause does not matter [-].
     everything : bool
         Whether causes that do not matter are added to the patched model as well.
+    spans : bool
+        Whether causes may act for a part of the time, where a gap stays open otherwise.
     thresholds : Thresholds
         The numbers that decide.
 
@@ -124,6 +126,7 @@ class DiagnosisSettings:
     signals: SignalSettings = field(default_factory=SignalSettings)
     material: float = 0.01
     everything: bool = False
+    spans: bool = True
     thresholds: Thresholds = field(default_factory=Thresholds)
 
     def without_small_print(self) -> DiagnosisSettings:

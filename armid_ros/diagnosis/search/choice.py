@@ -129,11 +129,11 @@ class Explainer:
         problem = JointFit(nuisance.arm, nuisance, setting, every, stated=True)
         found = explain(problem, evidence, result, settings, unknown)
         if at_floor(found, settings):
-            return Chosen(found, np.zeros(self.arm.robot.n_joints), NOISE)
+            return Chosen(found, np.zeros(self.arm.robot.n_joints), NOISE, look=result.first)
         misfit = np.sqrt(evidence.power(found.residual))
         sigma = tuple(np.maximum(one, misfit) for one in evidence.sigma)
         found = replace(found, evidence=replace(evidence, sigma=sigma))
-        return Chosen(found, misfit, ESTIMATED)
+        return Chosen(found, misfit, ESTIMATED, look=result.first)
 
     def _beside(self, misfit: FloatArray) -> Chosen:
         """
@@ -156,7 +156,7 @@ class Explainer:
         if np.all(before <= usual + evidence.matters(settings)):
             found = found.with_nothing_named()
         notes = (_AS_EXACT,) if found.steps and known is None else ()
-        return Chosen(found, misfit, WRITTEN_MISFIT, notes, _NO_BASELINE)
+        return Chosen(found, misfit, WRITTEN_MISFIT, notes, _NO_BASELINE, result.first)
 
     def _since(self, baseline: Baseline) -> Chosen:
         """Explain what has changed since the baseline."""
@@ -173,7 +173,8 @@ class Explainer:
         first = count_recordings(baseline.data)
         second = count_recordings(prepared.data) + count_recordings(self.unseen)
         untested = _ONE_EACH if found.steps and first == second == 1 else ''
-        return Chosen(found, misfit, OWN_MISFIT, (untested,) if untested else (), untested)
+        notes = (untested,) if untested else ()
+        return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
         """Explain what has changed in a model that stays as given."""

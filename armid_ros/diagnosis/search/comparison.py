@@ -20,6 +20,7 @@ from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import LASTING, Marginal, Nuisance, Setting
 from armid_ros.diagnosis.search.odds import (
+    allowed,
     CauseFit,
     IMPOSSIBLE,
     odds,
@@ -292,12 +293,20 @@ class CauseComparison:
     def look(self, nuisance: Nuisance) -> Look:
         """Compare every cause that is not accepted yet, and refine the shapes of the best."""
         settings, likeliest = self._settings(nuisance), self._likeliest(nuisance)
-        first: dict[object, tuple[float, Cause, Marginal]] = {}
         tried = settings if len(settings) == 1 else _leading(settings)
-        for cause, under in product(self._causes_of(nuisance), tried):
-            worth = odds(cause, nuisance, under).factor + under.evidence + cause.prior
-            if worth > first.get(cause.key, (-np.inf,))[0]:
-                first[cause.key] = worth, cause, under
+        each = [
+            (odds(cause, nuisance, one, bounded=False), cause, one)
+            for cause, one in product(self._causes_of(nuisance), tried)
+        ]
+        each.sort(key=lambda one: -(one[0].factor + one[2].evidence + one[1].prior))
+        first: dict[object, tuple[float, Cause, Marginal]] = {}
+        for fit, cause, one in each:
+            least = first.get(cause.key, (-np.inf,))[0]
+            worth = fit.factor + one.evidence + cause.prior
+            if worth > least:
+                worth += allowed(cause, fit, nuisance)
+            if worth > least:
+                first[cause.key] = worth, cause, one
         best = sorted(first.values(), key=lambda one: -one[0])
         result = []
         for n, (_, cause, under) in enumerate(best[:_COMPARED]):

@@ -19,6 +19,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import SelectedEffect
+from armid_ros.diagnosis.search.comparison import Look
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -139,6 +140,8 @@ class Chosen:
     untested : str
         What would separate a change from another motion's misfit, a sentence; empty if the
         recordings do. Where they do not, names have to take most of the gap.
+    look : Look or None
+        What all causes were worth at first.
 
     """
 
@@ -147,6 +150,7 @@ class Chosen:
     floor_in_words: str
     notes: tuple[str, ...] = ()
     untested: str = ''
+    look: Look | None = None
 
     @property
     def measured(self) -> bool:

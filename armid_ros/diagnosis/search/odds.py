@@ -166,6 +166,7 @@ def odds(
     under: Marginal | CauseInformation,
     usual: float = 0.0,
     spreads: FloatArray = EQUAL,
+    bounded: bool = True,
 ) -> CauseFit:
     """
     Return the log Bayes factor of a cause, with its values.
@@ -182,6 +183,8 @@ def odds(
         The usual spread of values between recordings.
     spreads : ndarray, shape (k,)
         Spreads that are averaged over.
+    bounded : bool
+        Whether values that cannot be count against the cause; see `allowed`.
 
     """
     known = under
@@ -224,7 +227,7 @@ def odds(
     std = np.sqrt(np.diag(covariance)) * cause.unit
     resolution = np.diag(covariance @ own)
     fit = CauseFit(factor, float(explained[first]), size, values, std, resolution)
-    return replace(fit, factor=factor + allowed(cause, fit, nuisance))
+    return replace(fit, factor=factor + allowed(cause, fit, nuisance)) if bounded else fit
 
 
 def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:

@@ -173,11 +173,10 @@ class Names:
         """
         least = 0.0 if chosen.measured else settings.thresholds.headline
         found, notes = chosen.explanation, tuple[str, ...]()
-        every = range(len(found.steps))
-        if found.steps and shares_of(found, unseen, settings).share(every) < least:
-            found, remarks = as_bodies(found.in_common_body())
-            notes = (_COMMON, *remarks)
         shares = shares_of(found, unseen, settings)
+        if found.steps and shares.share(range(len(found.steps))) < least:
+            found, remarks = as_bodies(found.in_common_body())
+            shares, notes = shares_of(found, unseen, settings), (_COMMON, *remarks)
         while (gone := smallest(found, shares, settings, least)) is not None:
             found = found.without(gone)
             shares = shares_of(found, unseen, settings)

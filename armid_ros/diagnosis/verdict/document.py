@@ -77,6 +77,10 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
             for row in detectable(diagnosis.explanation)
         ],
         'model': model,
+        'spans': [
+            {'recording': one.source, 'start': one.start, 'stop': one.stop}
+            for one in diagnosis.spans
+        ],
     }
 
 

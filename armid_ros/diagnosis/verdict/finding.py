@@ -9,12 +9,14 @@ A cause has its name, joints, values, share of the gap, and rivals.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.data.trajectory import at_rest, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
+from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.model.spring_ties import Tie
@@ -233,6 +235,8 @@ class Diagnosis:
         is named; empty if there is none.
     blind : tuple of str
         Joints that move and in which a change of all of the torque would not show.
+    spans : tuple of Span
+        Seconds of each recording in which the findings act; none if they act throughout.
 
     """
 
@@ -255,6 +259,13 @@ class Diagnosis:
     doubt: str = ''
     suspected: tuple[Finding, ...] = ()
     blind: tuple[str, ...] = ()
+    spans: tuple[Span, ...] = ()
+
+    def acting_in(self, spans: Sequence[Span]) -> Diagnosis:
+        """Return the same of causes that act for a part of the time."""
+        seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
+        summary = f'In {", ".join(seconds)}: {self.summary}'
+        return replace(self, summary=summary, spans=tuple(spans))
 
     @property
     def estimate(self) -> Estimate | None:

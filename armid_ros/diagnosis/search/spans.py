@@ -1,0 +1,192 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+The seconds in which a cause acts: a payload that is picked up and put down, a hose that pulls.
+
+Every cause is compared with its columns zero outside of a span of each recording. The span with
+the largest evidence is found over pairs of change points, one recording after the other.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations, pairwise
+from pathlib import Path
+
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.comparison import Look, Ranked
+from armid_ros.diagnosis.search.odds import odds
+from armid_ros.diagnosis.settings import Thresholds
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+
+#: Time between change points that are tried [s], and the shortest span [s].
+_STEP, _SHORTEST = 0.25, 2.0
+#: Change points of the first pass, and passes in which each is moved.
+_COARSE, _PASSES = 9, 2
+
+
+@dataclass(frozen=True)
+class Span:
+    """
+    Seconds of a recording in which a cause acts.
+
+    Attributes
+    ----------
+    recording : int
+        Number of the recording of the day in question.
+    source : str
+        Its name.
+    start, stop : float
+        First and last second [s]; none if it does not act there.
+    whole : bool
+        Whether it acts throughout.
+
+    """
+
+    recording: int
+    source: str
+    start: float
+    stop: float
+    whole: bool
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A cause in the recordings of the day in question, divided at change points."""
+
+    ranked: Ranked
+    look: Look
+
+    @cached_property
+    def edges(self) -> dict[int, npt.NDArray[np.intp]]:
+        """Rows of each recording at which a span may begin or end."""
+        return {k: np.searchsorted(t, self._points(t)) for k, t in self.times.items()}
+
+    @cached_property
+    def times(self) -> dict[int, FloatArray]:
+        """Time of the rows of each recording [s]."""
+        rows = self.look.nuisance.rows
+        return {
+            k: np.concatenate([part.t for part in rows.data if part.fold == k])
+            for k in np.flatnonzero(rows.today).tolist()
+        }
+
+    @staticmethod
+    def _points(t: FloatArray) -> FloatArray:
+        count = max(int((t[-1] - t[0]) / _STEP), 1) + 1
+        points = np.linspace(t[0], t[-1], count)
+        points[-1] = np.inf
+        return points
+
+    @cached_property
+    def _sums(self) -> dict[int, tuple[FloatArray, FloatArray, FloatArray]]:
+        """Products of the columns with nuisance columns, themselves and residual, up to edges."""
+        nuisance, cause = self.look.nuisance, self.ranked.cause
+        joints = list(cause.joints)
+        found = dict[int, tuple[FloatArray, FloatArray, FloatArray]]()
+        for k, edges in self.edges.items():
+            z, x, y = cause.columns[k], nuisance.columns[k], nuisance.residual[k]
+            parts = [
+                (
+                    np.einsum('jmq,jmp->qp', x[joints, a:b], z[:, a:b]),
+                    np.einsum('jmq,jmp->qp', z[:, a:b], z[:, a:b]),
+                    np.einsum('jm,jmp->p', y[joints, a:b], z[:, a:b]),
+                )
+                for a, b in pairwise(edges.tolist())
+            ]
+            first, second, third = (np.array(one) for one in zip(*parts, strict=True))
+            found[k] = _up_to(first), _up_to(second), _up_to(third)
+        return found
+
+    def within(self, spans: Mapping[int, tuple[int, int]]) -> Ranked:
+        """Return the cause that acts between two edges of each recording."""
+        cause, nuisance = self.ranked.cause, self.look.nuisance
+        products, own, aim = list(cause.products), list(cause.own), list(cause.aim)
+        tried = 0.0
+        for k, (a, b) in spans.items():
+            products[k], own[k], aim[k] = (x[b] - x[a] for x in self._sums[k])
+            count = len(self.edges[k])
+            if b - a < count - 1:
+                tried += float(np.log(0.5 * count * (count - 1)))
+        timed: Cause = replace(cause, products=tuple(products), own=tuple(own), aim=tuple(aim))
+        fit = odds(timed, nuisance, self.ranked.under)
+        return replace(self.ranked, cause=timed, fit=fit, data=fit.factor - tried)
+
+    def best(self) -> tuple[Ranked, dict[int, tuple[int, int]]]:
+        """Return the likeliest spans: of coarse pairs of edges, then moved edge by edge."""
+        spans = {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
+        found = self.within(spans)
+        for k, edges in self.edges.items():
+            coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
+            found, spans = self._better(found, spans, k, [(0, 0), *combinations(coarse, 2)])
+        for _ in range(_PASSES):
+            for k, edges in self.edges.items():
+                near = (len(edges) - 1) // (_COARSE - 1)
+                for end in (0, 1):
+                    first, last = spans[k]
+                    moves = range(-near, near + 1)
+                    tried = [(first + x, last) if end == 0 else (first, last + x) for x in moves]
+                    found, spans = self._better(found, spans, k, tried)
+        return found, spans
+
+    def _better(
+        self,
+        found: Ranked,
+        spans: dict[int, tuple[int, int]],
+        recording: int,
+        tried: Iterable[tuple[int, int]],
+    ) -> tuple[Ranked, dict[int, tuple[int, int]]]:
+        """Return the likeliest of spans that are tried for one recording."""
+        last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
+        for a, b in tried:
+            if 0 <= a <= b <= last and (b - a >= least or a == b == 0):
+                other = {**spans, recording: (a, b)}
+                one = self.within(other)
+                if one.worth > found.worth:
+                    found, spans = one, other
+        return found, spans
+
+
+def _up_to(parts: FloatArray) -> FloatArray:
+    """Return the sums of the first 0, 1, 2, ... parts."""
+    return np.concatenate([np.zeros((1, *parts.shape[1:])), np.cumsum(parts, axis=0)])
+
+
+def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
+    """
+    Return the seconds in which the likeliest cause acts.
+
+    Parameters
+    ----------
+    look : Look
+        What causes that act throughout explain.
+    thresholds : Thresholds
+        By how much a cause has to be likelier if it acts for a part of the time.
+
+    Returns
+    -------
+    tuple of Span
+        One for each recording of the day in question; none if no cause is likelier so.
+
+    """
+    if not look.ranking:
+        return ()
+    timed = [_Timed(one, look) for one in look.ranking]
+    found = [(*one.best(), one) for one in timed]
+    best, spans, own = max(found, key=lambda one: one[0].worth)
+    if best.ahead(look.ranking[0], thresholds) <= thresholds.alarm:
+        return ()
+    rows = look.nuisance.rows
+    result = []
+    for number, (k, (a, b)) in enumerate(spans.items()):
+        edges, t = own.edges[k], own.times[k]
+        name = Path(next(part.source for part in rows.data if part.fold == k)).name
+        whole = b - a == len(edges) - 1
+        start, stop = (float(t[min(edges[x], len(t) - 1)]) for x in (a, b))
+        result.append(Span(number, name or f'recording {number + 1}', start, stop, whole))
+    return tuple(result)
