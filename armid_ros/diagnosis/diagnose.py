@@ -142,6 +142,7 @@ def diagnose(
     notes += repairs
     if faults:
         return _bad(given, data, faults, notes)
+    notes += [f'prior knowledge given: {name} {how}' for name, how in settings.often.items()]
     tell(0.1, 'noise floor')
     by_misfit = bool(baseline) and settings.partner is None
     prepared = prepare(arm, recordings, used, data, settings, rng, by_misfit)
@@ -160,35 +161,57 @@ def diagnose(
             return _said(found, notes, asked)
     chosen = _explainer(asked, misfit).chosen()
     result = _said(chosen, notes, asked)
-    if result.verdict in OPEN and settings.spans and chosen.look is not None:
+    if settings.spans and chosen.look is not None and _hardly_explained(result, settings):
         spans = acting_spans(chosen.look, settings.thresholds)
-        shorter = _within(spans, recordings)
-        if shorter and not all(one.whole for one in spans):
-            within = diagnose(
-                given,
-                shorter,
-                validate=_within(spans[len(recordings) :], validate),
-                baseline=baseline,
-                misfit=misfit,
-                settings=replace(settings, spans=False),
-                rng=rng,
-                progress=tell,
-            )
-            if within.findings and within.verdict not in OPEN:
-                return within.acting_in([one for one in spans if one.stop > one.start])
+        found = _within(spans, asked, recordings, baseline, misfit)
+        if found is not None:
+            return found
     return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
 
 
-def _within(spans: Sequence[Span], recordings: Sequence[Recording]) -> list[Recording]:
-    """Return the parts of recordings in which a cause acts throughout; none of the others."""
-    parts = []
-    for span, one in zip(spans, recordings, strict=False):
-        if span.whole:
-            parts.append(one)
-        elif span.stop > span.start:
-            inside = (one.t >= span.start + _UNSURE) & (one.t <= span.stop - _UNSURE)
-            parts.append(one.select(inside))
-    return parts
+def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
+    """Return whether a gap is open, or names take less than half of it."""
+    shares = [one.share for one in result.findings]
+    least = settings.thresholds.open_share
+    return result.verdict in OPEN or (bool(shares) and max(shares) <= least)
+
+
+def _within(
+    spans: Sequence[Span],
+    asked: _Request,
+    recordings: Sequence[Recording],
+    baseline: Sequence[Recording],
+    misfit: Misfit | None,
+) -> Diagnosis | None:
+    """Diagnose the seconds in which a cause acts alone; None if that explains no more."""
+    cut = [_cut(*each) for each in zip(spans, [*recordings, *asked.validate], strict=False)]
+    shorter, unseen = (
+        [one for one in part if one is not None]
+        for part in (cut[: len(recordings)], cut[len(recordings) :])
+    )
+    if not shorter or all(one.whole for one in spans):
+        return None
+    found = diagnose(
+        asked.given,
+        shorter,
+        validate=unseen,
+        baseline=baseline,
+        misfit=misfit,
+        settings=replace(asked.settings, spans=False),
+        rng=asked.rng,
+        progress=asked.tell,
+    )
+    if not found.findings or _hardly_explained(found, asked.settings):
+        return None
+    return found.acting_in([one for one in spans if one.stop > one.start])
+
+
+def _cut(span: Span, recording: Recording) -> Recording | None:
+    """Return the part of a recording in which a cause acts."""
+    if span.whole:
+        return recording
+    inside = recording.t >= span.start + _UNSURE, recording.t <= span.stop - _UNSURE
+    return recording.select(inside[0] & inside[1]) if span.stop > span.start else None
 
 
 def _explainer(asked: _Request, misfit: Misfit | None) -> Explainer:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from armid_ros.effects import CATALOGUE, Kind
@@ -113,6 +114,8 @@ class DiagnosisSettings:
         Whether causes that do not matter are added to the patched model as well.
     spans : bool
         Whether causes may act for a part of the time, where a gap stays open otherwise.
+    often : mapping of str to str
+        How often effects happen to this arm, by name: often, usual, seldom or never.
     thresholds : Thresholds
         The numbers that decide.
 
@@ -127,6 +130,7 @@ class DiagnosisSettings:
     material: float = 0.01
     everything: bool = False
     spans: bool = True
+    often: Mapping[str, str] = field(default_factory=dict)
     thresholds: Thresholds = field(default_factory=Thresholds)
 
     def without_small_print(self) -> DiagnosisSettings:

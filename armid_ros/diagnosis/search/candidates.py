@@ -11,7 +11,7 @@ later. The columns of an effect are computed for all joints at once and divided 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise, product
@@ -21,7 +21,7 @@ from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.nuisance import Marginal, Nuisance
-from armid_ros.diagnosis.search.priors import log_prior
+from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
 from armid_ros.effects import Effect, Kind, Shape
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained
@@ -56,6 +56,8 @@ class Causes:
         Whether what has changed is asked, and not what was always there.
     fitted : frozenset of (str, tuple of str)
         Names and joints of what is among the nuisance parameters.
+    often : mapping of str to str
+        How often effects happen, as a user says it; see `HOW_OFTEN`.
 
     """
 
@@ -63,6 +65,7 @@ class Causes:
     nuisance: Nuisance
     changed: bool
     fitted: frozenset[tuple[str, tuple[str, ...]]]
+    often: Mapping[str, str] = field(default_factory=dict)
     _known: dict[tuple[str, tuple[int, ...]], Cause | None] = field(
         default_factory=dict, compare=False
     )
@@ -144,7 +147,8 @@ class Causes:
             SelectedEffect(effect, tuple(kept[k] for k in np.flatnonzero(seen).tolist())),
             [x[:, :, seen] for x in columns],
             _unit(SelectedEffect(effect, kept), torque, rows, robot)[seen],
-            log_prior(effect, robot, self.changed),
+            log_prior(effect, robot, self.changed)
+            + HOW_OFTEN[self.often.get(effect.said_as, 'usual')],
             torque[:, seen],
         )
 

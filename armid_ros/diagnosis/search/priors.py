@@ -8,6 +8,8 @@ from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.robots import Robot
 import numpy as np
 
+#: How often an effect happens to an arm, as its user says it: log odds over the usual ones.
+HOW_OFTEN = {'often': 2.0, 'usual': 0.0, 'seldom': -3.0, 'never': -30.0}
 #: Log odds of what never happens between two days: a link does not change.
 NEVER = -5.0
 #: Of a load of an inner link, between two days.
