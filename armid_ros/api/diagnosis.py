@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
@@ -295,6 +295,7 @@ def diagnose(
     decimation: int | None = None,
     material: float = 0.01,
     everything: bool = False,
+    prior: Mapping[str, str] | None = None,
     misfit: Misfit | None = None,
     partner: Partner | None = None,
     rng: Rng = 0,
@@ -329,6 +330,8 @@ def diagnose(
         Share of a joint's torque below which an effect does not matter.
     everything : bool
         Add effects to the model that do not matter, too.
+    prior : mapping of str to str, optional
+        How often effects happen to this arm, by name: often, usual, seldom or never.
     misfit : Misfit, optional
         What the model left when it was identified; by default as ``arm`` tells it.
     partner : Partner, optional
@@ -375,6 +378,7 @@ def diagnose(
         material=material,
         everything=everything,
         partner=partner,
+        prior=prior or {},
     )
     result = run(
         model,

@@ -142,7 +142,7 @@ def diagnose(
     notes += repairs
     if faults:
         return _bad(given, data, faults, notes)
-    notes += [f'prior knowledge given: {name} {how}' for name, how in settings.often.items()]
+    notes += [f'prior knowledge given: {name} {how}' for name, how in settings.prior.items()]
     tell(0.1, 'noise floor')
     by_misfit = bool(baseline) and settings.partner is None
     prepared = prepare(arm, recordings, used, data, settings, rng, by_misfit)

@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from armid_ros.diagnosis.search.priors import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, Kind
 from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
+from armid_ros.errors import ModelError
 from armid_ros.identification import SignalSettings
 
 
@@ -114,10 +116,15 @@ class DiagnosisSettings:
         Whether causes that do not matter are added to the patched model as well.
     spans : bool
         Whether causes may act for a part of the time, where a gap stays open otherwise.
-    often : mapping of str to str
+    prior : mapping of str to str
         How often effects happen to this arm, by name: often, usual, seldom or never.
     thresholds : Thresholds
         The numbers that decide.
+
+    Raises
+    ------
+    ModelError
+        If an effect or a frequency of ``prior`` is not known.
 
     """
 
@@ -130,8 +137,19 @@ class DiagnosisSettings:
     material: float = 0.01
     everything: bool = False
     spans: bool = True
-    often: Mapping[str, str] = field(default_factory=dict)
+    prior: Mapping[str, str] = field(default_factory=dict)
     thresholds: Thresholds = field(default_factory=Thresholds)
+
+    def __post_init__(self) -> None:
+        """Check what is said of priors."""
+        names = [kind.name for kind in self.kinds]
+        for name, how in self.prior.items():
+            for word, known, what in ((name, names, 'effect'), (how, HOW_OFTEN, 'frequency')):
+                if word not in known:
+                    raise ModelError(
+                        f"prior '{name}={how}': there is no {what} '{word}'; known are: "
+                        f'{", ".join(known)}'
+                    )
 
     def without_small_print(self) -> DiagnosisSettings:
         """Return settings by which all that is there beyond chance is named."""

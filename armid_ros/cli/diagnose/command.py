@@ -77,6 +77,14 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
     '--all', 'everything', is_flag=True, help='Add effects to the model that do not matter, too.'
 )
 @click.option(
+    '--prior',
+    'priors',
+    multiple=True,
+    metavar='E=HOW',
+    help='How often an effect happens to this arm: often, usual, seldom or never; may be given '
+    'several times.',
+)
+@click.option(
     '--effects',
     default='',
     metavar='E,...',
@@ -123,6 +131,7 @@ def diagnose(
     ties: tuple[str, ...],
     seed: int,
     as_json: bool,
+    priors: tuple[str, ...],
     **asked: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
@@ -165,6 +174,7 @@ def diagnose(
             baseline=before,
             misfit=misfit,
             partner=beside,
+            prior=dict(one.partition('=')[::2] for one in priors),
             rng=seed,
             progress=tick,
             **asked,

@@ -56,7 +56,7 @@ class Causes:
         Whether what has changed is asked, and not what was always there.
     fitted : frozenset of (str, tuple of str)
         Names and joints of what is among the nuisance parameters.
-    often : mapping of str to str
+    prior : mapping of str to str
         How often effects happen, as a user says it; see `HOW_OFTEN`.
 
     """
@@ -65,7 +65,7 @@ class Causes:
     nuisance: Nuisance
     changed: bool
     fitted: frozenset[tuple[str, tuple[str, ...]]]
-    often: Mapping[str, str] = field(default_factory=dict)
+    prior: Mapping[str, str] = field(default_factory=dict)
     _known: dict[tuple[str, tuple[int, ...]], Cause | None] = field(
         default_factory=dict, compare=False
     )
@@ -148,7 +148,7 @@ class Causes:
             [x[:, :, seen] for x in columns],
             _unit(SelectedEffect(effect, kept), torque, rows, robot)[seen],
             log_prior(effect, robot, self.changed)
-            + HOW_OFTEN[self.often.get(effect.said_as, 'usual')],
+            + HOW_OFTEN[self.prior.get(effect.said_as, 'usual')],
             torque[:, seen],
         )
 

@@ -239,7 +239,7 @@ class Explainer:
             level = friction_level(given, arm.robot, settings.library)
             kinds = [*(kind.as_change() for kind in kinds), *level]
         fitted = () if changed else ((effect.name, effect.joints) for effect in unknown)
-        catalogue = Causes(tuple(kinds), nuisance, changed, frozenset(fitted), settings.often)
+        catalogue = Causes(tuple(kinds), nuisance, changed, frozenset(fitted), settings.prior)
         used = settings_of_baseline(nuisance) if grid is None else tuple(grid)
         return CauseComparison(nuisance, catalogue, settings.thresholds, used)
 
