@@ -11,7 +11,7 @@ from typing import Literal
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.recording.curves import draw_joints
-from armid_ros.recording.partner_motion import PartnerMotion
+from armid_ros.recording.partner import PartnerMotion
 import numpy as np
 import numpy.typing as npt
 

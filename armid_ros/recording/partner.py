@@ -1,27 +1,59 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two recordings of machines that moved together, as one."""
+"""What another machine did while an arm was recorded: a person in an exoskeleton, a second arm."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording.partner_motion import PartnerMotion
-from armid_ros.recording.recording import Recording
+from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 if TYPE_CHECKING:
     from armid_ros.model.spring_ties import Tie
+    from armid_ros.recording.recording import Recording
 
 #: A step of this many nominal periods of the other machine is a hole that nothing bridges.
 _HOLE = 5.0
 #: Samples in common that are any use.
 _LEAST = 4
+
+
+@dataclass(frozen=True, eq=False)
+class PartnerMotion:
+    """
+    Positions of another machine at the samples of a recording.
+
+    Attributes
+    ----------
+    robot : Robot
+        Its description; its base frame is that of the arm.
+    ties : tuple of Tie
+        Where the two may be tied.
+    q : ndarray, shape (N, m)
+        Its joint positions [rad or m].
+
+    """
+
+    robot: Robot
+    ties: tuple[Tie, ...]
+    q: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the positions."""
+        object.__setattr__(self, 'q', read_only(self.q))
+
+    def select(
+        self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
+    ) -> PartnerMotion:
+        """Return it at some of the samples."""
+        return replace(self, q=self.q[samples])
 
 
 def recorded_together(
