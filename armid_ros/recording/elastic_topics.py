@@ -1,27 +1,39 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bags of arms that are measured on both sides of their transmissions."""
+"""Bags of arms that are measured on both sides, with accelerations as sensor_msgs/Imu."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
 from typing import TYPE_CHECKING
 
-from armid_ros.motion import ElasticRun
-from armid_ros.recording.imu import imu_topic, LINK, MOTOR, REFERENCE, write_accelerations
+from armid_ros.errors import RecordingError
+from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import write_joint_states
-from armid_ros.recording.message_types import STRING
+from armid_ros.recording.message_types import BYTE_ORDERS, STRING
 from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import IntArray
 from armid_ros.recording.string_message import string_cdr
-from armid_ros.recording.writer import whole_bag
+from armid_ros.recording.writer import BagWriter, whole_bag
 from armid_ros.robots import Robot
 import numpy as np
+import numpy.typing as npt
 
 if TYPE_CHECKING:
     from armid_ros.simulation.accelerometers import LinkAccelerometers
 
+#: Motors as seen at the joints, links, and what the loops are asked for.
+MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
+IMU = 'sensor_msgs/msg/Imu'
+#: Between two experiments [ns].
 _PAUSE_NS = 10**9
+#: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
+_NUMBERS = 37
+_ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
 
 
 def write_runs(
@@ -53,3 +65,113 @@ def write_runs(
             for name, values in zip(robot.links, felt, strict=True):
                 write_accelerations(writer, imu_topic(name), name, stamps, values)
             start = int(stamps[-1]) + _PAUSE_NS
+
+
+def write_accelerations(
+    writer: BagWriter,
+    topic: str,
+    frame_id: str,
+    stamps_ns: npt.ArrayLike,
+    acceleration: npt.ArrayLike,
+) -> None:
+    """
+    Write accelerometer readings to a topic of a bag, logged at their stamps.
+
+    Orientation and angular velocity are marked as not measured, by a covariance of -1.
+
+    Parameters
+    ----------
+    writer : BagWriter
+        The bag.
+    topic, frame_id : str
+        Where they go, and the frame they are in.
+    stamps_ns : array_like, shape (N,)
+        Stamps of the headers [ns].
+    acceleration : array_like, shape (N, 3)
+        Specific force [m/s^2]; that of a body at rest points up.
+
+    """
+    stamps = np.asarray(stamps_ns, np.int64)
+    layout = _layout(len(frame_id.encode()) + 1, '<')
+    rows = np.zeros(len(stamps), layout)
+    rows['encapsulation'] = (0, 1, 0, 0)
+    rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
+    rows['length'] = len(frame_id.encode()) + 1
+    rows['frame'] = frame_id.encode()
+    rows['numbers'][:, _ORIENTATION_COVARIANCE] = -1.0
+    rows['numbers'][:, _RATE_COVARIANCE] = -1.0
+    rows['numbers'][:, _ACCELERATION] = acceleration
+    writer.add_topic(topic, IMU)
+    writer.write_many(topic, rows.view(np.dtype((np.void, layout.itemsize))), stamps)
+
+
+def read_accelerations(
+    path: str | Path, topic: str, settings: ReadSettings = DEFAULT
+) -> tuple[IntArray, FloatArray]:
+    """
+    Read the accelerometer readings of a topic.
+
+    Returns
+    -------
+    stamps_ns : ndarray of int, shape (N,)
+        Stamps of the headers [ns], in the order of storage.
+    acceleration : ndarray, shape (N, 3)
+        [m/s^2].
+
+    Raises
+    ------
+    RecordingError
+        There is no such bag or topic, or messages are not those of the type.
+
+    """
+    with Bag(path, settings) as bag:
+        found = {t.name: t.type_name for t in bag.topics()}
+        if found.get(topic) != IMU:
+            listed = ', '.join(name for name, kind in found.items() if kind == IMU)
+            raise RecordingError(
+                f'{path}: there is no topic {topic} of {IMU}; of that type there are: '
+                f'{listed or "none"}'
+            )
+        messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
+    if not messages:
+        raise RecordingError(f'{path}: {topic} has no messages')
+    order = BYTE_ORDERS.get(messages[0][:2])
+    if order is None or len(messages[0]) < 16:
+        raise RecordingError(f'{path}: {topic} is not CDR')
+    layout = _layout(int(np.frombuffer(messages[0], order + 'u4', 1, 12)[0]), order)
+    odd = [k for k, m in enumerate(messages) if len(m) != layout.itemsize]
+    if odd:
+        raise RecordingError(
+            f'{path}: {topic}: message {odd[0]} has {len(messages[odd[0]])} bytes, but one with '
+            f'the frame of the first has {layout.itemsize}; keep one sensor per topic'
+        )
+    rows = np.frombuffer(b''.join(messages), layout)
+    stamps = rows['sec'].astype(np.int64) * 10**9 + rows['nanosec']
+    return stamps, np.array(rows['numbers'][:, _ACCELERATION], dtype=float)
+
+
+def _layout(frame_length: int, order: str) -> np.dtype[np.void]:
+    """Return an Imu message in CDR with a frame name of some bytes, its final zero included."""
+    end = 12 + frame_length
+    padded = -(-end // 8) * 8
+    return np.dtype(
+        {
+            'names': ['encapsulation', 'sec', 'nanosec', 'length', 'frame', 'numbers'],
+            'formats': [
+                '4u1',
+                order + 'i4',
+                order + 'u4',
+                order + 'u4',
+                f'S{frame_length}',
+                (order + 'f8', (_NUMBERS,)),
+            ],
+            'offsets': [0, 4, 8, 12, 16, 4 + padded],
+            'itemsize': 4 + padded + 8 * _NUMBERS,
+        }
+    )
+
+
+def imu_topic(link: str) -> str:
+    """Return the topic of the accelerometer on a link, whose name ROS may not take as it is."""
+    name = re.sub('[^A-Za-z0-9_]', '_', link)
+    return f'/{"_" if name[:1].isdigit() else ""}{name}/imu'

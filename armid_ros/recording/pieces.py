@@ -98,6 +98,8 @@ def _parts(
 def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:
     """Yield what messages have from a stamp on."""
     for states in held:
-        late = (states.stamps if clock == 'header' else states.receive) >= stamp
+        stamps = states.stamps if clock == 'header' else states.receive
+        assert stamps is not None
+        late = stamps >= stamp
         if late.any():
             yield states.select(np.flatnonzero(late))

@@ -16,7 +16,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.recording import PositionRange, ReadReport, Recording
+from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,
@@ -140,10 +140,18 @@ def assemble(
         length = (stamps[-1] - stamps[0]) * 1e-9
         read = f'{decoder.messages} messages over {length:.4g} s could be read'
         damage = f'of a damaged bag {read}: {damage}'
-    counts.update(messages=decoder.messages, malformed=decoder.malformed)
+    met = {
+        **counts,
+        'messages': decoder.messages,
+        'malformed': decoder.malformed,
+        'not_finite': culprits,
+        'absent': absent,
+        'clock_note': note,
+        'damage': damage,
+    }
     return recorded(
         samples,
-        ReadReport(not_finite=culprits, absent=absent, clock_note=note, damage=damage, **counts),
+        met,
         start_ns=int(stamps[0]),
         source=path,
         topic=topic,

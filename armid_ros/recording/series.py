@@ -14,7 +14,7 @@ stamps exactly and are interpolated linearly between stamps, but not over their 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -230,7 +230,9 @@ def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
         return parts[0]
     values = tuple(_stacked([part.values[field] for part in parts], parts) for field in range(3))
     receive, number = (
-        None if any(one is None for one in arrays) else np.concatenate(arrays)
+        np.concatenate([one for one in arrays if one is not None])
+        if all(one is not None for one in arrays)
+        else None
         for arrays in ([part.receive for part in parts], [part.number for part in parts])
     )
     stamps = np.concatenate([part.stamps for part in parts])
@@ -341,7 +343,7 @@ def _resampled(
     return JointSamples(series.joints, stamps, values), valid, equal
 
 
-def recorded(samples: JointSamples, report: ReadReport, **about: Any) -> Recording:
+def recorded(samples: JointSamples, met: Mapping[str, Any], **about: Any) -> Recording:
     """
     Make a recording of samples in order of time, positions continuous over whole turns.
 
@@ -349,8 +351,8 @@ def recorded(samples: JointSamples, report: ReadReport, **about: Any) -> Recordi
     ----------
     samples : JointSamples
         Two or more; nobody else has their arrays.
-    report : ReadReport
-        What was met so far; samples, gaps and joints with turns are added.
+    met : mapping of str to value
+        What was met so far, by attribute of the report.
     **about
         Other attributes of the recording.
 
@@ -362,8 +364,8 @@ def recorded(samples: JointSamples, report: ReadReport, **about: Any) -> Recordi
     for array in (t, q, dq, tau):
         if array is not None:
             array.setflags(write=False)  # so that it need not be copied
-    report = replace(
-        report,
+    report = ReadReport(
+        **met,
         samples=len(samples),
         gaps=gaps(t),
         unwrapped=tuple(samples.joints[k] for k in wrapped),

@@ -53,9 +53,11 @@ class JointSamples:
         self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice
     ) -> JointSamples:
         """Return some of the samples."""
-        arrays = (*self.values, self.receive, self.number)
-        *values, receive, number = (None if v is None else v[samples] for v in arrays)
-        return JointSamples(self.joints, self.stamps[samples], tuple(values), receive, number)
+        values = tuple(None if v is None else v[samples] for v in self.values)
+        receive, number = (
+            None if one is None else one[samples] for one in (self.receive, self.number)
+        )
+        return JointSamples(self.joints, self.stamps[samples], values, receive, number)
 
     def columns(self, joints: Sequence[str]) -> JointSamples:
         """Return some of the joints."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
-from armid_ros.recording.recording import PositionRange, ReadReport, Recording
+from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import longest_in_order, MAX_NOT_FINITE, not_finite, recorded
 from armid_ros.recording.tables.of_bags import in_si
 from armid_ros.recording.tables.patterns import not_chosen
@@ -58,18 +58,18 @@ def measured(plan: TablePlan) -> Recording:
         raise RecordingError(f'{table.source}: {len(series)} rows with numbers are left')
     counts['nan'] = int((~kept & stamped).sum())
     counts['unstamped'] += int((~stamped).sum())
-    report = ReadReport(
-        messages=len(table),
-        not_finite=culprits,
-        absent=plan.absent,
-        damage='; '.join(note for note in table.notes if 'cut off' in note),
+    met = {
         **counts,
-    )
+        'messages': len(table),
+        'not_finite': culprits,
+        'absent': plan.absent,
+        'damage': '; '.join(note for note in table.notes if 'cut off' in note),
+    }
     topic = 'the table'
     if plan.source('effort') is None and plan.unread:
         topic += f' (--effort names columns of it; not read are {plan.unread})'
     about = {'start_ns': start, 'source': table.source, 'topic': topic}
-    recording = recorded(series, report, others=tuple(_others(plan)), **about)
+    recording = recorded(series, met, others=tuple(_others(plan)), **about)
     sides = replace(plan.settings, degrees=False, position_scale=(), effort_scale=())
     return in_si(recording, sides)  # units are those of the plan
 
