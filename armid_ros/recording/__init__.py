@@ -16,13 +16,14 @@ from armid_ros.recording.joint_state.encoder import (
     write_recording,
 )
 from armid_ros.recording.mcap.recover import recover, RecoveryReport
-from armid_ros.recording.partner import PartnerMotion, recorded_together
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import (
     given_twice,
+    PartnerMotion,
     PositionRange,
     ReadReport,
+    recorded_together,
     Recording,
     require_once,
     TimeGap,
