@@ -132,7 +132,14 @@ class RecorderNode(ArmidNode):
         """Open a bag and record; RecordingError when it cannot be made or one is open."""
         if self._writer is not None:
             raise RecordingError(f'recording into {self._writer.path} already')
-        self._writer = self._open_bag(self._next_path())
+        name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
+        # The first bag must not exist; those of later ~/start are numbered.
+        path = Path(name).expanduser()
+        number = self._bags
+        while number and path.exists():
+            path = path.with_name(f'{Path(name).name}_{number}')
+            number += 1
+        self._writer = self._open_bag(path)
         self._bags += 1
         self._count = 0
         self._begun = time.monotonic()
@@ -321,16 +328,6 @@ class RecorderNode(ArmidNode):
         if self.context.ok():  # /rosout is gone once the process is told to end
             self.get_logger().info(text)
         return text
-
-    def _next_path(self) -> Path:
-        name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
-        # The first bag must not exist; those of later ~/start are numbered.
-        path = Path(name).expanduser()
-        number = self._bags
-        while number and path.exists():
-            path = path.with_name(f'{Path(name).name}_{number}')
-            number += 1
-        return path
 
     def _default_bag(self, path: Path) -> BagWriter:
         return BagWriter(
