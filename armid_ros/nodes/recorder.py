@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.messages.classes import installed_definition, is_stamped, message_class
+from armid_ros.nodes.messages.classes import is_stamped, message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
@@ -249,12 +249,7 @@ class RecorderNode(ArmidNode):
             if len(types) > 1:
                 raise RecordingError(f'{topic} has several types: {", ".join(types)}')
             message_type = message_class(types[0])
-            writer.add_topic(
-                topic,
-                types[0],
-                qos=recorded(publishers),
-                definition=installed_definition(types[0]),
-            )
+            writer.add_topic(topic, types[0], qos=recorded(publishers))
         except ArmidError as error:
             self.complaints.say('topic', f'{topic} is not recorded: {error}')
             self._refused[topic] = types

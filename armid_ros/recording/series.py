@@ -127,20 +127,12 @@ def ordered(samples: JointSamples, clock: Clock, counts: Counter[str]) -> JointS
     return longest_in_order(samples, counts)
 
 
-def _strays(stamps: IntArray) -> npt.NDArray[np.bool_]:
-    """Return which stamps are far from those of the messages before and after, (N,)."""
-    if len(stamps) < _AROUND or not (np.abs(np.diff(stamps)) > RESTART_NS).any():
-        return np.zeros(len(stamps), dtype=np.bool_)
-    around = median_filter(stamps, _AROUND, mode='mirror')
-    return np.asarray(
-        np.abs(stamps - around) > RESTART_NS + 2 * np.median(np.abs(np.diff(stamps)))
-    )
-
-
 def longest_in_order(series: JointSamples, counts: Counter[str]) -> JointSamples:
     """Return the longest stretch between restarts of the clock, in order of time."""
-    stray = _strays(series.stamps)
-    if stray.any():
+    steps = np.abs(np.diff(series.stamps))
+    if len(series) >= _AROUND and (steps > RESTART_NS).any():
+        around = median_filter(series.stamps, _AROUND, mode='mirror')
+        stray = np.abs(series.stamps - around) > RESTART_NS + 2 * np.median(steps)
         counts['unstamped'] += int(stray.sum())
         series = series.select(~stray)
     run = longest_run(series.stamps)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.nodes.qos import SAMPLES
-from armid_ros.recording.elastic_topics import imu_topic, LINK, REFERENCE
+from armid_ros.recording.elastic import imu_topic, LINK, REFERENCE
 from armid_ros.simulation.simulated_arm import LinkSample, SimulatedArm
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
