@@ -289,13 +289,8 @@ class OnlineIdentifierNode(ArmidNode):
     def _on_description(self, message: String) -> None:
         if message.data == self._description:
             return
-        try:
-            identifier = make_identifier(self.value, message.data)
-        except ArmidError as error:
-            self.complaints.say('robot_description', str(error))
-            return
+        self._begin(make_identifier(self.value, message.data))
         self._description = message.data
-        self._begin(identifier)
 
     def _on_model(self, message: String) -> None:
         """

@@ -235,15 +235,28 @@ def test_rubbish_is_said_once_and_costs_nothing(bench, arm, samples, expected):
     assert sum(rejected) == len(mixed) - len(samples[0])
 
 
+SPOILED_ELEMENTS = (
+    ('axis xyz="0 1 0"', 'axis xyz="nan 0 1"'),
+    ('axis xyz="0 1 0"', 'axis xyz="inf 0 1"'),
+    ('axis xyz="0 1 0"', 'axis xyz="0 0 0"'),
+    ('origin xyz="0.2 0 0"', 'origin xyz="inf 0 0"'),
+    ('origin xyz="0.2 0 0"', 'origin xyz="0 0"'),
+    ('mass value="2"', 'mass value="nan"'),
+)
+
+
 def test_a_description_that_is_none_is_refused_and_a_good_one_still_taken(bench):
     rosout = bench.rosout()
     node = bench.add(OnlineIdentifierNode)
     publisher = bench.matched_publisher(String, 'robot_description', LATCHED)
-    for text in ('hello', '<sdf/>', '<robot name="empty"/>', '<robot'):
+    spoiled = [PENDULUM.replace(*change, 1) for change in SPOILED_ELEMENTS]
+    wrong = ['hello', '<sdf/>', '<robot name="empty"/>', '<robot', *spoiled]
+    for text in wrong:
         publisher.publish(String(data=text))
         bench.settle()
         assert node.identifier is None
-    assert node.complaints.counts['robot_description'] == 4
+    assert node.complaints.counts['robot_description'] == len(wrong)
+    assert node.complaints.defects == 0
     publisher.publish(String(data=PENDULUM))
     bench.spin_until(lambda: node.identifier is not None)
     assert node.hardware == 'pendulum'
