@@ -25,6 +25,7 @@ from std_msgs.msg import String
 import yaml
 
 from docsite.schemas import faults
+from tests.ros.controller import joint_state
 
 PENDULUM = """<robot name="pendulum">
 <link name="base"/>
@@ -69,12 +70,8 @@ def samples(arm):
     return motion.t, motion.q, motion.dq, motion.tau
 
 
-def message(joints, t, q, dq, tau):
-    stamp = round((1000.0 + t) * 1e9)
-    message = JointState(name=list(joints), position=q.tolist(), velocity=dq.tolist())
-    message.effort = tau.tolist()
-    message.header.stamp = Time(sec=stamp // 10**9, nanosec=stamp % 10**9)
-    return message
+def message(joints, t, *values):
+    return joint_state(1000.0 + t, joints, *values)
 
 
 def messages(arm, samples):

@@ -23,7 +23,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-from tests.ros.controller import Controller, SECOND, stamp_of
+from tests.ros.controller import Controller, joint_state, SECOND
 
 PATIENCE = 120.0
 
@@ -188,9 +188,7 @@ def recorder_at_work(bench, processes, bag):
 
     def grown():
         for stamp in islice(stamps, 20):
-            state = JointState(name=['hinge'], position=[0.0], velocity=[0.0], effort=[1.0])
-            state.header.stamp = stamp_of(1e-9 * stamp)
-            publisher.publish(state)
+            publisher.publish(joint_state(1e-9 * stamp, ['hinge'], [0.0], [0.0], [1.0]))
         return any(file.stat().st_size > 5_000 for file in bag.glob('*.mcap'))
 
     bench.spin_until(grown, 'the recording')
