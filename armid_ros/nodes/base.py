@@ -24,6 +24,9 @@ from std_srvs.srv import Trigger
 #: before it is said that nothing does [s].
 _PATIENCE = 5.0
 
+#: How often new publishers and answers are looked for [s].
+LOOK_PERIOD = 0.1
+
 EXECUTOR = NodeParameter(
     name='executor',
     default='single',

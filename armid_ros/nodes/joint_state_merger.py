@@ -14,7 +14,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.identification.samples.joint_merge import JointMerger
 from armid_ros.inspection.band import LEAST, standing_bands
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
@@ -25,8 +25,6 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-#: How often publishers are looked for [s].
-_LOOK_PERIOD = 0.1
 #: Types of messages that hold torques.
 _EFFORTS = (
     'sensor_msgs/msg/JointState',
@@ -105,7 +103,7 @@ class JointStateMergerNode(ArmidNode):
             self._adopt(names(self, 'joints'))
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(LOOK_PERIOD, self.look)
 
     def look(self) -> None:
         """Subscribe to what has appeared."""

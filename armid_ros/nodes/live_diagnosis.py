@@ -16,7 +16,7 @@ from armid_ros.errors import ArmidError, IdentificationError, OutputError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Done, Helper, Plan, Save
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.joint_states import disturbance, JointStateReader
 from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.parameters.live import (
@@ -36,8 +36,6 @@ _LEVELS = {
     'consistent': DiagnosticStatus.OK,
     'bad_data': DiagnosticStatus.ERROR,
 }
-#: How often publishers and answers are looked for [s].
-_LOOK_PERIOD = 0.1
 
 
 class LiveDiagnosisNode(ArmidNode):
@@ -106,7 +104,7 @@ class LiveDiagnosisNode(ArmidNode):
         )
         for service in (self.accept, self.reject, self.save, self.next_run, self.reset):
             self.offer(f'~/{service.__name__}', service)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:

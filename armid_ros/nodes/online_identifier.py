@@ -24,7 +24,7 @@ from armid_ros.identification.online.identifier import (
 )
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.estimates import (
     change_status,
     estimate_message,
@@ -56,8 +56,6 @@ from std_msgs.msg import String
 
 #: Where ~/save writes to when nobody says.
 _FOLDER = 'online_identification'
-#: How often publishers of joint states are looked for, and whether states still come [s].
-_LOOK_PERIOD = 0.1
 #: Update times that are kept for diagnostics.
 _TIMED = 2000
 
@@ -135,7 +133,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
         self.pace('estimate_rate', self.publish_estimate)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:

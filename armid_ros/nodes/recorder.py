@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import is_stamped, message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
@@ -25,8 +25,6 @@ from armid_ros.recording.message_types import header_stamp
 
 OpenBag = Callable[[Path], BagWriter]
 
-#: How often new topics and publishers are looked for [s].
-LOOK_PERIOD = 0.1
 #: How often what waits in memory is written out [s]; bounds what a kill loses.
 FLUSH_PERIOD = 0.1
 #: How often the disk is looked at [s].
