@@ -26,8 +26,7 @@ from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor
-from armid_ros.nodes.running.steady import steady
+from armid_ros.nodes.running.process import make_executor, steady
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, SimulatedArm

@@ -14,7 +14,7 @@ from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import RecordingError
 from armid_ros.recording import Recording
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.contents import bag_contents
+from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import ColumnSettings, is_table
 from armid_ros.recording.tables.settings import numbers

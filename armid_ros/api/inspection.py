@@ -30,10 +30,10 @@ from armid_ros.inspection import (
     Remark,
 )
 from armid_ros.inspection import inspect as look
-from armid_ros.recording import ReadSettings, Recording
+from armid_ros.recording import ReadSettings, Recording, Topic
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.contents import bag_contents, TopicContent
 from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.settings import DEFAULT
 from armid_ros.recording.tables import (
@@ -131,7 +131,7 @@ def inspect(
     recording: RecordingLike,
     robot: RobotLike | None = None,
     *,
-    topics: tuple[TopicContent, ...] | None = None,
+    topics: tuple[Topic, ...] | None = None,
     rng: Rng = 0,
 ) -> InspectionResult:
     """
@@ -143,7 +143,7 @@ def inspect(
         A bag or a table.
     robot : model, robot, name or path, optional
         With it limits and units are checked, and an identification is tried.
-    topics : tuple of TopicContent, optional
+    topics : tuple of Topic, optional
         All topics of the bag; read from it by default where no robot is given.
     rng : int or Generator
         Seed, or source of randomness.
@@ -177,14 +177,14 @@ def inspect(
     return InspectionResult(found)
 
 
-def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[TopicContent, ...]:
+def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
     """Return the topics of a bag of ROS 2; of other recordings none."""
     return () if is_table(path) or is_ros1(path) else bag_contents(path, settings)
 
 
 def read_all_joints(
     path: Path,
-    topics: tuple[TopicContent, ...],
+    topics: tuple[Topic, ...],
     *,
     joints: Sequence[str] | None = None,
     topic: str | None = None,
@@ -199,7 +199,7 @@ def read_all_joints(
     ----------
     path : Path
         A bag or a table.
-    topics : tuple of TopicContent
+    topics : tuple of Topic
         Topics of the bag.
     joints : sequence of str, optional
         Which joints; by default all of the topic, or of the table.

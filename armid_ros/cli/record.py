@@ -77,7 +77,7 @@ def simulate(
     from armid_ros.api.simulation import reference_of
     from armid_ros.cli import options
     from armid_ros.recording import write_recording
-    from armid_ros.recording.elastic_topics import write_runs
+    from armid_ros.recording.elastic import write_runs
     from armid_ros.simulation import Sensors
     from armid_ros.simulation import simulate as run
     from armid_ros.simulation.bodies import require_masses

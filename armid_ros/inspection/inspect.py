@@ -16,8 +16,7 @@ from armid_ros.inspection.band import effort_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
 from armid_ros.inspection.trial import TrialFit, try_identification
-from armid_ros.recording import Recording
-from armid_ros.recording.contents import TopicContent
+from armid_ros.recording import Recording, Topic
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -56,7 +55,7 @@ class Inspection:
     ----------
     recording : Recording
         As it was read.
-    topics : tuple of TopicContent
+    topics : tuple of Topic
         Of the bag; empty for a table.
     robot : Robot or None
         Description, where one was given.
@@ -72,7 +71,7 @@ class Inspection:
     """
 
     recording: Recording
-    topics: tuple[TopicContent, ...]
+    topics: tuple[Topic, ...]
     robot: Robot | None
     sampling: Sampling
     joints: tuple[JointFacts, ...]
@@ -117,7 +116,7 @@ def inspect(
     recording: Recording,
     robot: Robot | None = None,
     *,
-    topics: tuple[TopicContent, ...] = (),
+    topics: tuple[Topic, ...] = (),
     rng: np.random.Generator,
 ) -> Inspection:
     """
@@ -129,7 +128,7 @@ def inspect(
         Of some joints; of those of the robot, in its order, where there is one.
     robot : Robot, optional
         Description: with it limits and units are checked, and an identification is tried.
-    topics : tuple of TopicContent, optional
+    topics : tuple of Topic, optional
         Of the bag.
     rng : numpy.random.Generator
         Of the identification.

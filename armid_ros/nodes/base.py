@@ -24,6 +24,9 @@ from std_srvs.srv import Trigger
 #: before it is said that nothing does [s].
 _PATIENCE = 5.0
 
+#: How often new publishers and answers are looked for [s].
+LOOK_PERIOD = 0.1
+
 EXECUTOR = NodeParameter(
     name='executor',
     default='single',
@@ -103,10 +106,6 @@ class ArmidNode(Node):
             self.destroy_timer(self._paced[parameter][1])
         timer = self.create_timer(1.0 / self.value(parameter), callback)
         self._paced[parameter] = callback, timer
-
-    def until_call(self, parameter: str) -> float:
-        """Return the time until what is paced by a parameter is called next [s]."""
-        return float(self._paced[parameter][1].time_until_next_call()) * 1e-9
 
     @property
     def missing_clock(self) -> str:
@@ -261,7 +260,10 @@ class ArmidNode(Node):
         if not changed:
             return SetParametersResult(successful=True)
         result = super().set_parameters_atomically(changed)
-        self._note_refusal(', '.join(p.name for p in changed), result)
+        name = ', '.join(p.name for p in changed)
+        if not result.successful:
+            reason = result.reason.removeprefix(f"parameter '{name}': ")
+            self.complaints.say('parameter', f"parameter '{name}' refused: {reason}")
         return result
 
     def publish_diagnostics(self) -> None:
@@ -275,7 +277,8 @@ class ArmidNode(Node):
         status.message = trouble or (self.complaints.latest if troubled else self.activity)
         rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
         for key, value in {**values, **rejected}.items():
-            status.values.append(KeyValue(key=key, value=_text(value)))
+            text = f'{value:.9g}' if isinstance(value, float) else str(value)
+            status.values.append(KeyValue(key=key, value=text))
         message = DiagnosticArray(status=[status, *self.further_statuses()])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
@@ -296,12 +299,3 @@ class ArmidNode(Node):
 
     def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
         return surviving(callback, what, lambda: self.complaints, lambda: self.context.ok())
-
-    def _note_refusal(self, name: str, result: SetParametersResult) -> None:
-        if not result.successful:
-            reason = result.reason.removeprefix(f"parameter '{name}': ")
-            self.complaints.say('parameter', f"parameter '{name}' refused: {reason}")
-
-
-def _text(value: object) -> str:
-    return f'{value:.9g}' if isinstance(value, float) else str(value)

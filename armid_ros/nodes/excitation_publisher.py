@@ -27,11 +27,11 @@ from armid_ros.nodes.arm_watch import ArmWatch
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.excitation import (
     checked,
-    EXCITATION_PARAMETERS,
     make_excitation,
     make_surroundings,
+    PUBLISHER_PARAMETERS,
+    SIMULATION,
 )
-from armid_ros.nodes.parameters.run import RUN_PARAMETERS, SIMULATION
 from armid_ros.nodes.parameters.table import declare, NodeParameter
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
@@ -65,7 +65,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     """
 
-    table = (*EXCITATION_PARAMETERS, *RUN_PARAMETERS)
+    table = PUBLISHER_PARAMETERS
 
     def __init__(
         self,

@@ -14,9 +14,8 @@ from armid_ros.errors import RecordingError
 from armid_ros.identification.samples.joint_merge import JointMerger
 from armid_ros.inspection.band import LEAST, standing_bands
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import message_class
-from armid_ros.nodes.messages.efforts import effort_reader, Reader
 from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
 from armid_ros.nodes.running.process import run
@@ -26,8 +25,12 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-#: How often publishers are looked for [s].
-_LOOK_PERIOD = 0.1
+#: Types of messages that hold torques.
+_EFFORTS = (
+    'sensor_msgs/msg/JointState',
+    'control_msgs/msg/DynamicJointState',
+    'std_msgs/msg/Float64MultiArray',
+)
 #: Samples that the band of the torques is estimated from.
 _KEPT = 4096
 
@@ -85,7 +88,6 @@ class JointStateMergerNode(ArmidNode):
         self.joints: tuple[str, ...] = ()
         self._published = 0
         self._lag_ns, self._epoch_ns = 0, 0
-        self._reader: Reader | None = None
         self._efforts: MatchedSubscription | None = None
         self._kept: deque[tuple[float, FloatArray, FloatArray]] = deque(maxlen=_KEPT)
         self._states = self.create_publisher(JointState, '~/joint_states', SAMPLES)
@@ -101,7 +103,7 @@ class JointStateMergerNode(ArmidNode):
             self._adopt(names(self, 'joints'))
         else:
             self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(LOOK_PERIOD, self.look)
 
     def look(self) -> None:
         """Subscribe to what has appeared."""
@@ -114,9 +116,10 @@ class JointStateMergerNode(ArmidNode):
             full = self.resolve_topic_name(topic)
             types = dict(self.get_topic_names_and_types()).get(full, [])
             if types:
-                self._reader = effort_reader(
-                    types[0], self._effort_names, self.value('effort_interface')
-                )
+                if types[0] not in _EFFORTS:
+                    raise RecordingError(
+                        f'{types[0]} holds no efforts; those that do: {", ".join(_EFFORTS)}'
+                    )
                 self._efforts = MatchedSubscription(
                     self, message_class(types[0]), topic, self._on_efforts
                 )
@@ -195,12 +198,36 @@ class JointStateMergerNode(ArmidNode):
             self._take_efforts(stamp, known, self.joints)
 
     def _on_efforts(self, message: Any) -> None:
-        if self._reader is None:
-            return
         header = getattr(message, 'header', None)
         now = self.get_clock().now().nanoseconds - self._lag_ns
         stamp = now if header is None else self._stamp(header.stamp)
-        self._take_efforts(stamp, self._reader(message), self._effort_names)
+        self._take_efforts(stamp, self._torques(message), self._effort_names)
+
+    def _torques(self, message: Any) -> Mapping[str, float]:
+        """Return the torques or currents that a message of one of the types holds, by name."""
+        if isinstance(message, JointState):
+            names, values = message.name, message.effort
+        elif hasattr(message, 'interface_values'):
+            interface, parts = self.value('effort_interface'), message.interface_values
+            found = {
+                joint: part.values[list(part.interface_names).index(interface)]
+                for joint, part in zip(message.joint_names, parts, strict=False)
+                if interface in part.interface_names
+            }
+            if not found:
+                there = sorted({name for part in parts for name in part.interface_names})
+                raise RecordingError(
+                    f"efforts: no joint has the interface '{interface}'; there are "
+                    f'{", ".join(there)}'
+                )
+            return found
+        else:
+            names, values = self._effort_names, message.data
+        if len(values) != len(names):
+            raise RecordingError(
+                f'efforts: {len(values)} values for {len(names)} names ({", ".join(names)})'
+            )
+        return dict(zip(names, values, strict=True))
 
     def _take_efforts(self, stamp: int, known: Mapping[str, float], called: Sequence[str]) -> None:
         n = len(self.joints)

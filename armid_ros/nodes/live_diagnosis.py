@@ -11,15 +11,14 @@ from typing import Any
 from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
+from armid_ros.diagnosis import Finding
 from armid_ros.errors import ArmidError, IdentificationError, OutputError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Done, Helper, Plan, Save
-from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.freshness import Freshness
-from armid_ros.nodes.messages.diagnoses import diagnosis_message, diagnosis_status
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.joint_states import disturbance, JointStateReader
-from armid_ros.nodes.messages.stamp_difference import StampDifference
+from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
@@ -28,12 +27,15 @@ from armid_ros.nodes.parameters.live import (
 )
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-#: How often publishers and answers are looked for [s].
-_LOOK_PERIOD = 0.1
+#: What each verdict is in /diagnostics: something is wrong where it names or cannot name.
+_LEVELS = {
+    'consistent': DiagnosticStatus.OK,
+    'bad_data': DiagnosticStatus.ERROR,
+}
 
 
 class LiveDiagnosisNode(ArmidNode):
@@ -102,7 +104,7 @@ class LiveDiagnosisNode(ArmidNode):
         )
         for service in (self.accept, self.reject, self.save, self.next_run, self.reset):
             self.offer(f'~/{service.__name__}', service)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:
@@ -220,7 +222,7 @@ class LiveDiagnosisNode(ArmidNode):
         if self.live is None:
             return ()
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
-        return (diagnosis_status(name, self.hardware, self.live.latest),)
+        return (_status(name, self.hardware, self.live.latest),)
 
     def level(self, troubled: bool) -> bytes:
         """Return STALE when joint states have stopped."""
@@ -258,7 +260,7 @@ class LiveDiagnosisNode(ArmidNode):
             self._publish_model()
         if live.latest is latest:
             return
-        message = diagnosis_message(answer, self.hardware, live.confirmed)
+        message = _message(answer, self.hardware, live.confirmed)
         message.header.stamp = self._reader.stamp(answer.end).to_msg()
         self._diagnoses.publish(message)
         said = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
@@ -304,6 +306,61 @@ class LiveDiagnosisNode(ArmidNode):
     def _tell(self, text: str) -> str:
         self.get_logger().info(text)
         return text
+
+
+def _message(answer: Answer, robot: str, confirmed: bool) -> Diagnosis:
+    """Return an answer as a message; the stamp is unset."""
+    message = Diagnosis(
+        robot=robot,
+        verdict=answer.verdict,
+        summary=answer.summary,
+        window=float(answer.window.duration),
+        confirmed=confirmed,
+        effect=[finding.name for finding in answer.findings],
+        effect_joints=[','.join(finding.joints) for finding in answer.findings],
+        share=[float(finding.share) for finding in answer.findings],
+        rivals=[','.join(finding.ambiguous_with) for finding in answer.findings],
+        gap_joint=[row.joint for row in answer.gap],
+        gap_before=[row.before for row in answer.gap],
+        gap_after=[row.after for row in answer.gap],
+        gap_floor=[row.floor for row in answer.gap],
+    )
+    for number, finding in enumerate(answer.findings):
+        for parameter, value, std in _rows(finding):
+            message.name.append(parameter.name)
+            message.joint.append(parameter.joint)
+            message.unit.append(parameter.unit)
+            message.value.append(float(value))
+            message.std_dev.append(float(std))
+            message.of_effect.append(number)
+    return message
+
+
+def _status(name: str, robot: str, answer: Answer | None) -> DiagnosticStatus:
+    """Return what /diagnostics says of the last answer: in words, and as numbers to plot."""
+    status = DiagnosticStatus(name=name, hardware_id=robot, message='nothing diagnosed so far')
+    status.level = DiagnosticStatus.OK
+    if answer is None:
+        return status
+    status.level = _LEVELS.get(answer.verdict, DiagnosticStatus.WARN)
+    status.message = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
+    numbers = {'processor seconds': answer.seconds, 'window': answer.window.duration}
+    for row in answer.gap:
+        numbers |= {
+            f'gap before {row.joint} [N m]': row.before,
+            f'gap after {row.joint} [N m]': row.after,
+            f'floor {row.joint} [N m]': row.floor,
+        }
+    for finding in answer.findings:
+        for parameter, value, std in _rows(finding):
+            what = ' '.join(filter(None, (finding.name, parameter.joint, parameter.name)))
+            numbers |= {f'{what} [{parameter.unit}]': value, f'{what} std': std}
+    status.values = [KeyValue(key=k, value=f'{float(x):.9g}') for k, x in numbers.items()]
+    return status
+
+
+def _rows(finding: Finding) -> list[tuple[object, float, float]]:
+    return list(zip(finding.parameters, finding.values, finding.std, strict=True))
 
 
 def _in_words(live: LiveDiagnosis) -> str:

@@ -32,8 +32,7 @@ from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.process import make_executor
-from armid_ros.nodes.running.steady import steady
+from armid_ros.nodes.running.process import make_executor, steady
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.simulation import SimulatedArm
 from rclpy.context import Context

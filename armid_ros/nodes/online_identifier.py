@@ -20,13 +20,11 @@ from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.identifier import (
     OnlineIdentifier,
-    OnlineSample,
     OnlineSettings,
 )
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.freshness import Freshness
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.estimates import (
     change_status,
     estimate_message,
@@ -40,7 +38,7 @@ from armid_ros.nodes.messages.joint_states import (
     JointSample,
     JointStateReader,
 )
-from armid_ros.nodes.messages.stamp_difference import StampDifference
+from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
@@ -58,8 +56,6 @@ from std_msgs.msg import String
 
 #: Where ~/save writes to when nobody says.
 _FOLDER = 'online_identification'
-#: How often publishers of joint states are looked for, and whether states still come [s].
-_LOOK_PERIOD = 0.1
 #: Update times that are kept for diagnostics.
 _TIMED = 2000
 
@@ -137,7 +133,7 @@ class OnlineIdentifierNode(ArmidNode):
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
         self.pace('estimate_rate', self.publish_estimate)
-        self.look_every(_LOOK_PERIOD, self.look)
+        self.look_every(LOOK_PERIOD, self.look)
 
     @property
     def hardware(self) -> str:
@@ -291,13 +287,8 @@ class OnlineIdentifierNode(ArmidNode):
     def _on_description(self, message: String) -> None:
         if message.data == self._description:
             return
-        try:
-            identifier = make_identifier(self.value, message.data)
-        except ArmidError as error:
-            self.complaints.say('robot_description', str(error))
-            return
+        self._begin(make_identifier(self.value, message.data))
         self._description = message.data
-        self._begin(identifier)
 
     def _on_model(self, message: String) -> None:
         """
@@ -333,7 +324,12 @@ class OnlineIdentifierNode(ArmidNode):
         identifier.update(*sample)
         self.update_times.append(time.thread_time() - begun)
         for learned in identifier.latest:
-            self._publish_sample(learned)
+            self._last_sample = learned.t
+            self._squares += learned.residual**2
+            self._counted += 1
+            self._last_sample_stamp = self._reader.stamp(learned.t).to_msg()
+            self._publish_effort(self._predictions, learned.predicted)
+            self._publish_effort(self._residuals, learned.residual)
         for change in identifier.changes[self._told :]:
             self._tell(change)
 
@@ -347,14 +343,6 @@ class OnlineIdentifierNode(ArmidNode):
         )
         message.header.stamp = self._reader.stamp(change.t).to_msg()
         self._changes.publish(message)
-
-    def _publish_sample(self, sample: OnlineSample) -> None:
-        self._last_sample = sample.t
-        self._squares += sample.residual**2
-        self._counted += 1
-        self._last_sample_stamp = self._reader.stamp(sample.t).to_msg()
-        self._publish_effort(self._predictions, sample.predicted)
-        self._publish_effort(self._residuals, sample.residual)
 
     def _publish_effort(self, publisher: Publisher, effort: FloatArray) -> None:
         if publisher.get_subscription_count():

@@ -15,8 +15,8 @@ from typing import Any, NoReturn
 
 from armid_ros.errors import ArmidError, RecordingEnded, RecordingError
 from armid_ros.files import size_text
-from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.messages.classes import installed_definition, is_stamped, message_class
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
+from armid_ros.nodes.messages.classes import is_stamped, message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import MatchedSubscription, recorded
 from armid_ros.nodes.running.process import run
@@ -25,8 +25,6 @@ from armid_ros.recording.message_types import header_stamp
 
 OpenBag = Callable[[Path], BagWriter]
 
-#: How often new topics and publishers are looked for [s].
-LOOK_PERIOD = 0.1
 #: How often what waits in memory is written out [s]; bounds what a kill loses.
 FLUSH_PERIOD = 0.1
 #: How often the disk is looked at [s].
@@ -132,7 +130,14 @@ class RecorderNode(ArmidNode):
         """Open a bag and record; RecordingError when it cannot be made or one is open."""
         if self._writer is not None:
             raise RecordingError(f'recording into {self._writer.path} already')
-        self._writer = self._open_bag(self._next_path())
+        name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
+        # The first bag must not exist; those of later ~/start are numbered.
+        path = Path(name).expanduser()
+        number = self._bags
+        while number and path.exists():
+            path = path.with_name(f'{Path(name).name}_{number}')
+            number += 1
+        self._writer = self._open_bag(path)
         self._bags += 1
         self._count = 0
         self._begun = time.monotonic()
@@ -242,12 +247,7 @@ class RecorderNode(ArmidNode):
             if len(types) > 1:
                 raise RecordingError(f'{topic} has several types: {", ".join(types)}')
             message_type = message_class(types[0])
-            writer.add_topic(
-                topic,
-                types[0],
-                qos=recorded(publishers),
-                definition=installed_definition(types[0]),
-            )
+            writer.add_topic(topic, types[0], qos=recorded(publishers))
         except ArmidError as error:
             self.complaints.say('topic', f'{topic} is not recorded: {error}')
             self._refused[topic] = types
@@ -321,16 +321,6 @@ class RecorderNode(ArmidNode):
         if self.context.ok():  # /rosout is gone once the process is told to end
             self.get_logger().info(text)
         return text
-
-    def _next_path(self) -> Path:
-        name = self.value('bag') or f'armid_{datetime.now():%Y_%m_%d-%H_%M_%S}'
-        # The first bag must not exist; those of later ~/start are numbered.
-        path = Path(name).expanduser()
-        number = self._bags
-        while number and path.exists():
-            path = path.with_name(f'{Path(name).name}_{number}')
-            number += 1
-        return path
 
     def _default_bag(self, path: Path) -> BagWriter:
         return BagWriter(

@@ -12,7 +12,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import read_model
 from armid_ros.errors import ArmidError, ModelError, TrajectoryError
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.messages.elastic_topics import ElasticTopics
 from armid_ros.nodes.parameters.arm import (
     ARM_PARAMETERS,
     bare_arm,
@@ -26,15 +25,19 @@ from armid_ros.nodes.qos import LATCHED, SAMPLES, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.nodes.trajectory.messages import read_trajectory
+from armid_ros.recording.elastic import imu_topic, LINK, REFERENCE
 from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.run import whole_steps
+from armid_ros.simulation.simulated_arm import LinkSample
+from builtin_interfaces.msg import Time as TimeMessage
 from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.time import Time
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock as ClockMessage
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
@@ -47,6 +50,56 @@ LONGEST = 3600.0
 LONGEST_NS = 60 * 10**9
 #: Timers cannot be much faster [s].
 _SHORTEST_PERIOD = 0.0005
+
+
+class ElasticTopics:
+    """
+    Publishers of link/joint_states, reference/joint_states and an imu topic for every link.
+
+    Parameters
+    ----------
+    node : Node
+        Whose topics they are.
+    arm : SimulatedArm
+        The arm, with springs.
+
+    """
+
+    def __init__(self, node: Node, arm: SimulatedArm) -> None:
+        def publisher(kind: type, topic: str) -> tuple:  # type: ignore[type-arg]
+            return node.create_publisher(
+                kind,
+                topic.lstrip('/'),
+                SAMPLES,
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            )
+
+        self._link = publisher(JointState, LINK), JointState(name=list(arm.joints))
+        self._reference = publisher(JointState, REFERENCE), JointState(name=list(arm.joints))
+        self._imus = []
+        for link in arm.plant.robot.links:
+            message = Imu()
+            message.header.frame_id = link
+            message.orientation_covariance[0] = message.angular_velocity_covariance[0] = -1.0
+            self._imus.append((publisher(Imu, imu_topic(link)), message))
+
+    def publish(self, sample: LinkSample, stamp: TimeMessage) -> None:
+        """Publish a sample."""
+        for (publisher, message), q, dq in (
+            (self._link, sample.q, sample.dq),
+            (self._reference, sample.asked_q, sample.asked_dq),
+        ):
+            message.header.stamp = stamp
+            message.position = q.tolist()
+            message.velocity = dq.tolist()
+            publisher.publish(message)
+        for (publisher, message), felt in zip(
+            self._imus, sample.acceleration.tolist(), strict=True
+        ):
+            message.header.stamp = stamp
+            acceleration = message.linear_acceleration
+            acceleration.x, acceleration.y, acceleration.z = felt
+            publisher.publish(message)
 
 
 class SimulatedArmNode(ArmidNode):

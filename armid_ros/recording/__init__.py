@@ -16,13 +16,14 @@ from armid_ros.recording.joint_state.encoder import (
     write_recording,
 )
 from armid_ros.recording.mcap.recover import recover, RecoveryReport
-from armid_ros.recording.partner_motion import PartnerMotion
 from armid_ros.recording.qos import LATCHED, QosProfile
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import (
     given_twice,
+    PartnerMotion,
     PositionRange,
     ReadReport,
+    recorded_together,
     Recording,
     require_once,
     TimeGap,
@@ -30,7 +31,6 @@ from armid_ros.recording.recording import (
 from armid_ros.recording.settings import ReadSettings
 from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
-from armid_ros.recording.together import recorded_together
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
     read_joint_trajectory,

@@ -197,12 +197,6 @@ class Bag:
         return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
-def _by_number(file: Path) -> tuple[tuple[int, str], ...]:
-    """Return what sorts BAG_2.mcap before BAG_10.mcap."""
-    pieces = re.split(r'(\d+)', file.name)
-    return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
-
-
 def _storage_suffix(file: Path) -> str:
     """Return '.mcap', '.db3', or what else a file is called."""
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
@@ -238,4 +232,9 @@ def _files_of(path: Path) -> BagMetadata:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
             f'bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-    return BagMetadata(tuple(sorted(found, key=_by_number)))
+
+    def by_number(file: Path) -> tuple[tuple[int, str], ...]:
+        pieces = re.split(r'(\d+)', file.name)  # BAG_2.mcap is before BAG_10.mcap
+        return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
+
+    return BagMetadata(tuple(sorted(found, key=by_number)))

@@ -87,22 +87,27 @@ _ZSTD = _Zstd()
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     """Return what can be had of a frame that is cut off, at most a number of bytes."""
-    if compression == 'zstd':
-        decompressor = zstandard.ZstdDecompressor().decompressobj()
-    elif compression == 'lz4':
-        decompressor = lz4.frame.LZ4FrameDecompressor()
-    else:
+    if compression not in ('zstd', 'lz4'):
         return bytes(stored[:size])
     content = bytearray()
     try:
-        for at in range(0, len(stored), _PARTIAL_STEP):
-            # Compressors write blocks that stand on their own.
-            content += decompressor.decompress(bytes(stored[at : at + _PARTIAL_STEP]))
-            if len(content) >= size:
-                break
+        _decompress_into(content, stored, compression, size)
     except (*CORRUPT, EOFError):
         pass
     return bytes(content[:size])
+
+
+def _decompress_into(content: bytearray, data: _Buffer, compression: str, size: int) -> None:
+    """Append the content of a frame until it has a number of bytes, or more by one step."""
+    if compression == 'zstd':
+        decompressor = zstandard.ZstdDecompressor().decompressobj()
+    else:
+        decompressor = lz4.frame.LZ4FrameDecompressor()
+    for at in range(0, len(data), _PARTIAL_STEP):
+        # Compressors write blocks that stand on their own.
+        content += decompressor.decompress(bytes(data[at : at + _PARTIAL_STEP]))
+        if len(content) >= size:
+            break
 
 
 def unpacked(stream: BinaryIO) -> Iterator[bytes]:
@@ -137,13 +142,11 @@ def message_content(data: bytes, limit: int) -> bytes:
         It is damaged, or larger.
 
     """
-    decompressor = zstandard.ZstdDecompressor().decompressobj()
     content = bytearray()
     try:
-        for at in range(0, len(data), _PARTIAL_STEP):
-            content += decompressor.decompress(data[at : at + _PARTIAL_STEP])
-            if len(content) > limit:
-                raise RecordingError(f'a compressed message takes more than {limit} bytes')
+        _decompress_into(content, data, 'zstd', limit + 1)
     except (*CORRUPT, EOFError) as error:
         raise RecordingError(f'a compressed message is damaged: {error}') from error
+    if len(content) > limit:
+        raise RecordingError(f'a compressed message takes more than {limit} bytes')
     return bytes(content)

@@ -3,9 +3,9 @@
 """
 Definitions and hashes of ROS 2 message types, without ROS.
 
-The standard packages are known by heart (rosbags' store of Jazzy); others are looked up where an
-installed workspace keeps them, share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH, or given as
-text.
+The standard packages are those of rosbags' store of Jazzy; others are looked up where an installed
+workspace keeps them, share/PACKAGE/msg/TYPE.msg below AMENT_PREFIX_PATH and below the prefix of
+this Python, or given as text.
 
 """
 
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 import struct
+import sys
 from typing import Any
 
 from armid_ros.errors import RecordingError
@@ -124,7 +125,8 @@ def _register(
 
 def _installed(name: str, environment: Mapping[str, str]) -> str:
     """Return the text of an installed .msg file."""
-    prefixes = [p for p in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
+    listed = environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    prefixes = [prefix for prefix in (*listed, sys.prefix) if prefix]
     package, _, rest = name.partition('/')
     for prefix in prefixes:
         path = Path(prefix, 'share', package, rest + '.msg')
@@ -132,7 +134,7 @@ def _installed(name: str, environment: Mapping[str, str]) -> str:
             return path.read_text(encoding='utf-8')
     raise RecordingError(
         f'type {name} is not known: give its definition, or source the workspace that has '
-        f'{package} (looked below {", ".join(prefixes) or "an empty AMENT_PREFIX_PATH"})'
+        f'{package} (looked below {", ".join(prefixes)})'
     )
 
 

@@ -131,7 +131,12 @@ def read_metadata(bag: Path) -> BagMetadata:
             if len(set(names)) != len(names):
                 raise ValueError('relative_file_paths names a file twice')
             mode = str(information.get('compression_mode') or '').lower()
-            counts = _counts(information.get('topics_with_message_count'))
+            counts: dict[str, int] = {}
+            entries = information.get('topics_with_message_count')
+            for entry in entries if isinstance(entries, list) else ():
+                name, count = entry['topic_metadata']['name'], entry['message_count']
+                if isinstance(name, str) and isinstance(count, int):
+                    counts[name] = counts.get(name, 0) + count
     except RecordingError as error:
         raise RecordingError(
             f'{path}: no valid description of a bag ({str(error).lstrip(": ")}); move it away, '
@@ -146,13 +151,3 @@ def read_metadata(bag: Path) -> BagMetadata:
             f'{path}: names {", ".join(missing)}, which the bag does not have; it has {present}'
         )
     return BagMetadata(files, '' if mode == 'none' else mode, counts)
-
-
-def _counts(entries: Any) -> dict[str, int]:
-    """Return the number of messages by topic, of those entries that say it."""
-    counts: dict[str, int] = {}
-    for entry in entries if isinstance(entries, list) else ():
-        name, count = entry['topic_metadata']['name'], entry['message_count']
-        if isinstance(name, str) and isinstance(count, int):
-            counts[name] = counts.get(name, 0) + count
-    return counts

@@ -11,7 +11,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.conversion import joint_state_blocks
-from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
+from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
 from armid_ros.recording.reader import assemble, check_joints, choose_topics
 from armid_ros.recording.recording import Recording
 from armid_ros.recording.settings import DEFAULT, ReadSettings
@@ -66,7 +66,7 @@ def read_pieces(
             )
         decoder = JointStateDecoder(joints)
         where = f'{path}: {chosen.name}'
-        held: list[JointStates] = []
+        held: list[JointSamples] = []
         new = 0
 
         def made(damage: str = '') -> Recording:
@@ -84,7 +84,9 @@ def read_pieces(
         yield made(bag.damage), True
 
 
-def _parts(bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int) -> Iterator[JointStates]:
+def _parts(
+    bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int
+) -> Iterator[JointSamples]:
     """Yield the messages of a topic, so many at a time at most."""
     with reading(bag.path, RecordingError):
         for block in joint_state_blocks(bag, topic):
@@ -93,9 +95,11 @@ def _parts(bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int) -> Ite
                     yield states.select(slice(start, start + most))
 
 
-def _from(held: Sequence[JointStates], stamp: int, clock: str) -> Iterator[JointStates]:
+def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:
     """Yield what messages have from a stamp on."""
     for states in held:
-        late = (states.header if clock == 'header' else states.receive) >= stamp
+        stamps = states.stamps if clock == 'header' else states.receive
+        assert stamps is not None
+        late = stamps >= stamp
         if late.any():
             yield states.select(np.flatnonzero(late))

@@ -6,25 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 from armid_ros.files import load_yaml
+from rosbags.interfaces import QosDurability, QosHistory, QosLiveliness, QosReliability
 import yaml
 
+#: Duration without a limit [ns].
 INFINITE_NS = 9223372036 * 10**9 + 854775807
-
-# Positions are the integers of rmw/types.h, which metadata.yaml up to version 8 holds.
-_HISTORY = ('system_default', 'keep_last', 'keep_all', 'unknown')
-_RELIABILITY = ('system_default', 'reliable', 'best_effort', 'unknown', 'best_available')
-_DURABILITY = ('system_default', 'transient_local', 'volatile', 'unknown', 'best_available')
-_LIVELINESS = (
-    'system_default',
-    'automatic',
-    'manual_by_node',
-    'manual_by_topic',
-    'unknown',
-    'best_available',
-)
 
 
 @dataclass(frozen=True)
@@ -108,22 +98,24 @@ def parse_qos(profiles: str | Iterable[Mapping[str, Any]] | None) -> tuple[QosPr
 
 def _parse_profile(profile: Mapping[str, Any]) -> QosProfile:
     return QosProfile(
-        history=_parse_choice(profile.get('history'), _HISTORY),
+        history=_parse_choice(profile.get('history'), QosHistory),
         depth=int(profile.get('depth', 0)),
-        reliability=_parse_choice(profile.get('reliability'), _RELIABILITY),
-        durability=_parse_choice(profile.get('durability'), _DURABILITY),
+        reliability=_parse_choice(profile.get('reliability'), QosReliability),
+        durability=_parse_choice(profile.get('durability'), QosDurability),
         deadline_ns=_parse_duration(profile.get('deadline')),
         lifespan_ns=_parse_duration(profile.get('lifespan')),
-        liveliness=_parse_choice(profile.get('liveliness'), _LIVELINESS),
+        liveliness=_parse_choice(profile.get('liveliness'), QosLiveliness),
         lease_ns=_parse_duration(profile.get('liveliness_lease_duration')),
         avoid_ros_namespace_conventions=bool(profile.get('avoid_ros_namespace_conventions')),
     )
 
 
-def _parse_choice(value: object, choices: tuple[str, ...]) -> str:
-    if isinstance(value, int) and 0 <= value < len(choices):
-        return choices[value]
-    return value if isinstance(value, str) and value in choices else 'unknown'
+def _parse_choice(value: object, choices: type[Enum]) -> str:
+    """Return a policy by its name, or by its integer in rmw/types.h, as up to version 8."""
+    names = {one.value: one.name.lower() for one in choices}
+    if isinstance(value, int):
+        return names.get(value, 'unknown')
+    return value if isinstance(value, str) and value in names.values() else 'unknown'
 
 
 def _dump_duration(nanoseconds: int) -> dict[str, int]:

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.errors import nearest, RecordingError
@@ -13,28 +14,25 @@ from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
-from armid_ros.recording.joint_state.decoder import JointStateDecoder, JointStates
+from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
 from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.recording import Clock, PositionRange, ReadReport, Recording
+from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import (
     choose_clock,
     clock_problem,
-    gaps,
     gather,
-    JointSamples,
+    MAX_NOT_FINITE,
     merged,
     not_finite,
     ordered,
+    recorded,
 )
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray, Topic
-from armid_ros.recording.turns import unwrapped
+from armid_ros.recording.source import Topic
 import numpy as np
 
-# More samples than this part being not finite is no glitch but a fault of the recording.
-MAX_NOT_FINITE = 0.2
-_Samples = tuple[FloatArray, FloatArray | None, FloatArray | None, IntArray]
-# This many messages tell which joints a topic names.
+_QUANTITIES = ('position', 'velocity', 'effort')
+#: This many messages tell which joints a topic names.
 _PEEK_MESSAGES = 1000
 
 
@@ -86,38 +84,24 @@ def read_recording(
         name = ' + '.join(one.name for one in chosen)
         where = f'{path}: {name}'
         with reading(path, RecordingError):
-            pieces = list(_within(settings, where, _decoded(bag, chosen, decoder)))
+            pieces, size = [], 0
+            for one in chosen:
+                for block in joint_state_blocks(bag, one):
+                    for piece in decoder.decode(block):
+                        size += piece.nbytes
+                        settings.require(size, f'{where}: the recording')
+                        pieces.append(piece)
         damage = bag.damage
     check_joints(where, decoder, joints)
     with reading(where, RecordingError):
         return assemble(str(path), name, joints, pieces, decoder, damage)
 
 
-def _decoded(
-    bag: Bag, topics: Sequence[Topic], decoder: JointStateDecoder
-) -> Iterator[JointStates]:
-    """Yield the messages of topics as arrays."""
-    for topic in topics:
-        for block in joint_state_blocks(bag, topic):
-            yield from decoder.decode(block)
-
-
-def _within(
-    settings: ReadSettings, where: str, pieces: Iterable[JointStates]
-) -> Iterator[JointStates]:
-    """Yield arrays as long as they take no more memory than allowed."""
-    size = 0
-    for piece in pieces:
-        size += piece.nbytes
-        settings.require(size, f'{where}: the recording')
-        yield piece
-
-
 def assemble(
     path: str,
     topic: str,
     joints: tuple[str, ...],
-    pieces: list[JointStates],
+    pieces: list[JointSamples],
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
@@ -126,62 +110,54 @@ def assemble(
     counts: Counter[str] = Counter()
     gathered = gather(pieces)
     pieces.clear()
-    clock, note = _usable_clock(where, gathered)
-    series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
-    q, dq, tau, absent = _measured_quantities(where, series)
-    kept, culprits = _finite(where, joints, series.stamps, (q, dq, tau), counts)
-    q, dq, tau, stamps = kept
-    if len(stamps) < 2:
-        dropped = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
-        raise RecordingError(
-            f'{where}: {len(stamps)} samples are left of {decoder.messages} messages '
-            f'({", ".join(dropped) or "the bag is too short"})'
-        )
-    t = (stamps - stamps[0]) * 1e-9
-    q, wrapped = unwrapped(q)
-    if damage:
-        read = f'{decoder.messages} messages over {t[-1]:.4g} s could be read'
-        damage = f'of a damaged bag {read}: {damage}'
-    report = ReadReport(
-        messages=decoder.messages,
-        samples=len(stamps),
-        malformed=decoder.malformed,
-        not_finite=culprits,
-        gaps=gaps(t),
-        absent=absent,
-        unwrapped=tuple(joints[k] for k in wrapped),
-        clock_note=note,
-        damage=damage,
-        **counts,
-    )
-    for array in (t, q, dq, tau):
-        if array is not None:
-            array.setflags(write=False)  # nobody else has it, so that it need not be copied
-    return Recording(
-        joints=joints,
-        t=t,
-        q=q,
-        dq=dq,
-        tau=tau,
-        start_ns=int(stamps[0]),
-        source=path,
-        topic=topic,
-        clock=clock,
-        report=report,
-        others=tuple(PositionRange(name, *ends) for name, ends in decoder.others.items()),
-    )
-
-
-def _usable_clock(where: str, gathered: Sequence[JointStates]) -> tuple[Clock, str]:
-    """Return whose time to use, and why not the header's; refuse a recording without a time."""
     clock, note = choose_clock(gathered)
     for states in gathered if clock == 'receive' else ():
-        problem = clock_problem(states.receive, states.position)
+        assert states.receive is not None
+        problem = clock_problem(states.receive, states.values[0])
         if problem:
             raise RecordingError(
                 f'{where} has no usable time: {note}, and receive times {problem}'
             )
-    return clock, note
+    series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
+    quantities, absent = _measured_quantities(where, series)
+    bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))
+    dropped = int(bad.sum())
+    if dropped > MAX_NOT_FINITE * len(series):
+        raise RecordingError(
+            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
+        )
+    counts['nan'] += dropped
+    samples = JointSamples(joints, series.stamps, quantities)
+    samples = samples.select(~bad) if dropped else samples
+    stamps = samples.stamps
+    if len(stamps) < 2:
+        lost = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
+        raise RecordingError(
+            f'{where}: {len(stamps)} samples are left of {decoder.messages} messages '
+            f'({", ".join(lost) or "the bag is too short"})'
+        )
+    if damage:
+        length = (stamps[-1] - stamps[0]) * 1e-9
+        read = f'{decoder.messages} messages over {length:.4g} s could be read'
+        damage = f'of a damaged bag {read}: {damage}'
+    met = {
+        **counts,
+        'messages': decoder.messages,
+        'malformed': decoder.malformed,
+        'not_finite': culprits,
+        'absent': absent,
+        'clock_note': note,
+        'damage': damage,
+    }
+    return recorded(
+        samples,
+        met,
+        start_ns=int(stamps[0]),
+        source=path,
+        topic=topic,
+        clock=clock,
+        others=tuple(PositionRange(name, *ends) for name, ends in decoder.others.items()),
+    )
 
 
 def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:
@@ -242,6 +218,23 @@ def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
     return decoder.names_seen
 
 
+def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
+    """
+    Return the topics of a bag, with the joints that those of JointState name.
+
+    Raises
+    ------
+    RecordingError
+        There is no bag that can be read.
+
+    """
+    with Bag(path, settings) as bag:
+        return tuple(
+            replace(topic, joints=named_joints(bag, topic)) if holds_joint_state(topic) else topic
+            for topic in bag.topics()
+        )
+
+
 def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) -> None:
     """Refuse a topic that does not name all joints, or nothing at all."""
     if not decoder.messages:
@@ -268,11 +261,11 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
 
 def _measured_quantities(
     where: str, series: JointSamples
-) -> tuple[FloatArray, FloatArray | None, FloatArray | None, tuple[str, ...]]:
+) -> tuple[tuple[FloatArray | None, ...], tuple[str, ...]]:
     """Tell quantities that were measured from those never filled in."""
     absent: list[str] = []
     kept: list[FloatArray | None] = []
-    for name, values in zip(('position', 'velocity', 'effort'), series.values, strict=True):
+    for name, values in zip(_QUANTITIES, series.values, strict=True):
         if values is None:
             lacking = list(series.joints)
         else:
@@ -283,30 +276,6 @@ def _measured_quantities(
             everyone = len(lacking) == len(series.joints)
             absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
         kept.append(None if lacking else values)
-    q, dq, tau = kept
-    if q is None:
+    if kept[0] is None:
         raise RecordingError(f'{where} has no {absent[0]}')
-    return q, dq, tau, tuple(absent)
-
-
-def _finite(
-    where: str,
-    joints: Sequence[str],
-    stamps: IntArray,
-    values: tuple[FloatArray, FloatArray | None, FloatArray | None],
-    counts: Counter[str],
-) -> tuple[_Samples, tuple[str, ...]]:
-    """Drop samples with a value that is not finite, and say whose; refuse when they are many."""
-    names = ('position', 'velocity', 'effort')
-    bad, culprits = not_finite(joints, zip(names, values, strict=True), len(stamps))
-    if not culprits:
-        return (*values, stamps), ()
-    dropped = int(bad.sum())
-    if dropped > MAX_NOT_FINITE * len(stamps):
-        raise RecordingError(
-            f'{where}: {dropped} of {len(stamps)} samples are not finite ({"; ".join(culprits)})'
-        )
-    counts['nan'] += dropped
-    q, dq, tau = (None if array is None else array[~bad] for array in values)
-    assert q is not None
-    return (q, dq, tau, stamps[~bad]), culprits
+    return tuple(kept), tuple(absent)

@@ -16,6 +16,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.conversion import is_plain
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import Topic
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.writer import whole_bag
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
@@ -99,37 +100,23 @@ def copy_renamed(
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     names: dict[str, str] = {}
-    counts: dict[str, int] = {}
+
+    def change(topic: Topic, cdr: bytes) -> bytes:
+        if topic.type_name != JOINT_STATE:
+            return cdr
+        return _with_names(store, store.deserialize_cdr(cdr, JOINT_STATE), rename, names)
+
     with Bag(path, settings) as bag, whole_bag(out) as writer:
-        topics = {topic.name: topic for topic in bag.topics()}
-        for topic in topics.values():
-            described = topic.message_type
+        for topic in bag.topics():
             if topic.type_name == JOINT_STATE and not is_plain(topic):
                 raise RecordingError(
                     f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
                     'changed; give --rename to the command that reads the bag'
                 )
-            writer.add_topic(
-                topic.name,
-                topic.type_name,
-                qos=topic.qos,
-                definition=described.definition or None,
-                type_hash=described.type_hash or None,
-                encoding='ros2idl' if described.encoding == 'ros2idl' else 'ros2msg',
-            )
-        for message in bag.messages():
-            name = message.topic
-            cdr = bytes(message.cdr)
-            if topics[name].type_name == JOINT_STATE:
-                cdr = _with_names(store, store.deserialize_cdr(cdr, JOINT_STATE), rename, names)
-            writer.write(name, cdr, message.log_time_ns, message.publish_time_ns)
-            counts[name] = counts.get(name, 0) + 1
+        writer.copy(bag, change)
         damage = bag.damage
-    return Copied(
-        tuple((name, topic.type_name, counts.get(name, 0)) for name, topic in topics.items()),
-        renamed=_changed(names),
-        damage=damage,
-    )
+    topics = tuple((topic.name, topic.type_name, topic.count) for topic in writer.topics)
+    return Copied(topics, renamed=_changed(names), damage=damage)
 
 
 def _copy_ros1(path: Path, reader: Reader, out: Path, rename: Sequence[tuple[str, str]]) -> Copied:

@@ -14,13 +14,15 @@ stamps exactly and are interpolated linearly between stamps, but not over their 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence, Sized
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from armid_ros.motion import FloatArray
-from armid_ros.recording.joint_state.decoder import JointStates
-from armid_ros.recording.recording import Clock, TimeGap
+from armid_ros.recording.joint_state.decoder import JointSamples
+from armid_ros.recording.recording import Clock, ReadReport, Recording, TimeGap
 from armid_ros.recording.source import IntArray
+from armid_ros.recording.turns import unwrapped
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
@@ -38,6 +40,8 @@ GAP_PERIODS = 5.0
 LARGEST = 1e15
 # A torque that varies by less is none: memory that nobody wrote to [N m].
 NOTHING = 1e-9
+#: More samples than this part being not finite is no glitch but a fault of the recording.
+MAX_NOT_FINITE = 0.2
 # Beyond these fractions of the messages the header's clock is not believed.
 _MAX_ZERO = 0.01
 _MAX_REPEATED = 0.5
@@ -45,55 +49,22 @@ _MAX_BACKWARD = 0.1
 _MAX_SPAN_RATIO = 1000.0
 
 
-@dataclass(frozen=True)
-class JointSamples:
-    """
-    Samples of some joints; arrays of shape (N,) and (N, k), NaN where nothing was measured.
-
-    Attributes
-    ----------
-    joints : tuple of str
-        k names.
-    stamps : ndarray, shape (N,)
-        Time stamps [ns].
-    values : ndarray, shape (3, N, k), as a tuple of three
-        Positions, velocities, efforts; None for a quantity no message has.
-
-    """
-
-    joints: tuple[str, ...]
-    stamps: IntArray
-    values: tuple[FloatArray | None, FloatArray | None, FloatArray | None]
-
-    def __len__(self) -> int:
-        """Return the number of samples N."""
-        return len(self.stamps)
-
-    def select(
-        self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice
-    ) -> JointSamples:
-        """Return some of the samples."""
-        q, dq, tau = (None if v is None else v[samples] for v in self.values)
-        return JointSamples(self.joints, self.stamps[samples], (q, dq, tau))
-
-    def columns(self, joints: Sequence[str]) -> JointSamples:
-        """Return some of the joints."""
-        if tuple(joints) == self.joints:
-            return self
-        chosen = [self.joints.index(joint) for joint in joints]
-        q, dq, tau = (None if v is None else v[:, chosen] for v in self.values)
-        return JointSamples(tuple(joints), self.stamps, (q, dq, tau))
-
-
-def gather(pieces: Sequence[JointStates]) -> list[JointStates]:
+def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
     """Put pieces that name the same joints together, each in the order of storage."""
-    by_joints: dict[tuple[str, ...], list[JointStates]] = {}
+    by_joints: dict[tuple[str, ...], list[JointSamples]] = {}
     for piece in pieces:
         by_joints.setdefault(piece.joints, []).append(piece)
-    return [_concatenated(joints, parts) for joints, parts in by_joints.items()]
+    gathered = []
+    for parts in by_joints.values():
+        whole = _concatenated(parts)
+        number = whole.number
+        if number is not None and not (np.diff(number) > 0).all():
+            whole = whole.select(np.argsort(number, kind='stable'))
+        gathered.append(whole)
+    return gathered
 
 
-def choose_clock(gathered: Sequence[JointStates]) -> tuple[Clock, str]:
+def choose_clock(gathered: Sequence[JointSamples]) -> tuple[Clock, str]:
     """
     Decide whose time to use.
 
@@ -106,7 +77,7 @@ def choose_clock(gathered: Sequence[JointStates]) -> tuple[Clock, str]:
 
     """
     for states in gathered:
-        problem = clock_problem(states.header, states.position, states.receive)
+        problem = clock_problem(states.stamps, states.values[0], states.receive)
         if problem:
             return 'receive', f'header stamps {problem}'
     return 'header', ''
@@ -144,31 +115,24 @@ def clock_problem(
     return ''
 
 
-def ordered(states: JointStates, clock: Clock, counts: Counter[str]) -> JointSamples:
-    """Return the messages as samples in order of time, counting what had to be done for it."""
-    stamps = states.header if clock == 'header' else states.receive
-    series = JointSamples(states.joints, stamps, (states.position, states.velocity, states.effort))
-    stamped = stamps != 0
+def ordered(samples: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
+    """Return messages in order of time, counting what had to be done for it."""
+    if clock == 'receive':
+        assert samples.receive is not None
+        samples = replace(samples, stamps=samples.receive)
+    stamped = samples.stamps != 0
     if not stamped.all():
         counts['unstamped'] += int((~stamped).sum())
-        series = series.select(stamped)
-    return longest_in_order(series, counts)
-
-
-def _strays(stamps: IntArray) -> npt.NDArray[np.bool_]:
-    """Return which stamps are far from those of the messages before and after, (N,)."""
-    if len(stamps) < _AROUND or not (np.abs(np.diff(stamps)) > RESTART_NS).any():
-        return np.zeros(len(stamps), dtype=np.bool_)
-    around = median_filter(stamps, _AROUND, mode='mirror')
-    return np.asarray(
-        np.abs(stamps - around) > RESTART_NS + 2 * np.median(np.abs(np.diff(stamps)))
-    )
+        samples = samples.select(stamped)
+    return longest_in_order(samples, counts)
 
 
 def longest_in_order(series: JointSamples, counts: Counter[str]) -> JointSamples:
     """Return the longest stretch between restarts of the clock, in order of time."""
-    stray = _strays(series.stamps)
-    if stray.any():
+    steps = np.abs(np.diff(series.stamps))
+    if len(series) >= _AROUND and (steps > RESTART_NS).any():
+        around = median_filter(series.stamps, _AROUND, mode='mirror')
+        stray = np.abs(series.stamps - around) > RESTART_NS + 2 * np.median(steps)
         counts['unstamped'] += int(stray.sum())
         series = series.select(~stray)
     run = longest_run(series.stamps)
@@ -223,10 +187,14 @@ def merged(
     for joint in joints:
         key = tuple(i for i, one in enumerate(series) if joint in one.joints)
         holders.setdefault(key, []).append(joint)
-    groups = [
-        _union([series[i].columns(names) for i in key], counts) for key, names in holders.items()
-    ]
-    groups = [group for group in groups if len(group)]
+    groups = []
+    for key, names in holders.items():
+        group = _concatenated([series[i].columns(names) for i in key])
+        if len(key) > 1:
+            order = np.argsort(group.stamps, kind='stable')
+            group = _sorted(group.select(order), counts)
+        if len(group):
+            groups.append(group)
     if len(groups) == 1 and len(groups[0].joints) == len(joints):
         return groups[0].columns(joints)
     base = max(groups, key=len)
@@ -241,45 +209,40 @@ def merged(
     counts['incomplete'] += int((~known).sum())
     counts['merged'] += int(known.sum())
     counts['interpolated'] += int((known & ~exact).sum())
-    q, dq, tau = (
-        _side_by_side([part.values[field] for part in parts], parts) for field in range(3)
+    values = tuple(
+        _stacked([part.values[field] for part in parts], parts, axis=1) for field in range(3)
     )
-    together = JointSamples(
-        tuple(n for part in parts for n in part.joints), base.stamps, (q, dq, tau)
-    )
+    together = JointSamples(tuple(n for part in parts for n in part.joints), base.stamps, values)
     return together.columns(joints).select(known)
 
 
-def _concatenated(joints: tuple[str, ...], parts: Sequence[JointStates]) -> JointStates:
+def _concatenated(parts: Sequence[JointSamples]) -> JointSamples:
+    """Put samples of the same joints behind each other."""
     if len(parts) == 1:
         return parts[0]
-    number = np.concatenate([part.number for part in parts])
-    whole = JointStates(
-        joints,
-        number,
-        np.concatenate([part.header for part in parts]),
-        np.concatenate([part.receive for part in parts]),
-        _stacked([part.position for part in parts], parts, len(joints)),
-        _stacked([part.velocity for part in parts], parts, len(joints)),
-        _stacked([part.effort for part in parts], parts, len(joints)),
+    values = tuple(_stacked([part.values[field] for part in parts], parts) for field in range(3))
+    receive, number = (
+        np.concatenate([one for one in arrays if one is not None])
+        if all(one is not None for one in arrays)
+        else None
+        for arrays in ([part.receive for part in parts], [part.number for part in parts])
     )
-    if (np.diff(number) > 0).all():
-        return whole
-    return whole.select(np.argsort(number, kind='stable'))
+    stamps = np.concatenate([part.stamps for part in parts])
+    return JointSamples(parts[0].joints, stamps, values, receive, number)
 
 
 def _stacked(
-    arrays: Sequence[FloatArray | None], parts: Sequence[Sized], k: int
+    arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples], axis: int = 0
 ) -> FloatArray | None:
-    """Concatenate along time, NaN for what is missing."""
+    """Concatenate along time or along joints, NaN for what is missing."""
     if all(values is None for values in arrays):
         return None
     whole = [
-        np.full((len(part), k), np.nan) if values is None else values
+        np.full((len(part), len(part.joints)), np.nan) if values is None else values
         for values, part in zip(arrays, parts, strict=True)
     ]
-    together = _adjacent(whole)
-    return np.concatenate(whole) if together is None else together
+    together = None if axis else _adjacent(whole)
+    return np.concatenate(whole, axis=axis) if together is None else together
 
 
 def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
@@ -299,21 +262,6 @@ def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
     row = whole.strides[0]
     begin = whole.ctypes.data
     return whole[(first - begin) // row : (at - begin) // row]
-
-
-def _side_by_side(
-    arrays: Sequence[FloatArray | None], parts: Sequence[JointSamples]
-) -> FloatArray | None:
-    """Concatenate along joints, NaN for what is missing."""
-    if all(values is None for values in arrays):
-        return None
-    return np.concatenate(
-        [
-            np.full((len(part), len(part.joints)), np.nan) if values is None else values
-            for values, part in zip(arrays, parts, strict=True)
-        ],
-        axis=1,
-    )
 
 
 def longest_run(stamps: IntArray) -> slice | None:
@@ -365,19 +313,6 @@ def _sorted(series: JointSamples, counts: Counter[str]) -> JointSamples:
     return series if first.all() else series.select(first)
 
 
-def _union(parts: Sequence[JointSamples], counts: Counter[str]) -> JointSamples:
-    """Put series of the same joints together."""
-    if len(parts) == 1:
-        return parts[0]
-    joints = parts[0].joints
-    q, dq, tau = (
-        _stacked([part.values[field] for part in parts], parts, len(joints)) for field in range(3)
-    )
-    together = JointSamples(joints, np.concatenate([part.stamps for part in parts]), (q, dq, tau))
-    order = np.argsort(together.stamps, kind='stable')
-    return _sorted(together.select(order), counts)
-
-
 def _resampled(
     series: JointSamples, stamps: IntArray
 ) -> tuple[JointSamples, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -394,10 +329,40 @@ def _resampled(
     inside = (own[before] <= stamps) & (own[after] >= stamps)
     valid = equal | (inside & (width <= GAP_PERIODS * period))
     weight = np.where(equal, 0.0, (stamps - own[before]) / np.maximum(width, 1))[:, np.newaxis]
-    q, dq, tau = (
+    values = tuple(
         None if v is None else v[before] + weight * (v[after] - v[before]) for v in series.values
     )
-    return JointSamples(series.joints, stamps, (q, dq, tau)), valid, equal
+    return JointSamples(series.joints, stamps, values), valid, equal
+
+
+def recorded(samples: JointSamples, met: Mapping[str, Any], **about: Any) -> Recording:
+    """
+    Make a recording of samples in order of time, positions continuous over whole turns.
+
+    Parameters
+    ----------
+    samples : JointSamples
+        Two or more; nobody else has their arrays.
+    met : mapping of str to value
+        What was met so far, by attribute of the report.
+    **about
+        Other attributes of the recording.
+
+    """
+    q, dq, tau = samples.values
+    assert q is not None
+    q, wrapped = unwrapped(q)
+    t = (samples.stamps - samples.stamps[0]) * 1e-9
+    for array in (t, q, dq, tau):
+        if array is not None:
+            array.setflags(write=False)  # so that it need not be copied
+    report = ReadReport(
+        **met,
+        samples=len(samples),
+        gaps=gaps(t),
+        unwrapped=tuple(samples.joints[k] for k in wrapped),
+    )
+    return Recording(joints=samples.joints, t=t, q=q, dq=dq, tau=tau, report=report, **about)
 
 
 def gaps(t: FloatArray) -> tuple[TimeGap, ...]:

@@ -42,6 +42,8 @@ class Topic:
         Number of messages.
     encoding : str
         How messages are serialised: 'cdr' in ROS 2.
+    joints : tuple of str
+        Joints that its first messages name, as far as `bag_contents` has looked.
 
     """
 
@@ -50,6 +52,7 @@ class Topic:
     qos: tuple[QosProfile, ...] = ()
     count: int = 0
     encoding: str = 'cdr'
+    joints: tuple[str, ...] = ()
 
     @property
     def type_name(self) -> str:

@@ -19,17 +19,6 @@ def string_cdr(text: str) -> bytes:
     return b'\x00\x01\x00\x00' + struct.pack('<I', len(content)) + content
 
 
-def parse_string(cdr: bytes) -> str | None:
-    """Return the text of a std_msgs/String; None if the bytes are none."""
-    order = BYTE_ORDERS.get(cdr[:2])
-    if order is None or len(cdr) < 8:
-        return None
-    (length,) = struct.unpack_from(order + 'I', cdr, 4)
-    if length > len(cdr) - 8:
-        return None
-    return cdr[8 : 8 + length].rstrip(b'\0').decode('utf-8', 'replace')
-
-
 def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
     """
     Return the robot description a bag holds.
@@ -59,8 +48,13 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
             if topic.type_name != STRING or not topic.name.endswith('robot_description'):
                 continue
             for block in bag.blocks(topic.name):
-                text = parse_string(block.message(len(block) - 1))
-                if text:
+                cdr = block.message(len(block) - 1)
+                order = BYTE_ORDERS.get(cdr[:2])
+                if order is None or len(cdr) < 8:
+                    continue
+                (length,) = struct.unpack_from(order + 'I', cdr, 4)
+                text = cdr[8 : 8 + length].rstrip(b'\0').decode('utf-8', 'replace')
+                if text and length <= len(cdr) - 8:
                     texts[topic.name] = text
     if len(set(texts.values())) > 1:
         raise RecordingError(

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 import os
 from pathlib import Path
 import shutil
@@ -25,7 +26,7 @@ from armid_ros.recording.mcap.writer import Compression, McapWriter, message_rec
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
 from armid_ros.recording.qos import dump_qos_text, QosProfile
-from armid_ros.recording.source import IntArray, Topic
+from armid_ros.recording.source import IntArray, Source, Topic
 from armid_ros.version import __version__
 from mcap.opcode import Opcode
 import numpy as np
@@ -331,6 +332,33 @@ class BagWriter:
             waiting, offsets = _joined(self._open_records())
             more = len(waiting) + np.arange(len(some), dtype=np.int64) * record.itemsize
             self._mcap.write_chunk(waiting + records.tobytes(), np.concatenate([offsets, more]))
+
+    def copy(self, source: Source, change: Callable[[Topic, bytes], bytes] | None = None) -> None:
+        """
+        Write all topics and messages of a source, with types, QoS and times as they are.
+
+        Parameters
+        ----------
+        source : Source
+            A bag, or one of its files.
+        change : callable, optional
+            Returns what is written in place of a message, given its topic and CDR.
+
+        """
+        topics = {topic.name: topic for topic in source.topics()}
+        for topic in topics.values():
+            kept = topic.message_type
+            add = partial(
+                self.add_topic, topic.name, kept.name, qos=topic.qos, encoding=kept.encoding
+            )
+            text, digest = kept.definition, kept.type_hash
+            try:  # what the source does not describe is looked up
+                add(definition=text or None, type_hash=digest or None)
+            except RecordingError:
+                add(definition=text, type_hash=digest)
+        for message in source.messages():
+            cdr = message.cdr if change is None else change(topics[message.topic], message.cdr)
+            self.write(message.topic, cdr, message.log_time_ns, message.publish_time_ns)
 
     def flush(self) -> None:
         """Write out what is in memory; for a timer, should messages stop coming."""

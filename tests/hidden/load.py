@@ -12,8 +12,9 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.hidden.arrays import FloatArray, named_body, Parameter
+from tests.hidden.arrays import named_body, Parameter
 from tests.hidden.base import HiddenEffect, InJoint, Live, OneJoint, pick, Setting
+from tests.hidden.lived.chain import body_vector
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class _Ball(InJoint):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        values = body_parameters(self.mass, np.array(self.centre), self.inertia * np.eye(3))
+        values = body_vector(self.mass, np.array(self.centre), self.inertia * np.eye(3))
         return named_body(self.label, self.joint, values)
 
     def edit(self, spec: mujoco.MjSpec, robot: Robot) -> None:
@@ -137,12 +138,6 @@ def _centre(rng: np.random.Generator) -> tuple[float, float, float]:
     """Draw a place 0.1 m from the frame of a joint."""
     direction = rng.normal(size=3)
     return tuple((0.1 * direction / np.linalg.norm(direction)).tolist())
-
-
-def body_parameters(mass: float, centre: FloatArray, inertia: FloatArray) -> FloatArray:
-    """Return mass, first moments and inertia about the frame's origin, shape (10,)."""
-    about = inertia + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    return np.concatenate([[mass], mass * centre, about[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
 
 
 LOAD = (Payload, LinkInertia, GravityMagnitude, BaseTilt, RotorInertia)

@@ -39,20 +39,13 @@ def workspace(root, tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope='module')
-def install(workspace):
-    """Build the workspace."""
-    run(['colcon', 'build'], workspace)
-    return workspace / 'install'
-
-
-@pytest.fixture(scope='module')
-def linked_install(workspace, tmp_path_factory):
-    """Build armid_ros alone with links into the source tree, as developers do."""
-    folder = tmp_path_factory.mktemp('linked_workspace')
+@pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=['copied', 'linked'])
+def install(request, workspace, tmp_path_factory):
+    """Build armid_ros alone; its messages are in the environment, of the same CMakeLists.txt."""
+    folder = tmp_path_factory.mktemp('package')
     (folder / 'src').mkdir()
     (folder / 'src' / 'armid_ros').symlink_to(workspace / 'src' / 'armid_ros')
-    run(['colcon', 'build', '--symlink-install'], folder)
+    run(['colcon', 'build', *request.param], folder)
     return folder / 'install'
 
 
@@ -63,12 +56,8 @@ def test_both_packages_are_found_messages_first(workspace):
     assert run(listed, workspace / 'src' / 'armid_ros').split() == ['armid_msgs', 'armid_ros']
 
 
-@pytest.mark.parametrize(
-    'built', ['install', pytest.param('linked_install', marks=pytest.mark.long)]
-)
-def test_build_installs_what_ros2_looks_for(built, root, request):
+def test_build_installs_what_ros2_looks_for(install, root, request):
     """Marker, manifest and executables, without one of the scripts being lost or added."""
-    install = request.getfixturevalue(built)
     share = install / 'armid_ros' / 'share'
     assert (share / 'ament_index' / 'resource_index' / 'packages' / 'armid_ros').is_file()
     assert (share / 'armid_ros' / 'package.xml').is_file()
@@ -76,14 +65,19 @@ def test_build_installs_what_ros2_looks_for(built, root, request):
     executables = {path.name for path in libexec.iterdir() if os.access(path, os.X_OK)}
     assert executables == {path.name for path in (root / 'scripts').iterdir()}
     first = {(libexec / name).read_text().partition('\n')[0] for name in executables}
-    if built == 'install':  # the Python of the active environment, which has what pip installed
+    if (
+        'copied' in request.node.name
+    ):  # the Python of the active environment, which has what pip installed
         assert first <= {'#!/usr/bin/env python3', '#!/bin/sh'}
 
 
-def test_sourced_workspace_is_what_python_imports(install):
+@pytest.mark.long
+def test_sourced_workspace_is_what_python_imports(workspace):
     """Package and compiled messages come from the workspace, not from the environment."""
+    run(['colcon', 'build'], workspace)
+    install = workspace / 'install'
     code = 'import armid_ros, armid_msgs.msg as m; print(armid_ros.__file__, m.__file__)'
     use = 'from rclpy.serialization import serialize_message as s; s(m.ParameterEstimate())'
-    output = run(['sh', '-c', f'. install/setup.sh && python -c "{code}; {use}"'], install.parent)
+    output = run(['sh', '-c', f'. install/setup.sh && python -c "{code}; {use}"'], workspace)
     for path in output.split():
         assert Path(path).is_relative_to(install)

@@ -10,23 +10,8 @@ import sysconfig
 
 import pytest
 
-LOCKS = {
-    'build': ['build'],
-    'run': ['run', 'ros'],
-    'test': ['test', 'convert', 'docs', 'fleet', 'residual', 'mujoco', 'view', 'run', 'ros'],
-    'bench': [
-        'bench',
-        'test',
-        'convert',
-        'docs',
-        'fleet',
-        'residual',
-        'mujoco',
-        'view',
-        'run',
-        'ros',
-    ],
-}
+TESTS = ['test', 'convert', 'docs', 'fleet', 'residual', 'mujoco', 'view', 'run', 'ros']
+LOCKS = {'build': ['build'], 'run': ['run', 'ros'], 'test': TESTS, 'bench': ['bench', *TESTS]}
 
 
 def normal(name):

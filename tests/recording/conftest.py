@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A swinging arm's recording, and bags made message by message."""
 
+import sqlite3
+
 from armid_ros.recording import BagWriter, joint_state_cdr, Recording
 from armid_ros.recording.message_types import JOINT_STATE
 import numpy as np
@@ -24,6 +26,25 @@ def swing(samples=500, joints=JOINTS, period_ns=PERIOD_NS, start_ns=START_NS):
         tau=10 * np.cos(np.outer(t, rates) + 0.2),
         start_ns=start_ns,
     )
+
+
+def sqlite_bag(path, messages, columns=', offered_qos_profiles TEXT'):
+    """Write messages of one topic into a database as rosbag2 does; return it open."""
+    database = sqlite3.connect(path)
+    database.executescript(
+        'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, '
+        f'serialization_format TEXT{columns});'
+        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
+        'data BLOB);'
+    )
+    row = (1, messages[0][0], JOINT_STATE, 'cdr') + (('',) if columns else ())
+    database.execute(f'INSERT INTO topics VALUES ({",".join("?" * len(row))})', row)
+    database.executemany(
+        'INSERT INTO messages(topic_id, timestamp, data) VALUES (1, ?, ?)',
+        [(time, cdr) for _, cdr, time in messages],
+    )
+    database.commit()
+    return database
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 import yaml
 
-JOINTS = ('shoulder', 'elbow', 'wrist')
+from .conftest import JOINTS, sqlite_bag
 
 
 @pytest.fixture
@@ -127,27 +127,10 @@ def test_two_publishers_recorded_as_two_channels_are_one_topic(
 
 @pytest.mark.parametrize('columns', ['', ', offered_qos_profiles TEXT NOT NULL'])
 def test_sqlite_files_of_the_first_distributions_are_read(
-    swinging, stamps, tmp_path, assert_same, columns
+    swinging, stamps, messages_of, tmp_path, assert_same, columns
 ):
     path = tmp_path / 'old.db3'
-    messages = joint_state_cdr(JOINTS, stamps, swinging.q, swinging.dq, swinging.tau)
-    database = sqlite3.connect(path)
-    database.execute(
-        'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, '
-        f'serialization_format TEXT NOT NULL{columns})'
-    )
-    database.execute(
-        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, '
-        'timestamp INTEGER NOT NULL, data BLOB NOT NULL)'
-    )
-    row = (1, '/joint_states', JOINT_STATE, 'cdr') + (('',) if columns else ())
-    database.execute(f'INSERT INTO topics VALUES ({",".join("?" * len(row))})', row)
-    database.executemany(
-        'INSERT INTO messages (topic_id, timestamp, data) VALUES (1, ?, ?)',
-        zip(stamps.tolist(), messages, strict=True),
-    )
-    database.commit()
-    database.close()
+    sqlite_bag(path, messages_of(swinging, stamps), columns).close()
     before = path.read_bytes()
     recording = read_recording(path, joints=JOINTS)
     assert_same(recording, swinging)

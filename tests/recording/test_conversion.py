@@ -6,9 +6,9 @@ import json
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording
-from armid_ros.recording.contents import bag_contents
 from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE, message_type
+from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.ros1 import copy_renamed
 from mcap.writer import Writer as McapFileWriter
 import numpy as np

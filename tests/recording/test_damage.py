@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nothing damaged passes for data: it is left out, and said with its time."""
 
-import sqlite3
 import struct
 
 from armid_ros.errors import RecordingError
@@ -12,7 +11,7 @@ from armid_ros.recording.mcap.records import map_file, MESSAGE
 import numpy as np
 import pytest
 
-JOINTS = ('shoulder', 'elbow', 'wrist')
+from .conftest import JOINTS, sqlite_bag
 
 
 @pytest.fixture(params=['none', 'zstd', 'lz4'])
@@ -35,7 +34,7 @@ def change(path, at, value=None):
     path.write_bytes(content)
 
 
-def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag):
+def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag, tmp_path):
     recording, path = bag
     chunk = chunks_of(path)[2]
     change(path, chunk.end - 40)
@@ -49,6 +48,11 @@ def test_a_damaged_chunk_is_left_out_and_said_with_its_time(bag):
     assert 0 < left.sum() < 300
     np.testing.assert_array_equal(got.q, recording.q[left])
     assert len(list(iter_raw(path))) == left.sum()
+    report = recover(path, tmp_path / 'out')
+    assert 'chunk at byte' in report.damage and report.messages == left.sum()
+    again = read_recording(tmp_path / 'out', joints=JOINTS)
+    np.testing.assert_array_equal(again.tau, recording.tau[left])
+    assert again.report.damage == ''
 
 
 def test_checksums_are_not_compared_for_who_does_not_want_it(make_swing, tmp_path):
@@ -147,30 +151,13 @@ def test_a_message_logged_after_2262_is_left_out_and_said(make_swing, tmp_path):
         assert len(read_recording(path, joints=JOINTS)) == 299
 
 
-def sqlite_bag(path, recording, messages):
-    database = sqlite3.connect(path)
-    database.executescript(
-        'CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, '
-        'serialization_format TEXT, offered_qos_profiles TEXT);'
-        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
-        'data BLOB);'
-        "INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr', '');"
-    )
-    database.executemany(
-        'INSERT INTO messages(topic_id, timestamp, data) VALUES (1, ?, ?)',
-        [(time, cdr) for _, cdr, time in messages],
-    )
-    database.commit()
-    return database
-
-
 @pytest.mark.parametrize('value', ['NULL', "'text'", '3.5', "CAST(x'ff' AS TEXT)"])
 @pytest.mark.parametrize('column', ['timestamp', 'data', 'topic_id'])
 def test_rows_that_are_no_messages_are_left_out_and_said(
     swinging, stamps, messages_of, tmp_path, column, value
 ):
     path = tmp_path / 'bag.db3'
-    with sqlite_bag(path, swinging, messages_of(swinging, stamps)) as database:
+    with sqlite_bag(path, messages_of(swinging, stamps)) as database:
         database.execute(f'UPDATE messages SET {column} = {value} WHERE id = 10')
     got = read_recording(path, joints=JOINTS)
     assert len(got) == 499 and '1 rows of messages have no' in got.report.damage
@@ -185,7 +172,7 @@ def test_topics_that_are_no_texts_are_refused_or_read(
     swinging, stamps, messages_of, tmp_path, column, value
 ):
     path = tmp_path / 'bag.db3'
-    with sqlite_bag(path, swinging, messages_of(swinging, stamps)) as database:
+    with sqlite_bag(path, messages_of(swinging, stamps)) as database:
         database.execute(f'UPDATE topics SET {column} = {value}')
     try:
         assert len(read_recording(path, joints=JOINTS)) == 500
@@ -195,7 +182,7 @@ def test_topics_that_are_no_texts_are_refused_or_read(
 
 def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, messages_of, tmp_path):
     path = tmp_path / 'bag.db3'
-    with sqlite_bag(path, swinging, messages_of(swinging, stamps)) as database:
+    with sqlite_bag(path, messages_of(swinging, stamps)) as database:
         database.executescript(
             'DROP TABLE messages; CREATE VIEW messages AS WITH RECURSIVE n(i) AS '
             '(SELECT 1 UNION ALL SELECT i + 1 FROM n) '
@@ -207,7 +194,7 @@ def test_a_view_in_place_of_a_table_is_refused(swinging, stamps, messages_of, tm
 
 def test_a_damaged_page_of_a_database_is_said(swinging, stamps, messages_of, tmp_path):
     path = tmp_path / 'bag.db3'
-    sqlite_bag(path, swinging, messages_of(swinging, stamps)).close()
+    sqlite_bag(path, messages_of(swinging, stamps)).close()
     size = path.stat().st_size
     change(path, 4096 * (size // 4096 // 2) + 8, b'\xff' * 64)
     try:

@@ -94,12 +94,3 @@ def test_efforts_beyond_all_quantities_throughout_are_refused(write, tmp_path):
     t, q = motion()
     with pytest.raises(RecordingError, match='elbow'):
         read_anything(write(tmp_path, t, q, q * [1.0, 1e300]), joints=JOINTS)
-
-
-def test_rows_with_a_time_of_rubbish_are_left_out(tmp_path, recwarn):
-    t, q = motion()
-    stamps = t.copy()
-    stamps[[0, 500]] = 1e157
-    read = read_anything(as_table(tmp_path, stamps, q, q), joints=JOINTS)
-    assert len(read) == 1998 and read.report.unstamped == 2
-    assert not recwarn.list

@@ -436,3 +436,12 @@ def stamp_of(seconds):
     """Return a time as a stamp."""
     nanoseconds = round(seconds * SECOND)
     return Time(sec=nanoseconds // SECOND, nanosec=nanoseconds % SECOND)
+
+
+def joint_state(seconds, names, q, dq=(), tau=()):
+    """Return a joint state with a stamp."""
+    values = {'position': q, 'velocity': dq, 'effort': tau}
+    fields = {field: np.asarray(x, dtype=float).tolist() for field, x in values.items()}
+    state = JointState(name=list(names), **fields)
+    state.header.stamp = stamp_of(seconds)
+    return state

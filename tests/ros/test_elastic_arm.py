@@ -8,7 +8,6 @@ from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.papers.elastic.identification import Accelerometers, identify_two_inertia, read_runs
-from armid_ros.papers.elastic.identification.live import OnlineTwoInertia, TwoLinkSample
 from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
@@ -99,56 +98,6 @@ def test_a_bag_recorded_live_tells_the_springs(bench, tmp_path):
     np.testing.assert_allclose(found.stiffness, shipped.parameters.stiffness, rtol=0.02)
     np.testing.assert_allclose(found.rotor, shipped.parameters.rotor, rtol=0.03)
     np.testing.assert_allclose(found.inertia, shipped.parameters.inertia, rtol=0.03)
-
-
-def test_springs_are_identified_live_at_a_kilohertz(bench):
-    """Samples are put together by their stamps as topics bring them, and taken in one by one."""
-    arm = still_arm(
-        bench, robot='two_link_elastic', loop_gain=0.15, start='0.3,-0.4', velocity_noise=[0.003],
-        acceleration_noise=0.08,
-    )  # fmt: skip
-    publisher = bench.matched_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
-    names = ('joint_states', 'link/joint_states', 'link1/imu', 'link2/imu')
-    kinds = (JointState, JointState, Imu, Imu)
-    heard = [bench.listen(kind, name) for kind, name in zip(kinds, names, strict=True)]
-    bench.settle()
-    shipped = two_link_set('after')
-    sensors = Accelerometers.on(ROBOT, shipped.assumptions['accelerometer_radius'])
-    live = OnlineTwoInertia(ROBOT.joints)
-    rng = np.random.default_rng(4)
-    [experiment] = resonance_experiments(1, rms=EXCITATION_RMS, rng=rng, duration=1.5)
-    way = 1e-3 * np.cumsum(experiment.velocity, axis=0)
-    t = 1e-3 * np.arange(len(way))
-    message = trajectory(t, np.array([0.3, -0.4]) + way - way[0], experiment.torque)
-    send(bench, publisher, arm, message)
-    taken = 0
-    while taken < 1400:
-        for _ in range(8):
-            arm.step()
-        bench.spin_until(lambda due=taken + 8: min(map(len, heard)) >= due, 'all topics')
-        for motor, link, *imus in zip(
-            *(messages[taken : taken + 8] for messages in heard), strict=True
-        ):
-            stamps = {(m.header.stamp.sec, m.header.stamp.nanosec) for m in (motor, link, *imus)}
-            assert len(stamps) == 1
-            q, dq = np.array(link.position), np.array(link.velocity)
-            felt = [
-                np.array([[m.linear_acceleration.x, m.linear_acceleration.y, 0.0]]) for m in imus
-            ]
-            live.take(
-                TwoLinkSample(
-                    np.array(motor.position),
-                    np.array(motor.velocity),
-                    np.array(motor.effort),
-                    q,
-                    dq,
-                    sensors.accelerations(q[np.newaxis], dq[np.newaxis], *felt)[0],
-                )
-            )
-        taken += 8
-    truth, found = shipped.parameters, live.estimate
-    wanted = [truth.alpha, truth.beta, truth.gamma, *truth.rotor, *truth.stiffness]
-    np.testing.assert_allclose(found.values[:7], wanted, rtol=0.02)
 
 
 def test_any_arm_hangs_its_links_on_springs_and_follows(bench):

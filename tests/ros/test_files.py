@@ -83,7 +83,8 @@ def documented(name, column):
 
 @pytest.mark.parametrize('name', [name for name in NODES if name not in ANYTHING])
 def test_topics_and_services_are_those_of_the_table(name, bench):
-    node = bench.add(NODES[name])
+    quick = {'design_time': 1.0, 'duration': 8.0, 'n_periods': 1, 'harmonics': 1}
+    node = bench.add(NODES[name], **{k: v for k, v in quick.items() if k in TABLES[name]})
     who = (node.get_name(), node.get_namespace())
 
     def subscribed():

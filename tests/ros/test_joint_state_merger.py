@@ -14,16 +14,10 @@ import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-from tests.ros.controller import stamp_of
+from tests.ros.controller import joint_state, stamp_of
 
 JOINTS = ('a', 'b')
 OUT = 'joint_state_merger/joint_states'
-
-
-def state(t, names, q, dq=(), tau=()):
-    message = JointState(name=list(names), position=list(q), velocity=list(dq), effort=list(tau))
-    message.header.stamp = stamp_of(t)
-    return message
 
 
 def merger(bench, **parameters):
@@ -42,8 +36,10 @@ def test_joints_of_two_senders_are_one_message_in_the_order_asked_for(bench):
     node, out = merger(bench)
     first = sender(bench, node, JointState, 'joint_states')
     for t in (1.0, 1.1, 1.2):
-        first.publish(state(t, ['b', 'gripper'], [20.0 * t, 0.0], [2.0, 0.0], [200.0 * t, 9.0]))
-        first.publish(state(t - 0.05, ['a'], [t - 0.05], [1.0], [-t]))
+        first.publish(
+            joint_state(t, ['b', 'gripper'], [20.0 * t, 0.0], [2.0, 0.0], [200.0 * t, 9.0])
+        )
+        first.publish(joint_state(t - 0.05, ['a'], [t - 0.05], [1.0], [-t]))
     bench.spin_until(lambda: len(out) >= 2, OUT)
     assert out[0].name == list(JOINTS)
     np.testing.assert_allclose(out[0].position, [1.05, 21.0])
@@ -72,8 +68,8 @@ def test_what_it_waits_for_is_logged_once(bench, joints, waits_for):
 def test_joint_states_on_several_topics_are_merged(bench):
     node, out = merger(bench, position_topics=['left', 'right'])
     left, right = (sender(bench, node, JointState, topic) for topic in ('left', 'right'))
-    left.publish(state(1.0, ['a'], [1.0], [], [3.0]))
-    right.publish(state(1.0, ['b'], [2.0], [], [4.0]))
+    left.publish(joint_state(1.0, ['a'], [1.0], [], [3.0]))
+    right.publish(joint_state(1.0, ['b'], [2.0], [], [4.0]))
     bench.spin_until(lambda: out, OUT)
     assert (list(out[0].position), list(out[0].effort)) == ([1.0, 2.0], [3.0, 4.0])
     assert not out[0].velocity
@@ -102,7 +98,7 @@ def test_currents_of_dynamic_joint_states_become_torques_by_gains(bench):
     positions = sender(bench, node, JointState, 'joint_states')
     for t in (1.0, 1.1):
         efforts.publish(currents(t, [t, 10.0 * t]))
-    positions.publish(state(1.05, JOINTS, [0.1, 0.2], [0.0, 0.0], [77.0, 77.0]))
+    positions.publish(joint_state(1.05, JOINTS, [0.1, 0.2], [0.0, 0.0], [77.0, 77.0]))
     bench.spin_until(lambda: out, OUT)
     np.testing.assert_allclose(out[0].effort, [2.0 * 1.05, -0.5 * 10.5])
     np.testing.assert_allclose(out[0].position, [0.1, 0.2])
@@ -113,7 +109,7 @@ def test_an_array_without_a_stamp_is_of_the_time_it_comes(bench):
     efforts = sender(bench, node, Float64MultiArray, 'currents')
     positions = sender(bench, node, JointState, 'joint_states')
     for k in range(4):
-        positions.publish(state(1.0 + k, JOINTS, [k, k]))
+        positions.publish(joint_state(1.0 + k, JOINTS, [k, k]))
         bench.settle()
         efforts.publish(Float64MultiArray(data=[1.0, 2.0]))
         bench.settle()
@@ -136,7 +132,7 @@ def test_what_is_missing_is_named(bench):
     node, _ = merger(bench, effort_topic='dynamic_joint_states', effort_interface='torque')
     efforts = sender(bench, node, DynamicJointState, 'dynamic_joint_states')
     positions = sender(bench, node, JointState, 'joint_states')
-    positions.publish(state(1.0, JOINTS, [0.1, 0.2]))
+    positions.publish(joint_state(1.0, JOINTS, [0.1, 0.2]))
     efforts.publish(currents(1.0, [1.0, 1.0]))
     bench.settle()
     assert 'torque of a, b' in node.condition()[0]
@@ -160,7 +156,7 @@ def test_torques_that_a_driver_low_passes_are_said(bench):
     for k in range(1500):
         noise = rng.normal(size=2)
         tau += [0.1, 1.0] * (noise - tau)  # a is smoothed, b as it is
-        positions.publish(state(1.0 + 0.002 * k, JOINTS, [0.5, 0.5], [], tau))
+        positions.publish(joint_state(1.0 + 0.002 * k, JOINTS, [0.5, 0.5], [], tau))
         if k % 5 == 0:
             bench.settle()
     bench.spin_until(lambda: len(out) > 1400, OUT)

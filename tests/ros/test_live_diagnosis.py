@@ -26,6 +26,7 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from tests.live.conftest import KNOWN, MORE_FRICTION, moving
+from tests.ros.controller import joint_state
 
 ROBOT = load_robot('humanoid_arm')
 RATE = 100.0
@@ -159,23 +160,13 @@ def test_effects_that_an_arm_cannot_have_are_refused(bench, effect, said):
 def test_questions_wait_until_the_one_before_is_answered(bench, idle):
     node, helper = idle
     for t in np.arange(0.0, 40.0, 0.01):
-        message = JointState(
-            name=list(ROBOT.joints),
-            position=[float(np.sin(t))] * 6,
-            velocity=[0.0] * 6,
-            effort=[0.0] * 6,
-        )
-        message.header.stamp.sec, message.header.stamp.nanosec = 100 + int(t), int(t % 1 * 1e9)
-        node.take_joint_states(message)
+        take(node, 100.0 + t, np.sin(t), 0.0)
     assert len(helper.jobs) == 1
     assert node.received == 4000
 
 
 def take(node, t, q, tau):
-    message = JointState(name=list(ROBOT.joints), position=[q] * 6, effort=[tau] * 6)
-    nanoseconds = round(t * 1e9)
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
-    node.take_joint_states(message)
+    node.take_joint_states(joint_state(t, ROBOT.joints, [q] * 6, (), [tau] * 6))
 
 
 def status(bench, node):

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from itertools import count, islice
 import os
 import signal
 import subprocess
@@ -22,7 +23,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
-from tests.ros.controller import Controller
+from tests.ros.controller import Controller, joint_state, SECOND
 
 PATIENCE = 120.0
 
@@ -182,18 +183,23 @@ def test_a_publisher_that_designs_is_ended_at_once(bench, processes):
 
 def recorder_at_work(bench, processes, bag):
     recorder = processes.start('recorder', f'bag:={bag}', 'topics:=[joint_states]')
-    processes.start('simulated_arm', 'rate:=1000.0')
-    bench.spin_until(
-        lambda: any(f.stat().st_size > 50_000 for f in bag.glob('*.mcap')), 'the recording'
-    )
+    publisher = bench.matched_publisher(JointState, 'joint_states')
+    stamps = count(SECOND, SECOND // 1000)
+
+    def grown():
+        for stamp in islice(stamps, 20):
+            publisher.publish(joint_state(1e-9 * stamp, ['hinge'], [0.0], [0.0], [1.0]))
+        return any(file.stat().st_size > 5_000 for file in bag.glob('*.mcap'))
+
+    bench.spin_until(grown, 'the recording')
     return recorder
 
 
 def test_what_a_killed_recorder_leaves_is_read(bench, processes, tmp_path):
     bag = tmp_path / 'bag'
     processes.end(recorder_at_work(bench, processes, bag), signal.SIGKILL)
-    recording = read_recording(bag, joints=load_robot('humanoid_arm').joints)
-    assert len(recording) > 100 and recording.report.damage
+    recording = read_recording(bag, joints=['hinge'])
+    assert len(recording) > 10 and recording.report.damage
 
 
 def test_a_recorder_whose_terminal_is_closed_completes_its_bag(bench, processes, tmp_path):
@@ -202,7 +208,7 @@ def test_a_recorder_whose_terminal_is_closed_completes_its_bag(bench, processes,
     errors = processes.end(recorder, signal.SIGHUP)
     assert recorder.returncode == 1
     assert 'SIGHUP' in errors.strip().splitlines()[-1]
-    report = read_recording(bag, joints=load_robot('humanoid_arm').joints).report
+    report = read_recording(bag, joints=['hinge']).report
     assert report.samples and not report.damage  # a busy computer leaves gaps
 
 

@@ -10,7 +10,6 @@ import shutil
 from armid_ros.errors import RecordingError
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.recording import iter_raw, read_recording, topics
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -19,21 +18,20 @@ from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty, String
 
+from tests.ros.controller import joint_state
+
 SECOND = 10**9
 JOINTS = ('a', 'b')
 
 
-def joint_state(k: int) -> JointState:
-    message = JointState(name=['a', 'b'], position=[0.1 * k, 1.0], velocity=[0.0, 0.0])
-    message.effort = [2.0, float(k)]
-    message.header.stamp = Time(sec=100, nanosec=k * 10**6)
-    return message
+def state(k: int) -> JointState:
+    return joint_state(100.0 + 1e-3 * k, JOINTS, [0.1 * k, 1.0], [0.0, 0.0], [2.0, k])
 
 
 def record(bench, recorder, publisher, count):
     before = recorder.message_count
     for k in range(count):
-        publisher.publish(joint_state(k))
+        publisher.publish(state(k))
     bench.spin_until(lambda: recorder.message_count >= before + count, 'the messages')
 
 
@@ -52,14 +50,14 @@ def test_every_message_is_in_the_bag_with_its_stamp(bench, tmp_path, reliability
     assert topic.qos[0].durability == durability.name.lower()
     first = next(iter_raw(tmp_path / 'bag'))
     assert first.publish_time_ns == 100 * SECOND
-    assert deserialize_message(first.cdr, JointState) == joint_state(0)
+    assert deserialize_message(first.cdr, JointState) == state(0)
 
 
 def test_without_names_all_topics_are_recorded_those_that_come_later_too(bench, tmp_path):
     recorder = bench.add(RecorderNode, bag=str(tmp_path / 'bag'))
     states = bench.matched_publisher(JointState, 'joint_states')
     texts = bench.matched_publisher(String, 'namespace/text')
-    states.publish(joint_state(1))
+    states.publish(state(1))
     texts.publish(String(data='late'))
     bench.settle()
     recorder.close()
@@ -123,10 +121,10 @@ def test_in_simulated_time_messages_are_logged_at_it(bench, tmp_path):
         RecorderNode, bag=str(tmp_path / 'bag'), topics=['joint_states'], use_sim_time=True
     )
     publisher = bench.matched_publisher(JointState, 'joint_states')
-    publisher.publish(joint_state(0))  # before /clock begins: kept until it does
+    publisher.publish(state(0))  # before /clock begins: kept until it does
     bench.settle()
     bench.tick(150 * SECOND)
-    publisher.publish(joint_state(1))
+    publisher.publish(state(1))
     bench.spin_until(lambda: recorder.message_count == 2)
     recorder.close()
     assert [m.log_time_ns for m in iter_raw(tmp_path / 'bag')] == [150 * SECOND] * 2
@@ -161,7 +159,7 @@ def keep_publishing(bench, publisher):
     """Publish until the recorder ends with an error, and return that."""
     with pytest.raises(RecordingError) as refusal:
         for k in range(100_000):
-            publisher.publish(joint_state(k % 1000))
+            publisher.publish(state(k % 1000))
             bench.settle()
     return str(refusal.value)
 

@@ -9,7 +9,7 @@ import gc
 
 from armid_ros.nodes.lockstep import Stage
 from armid_ros.nodes.running.domains import private_context
-from armid_ros.nodes.running.steady import steady
+from armid_ros.nodes.running.process import steady
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits

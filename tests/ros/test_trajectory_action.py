@@ -217,28 +217,6 @@ def test_a_controller_that_never_answers_is_said(bench, arm, excitation, monkeyp
     assert node.elapsed is None
 
 
-def test_a_controller_that_goes_on_is_told_again(bench, arm, excitation):
-    node = begun(bench, arm, excitation)
-    arm.run(101.5)
-    arm.faults.deaf = True
-    node.stop()
-    arm.run(102.4)
-    arm.faults.deaf = False
-    arm.run(103.4)
-    assert 'goes on moving though it was stopped' in node.condition()[0]
-    np.testing.assert_allclose(arm.state(arm.now).dq, 0.0, atol=1e-9)
-
-
-def test_a_rehearsal_goes_as_a_goal_and_is_reported_at_its_end(bench, arm, excitation):
-    node = publisher(bench, arm, excitation, rehearsal_speed=0.5)
-    node.rehearse()
-    bench.spin_until(lambda: arm.goals, 'the goal')
-    arm.run(100.6 + node.duration, step=0.2)
-    node.look()
-    assert node.condition()[0].startswith('rehearsed: followed within')
-    assert arm.ends == ['succeed']
-
-
 def test_where_there_is_no_action_the_topic_is_used_or_it_is_said(bench, excitation):
     arm = Controller(bench, ROBOT, HOME)
     node = publisher(bench, arm, excitation)

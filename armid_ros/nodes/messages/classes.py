@@ -1,12 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Message types by name: the class to subscribe with, and the definition a bag needs."""
+"""Message types by name: the class to subscribe with."""
 
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
-import sys
 from typing import Any
 
 from armid_ros.errors import RecordingError
@@ -39,10 +37,3 @@ def is_stamped(message_type: type[Any]) -> bool:
     """Whether messages begin with a std_msgs/Header, and so with a stamp."""
     fields: dict[str, str] = message_type.get_fields_and_field_types()
     return next(iter(fields.items()), None) == ('header', 'std_msgs/Header')
-
-
-def installed_definition(type_name: str) -> str | None:
-    """Return the text of a .msg file installed beside this Python; None when there is none."""
-    package, _, name = type_name.partition('/msg/')
-    path = Path(sys.prefix, 'share', package, 'msg', f'{name}.msg')
-    return path.read_text(encoding='utf-8') if path.is_file() else None

@@ -87,15 +87,9 @@ ARM_PARAMETERS = (
 )
 
 
+_PER_JOINT = ('torque_noise', 'position_noise', 'velocity_noise', 'resolution')
 #: Parameters of the sensors that can be set while the arm moves.
-SENSOR_PARAMETERS = {
-    'torque_noise',
-    'position_noise',
-    'velocity_noise',
-    'resolution',
-    'velocity_from_encoder',
-    'acceleration_noise',
-}
+SENSOR_PARAMETERS = {*_PER_JOINT, 'velocity_from_encoder', 'acceleration_noise'}
 
 
 def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
@@ -151,10 +145,7 @@ def sensors_of(value: Values, n_joints: int) -> Sensors:
 
     """
     return Sensors(
-        torque_noise=_per_joint(value('torque_noise'), n_joints, 'torque_noise'),
-        position_noise=_per_joint(value('position_noise'), n_joints, 'position_noise'),
-        velocity_noise=_per_joint(value('velocity_noise'), n_joints, 'velocity_noise'),
-        resolution=_per_joint(value('resolution'), n_joints, 'resolution'),
+        **{name: _per_joint(value(name), n_joints, name) for name in _PER_JOINT},
         velocity_from_encoder=value('velocity_from_encoder'),
         torque_delay=value('torque_delay'),
         acceleration_noise=value('acceleration_noise'),

@@ -12,22 +12,26 @@ from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.robots import load_robot, parse_gravity, robot_from_urdf
+from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
 import numpy as np
 
 Values = Callable[[str], Any]
 
-IDENTIFIER_PARAMETERS = (
+#: Parameters of nodes that learn of the robot on robot_description, where none is named.
+ROBOT_PARAMETERS = (
     NodeParameter(
         'robot', '', 'A shipped robot, or a path; empty: what comes on robot_description.'
     ),
     NodeParameter(
         'gravity',
         'earth',
-        'earth, moon, or x,y,z in the base frame [m/s^2].',
+        'earth, moon, or x,y,z in the base frame [m/s^2]; that of the model where there is one.',
         check=parse_gravity,
     ),
     NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+)
+IDENTIFIER_PARAMETERS = (
+    *ROBOT_PARAMETERS,
     NodeParameter(
         'effects',
         list(USUAL_EFFECTS),
@@ -81,6 +85,17 @@ IDENTIFIER_PARAMETERS = (
 )
 
 
+def robot_of(value: Values, description: str | None) -> Robot:
+    """Return the robot of a description (URDF), or else the one that parameters name."""
+    given = {
+        'gravity': value('gravity'),
+        'joints': tuple(filter(None, value('joints'))) or None,
+    }
+    if description is None:
+        return load_robot(value('robot'), **given)
+    return robot_from_urdf(description, **given)
+
+
 def make_identifier(value: Values, description: str | None = None) -> OnlineIdentifier:
     """
     Make the identifier that parameters describe.
@@ -98,12 +113,7 @@ def make_identifier(value: Values, description: str | None = None) -> OnlineIden
         If robot, effects or settings are not valid or do not fit each other.
 
     """
-    joints = tuple(filter(None, value('joints'))) or None
-    gravity = value('gravity')
-    if description is None:
-        robot = load_robot(value('robot'), gravity=gravity, joints=joints)
-    else:
-        robot = robot_from_urdf(description, gravity=gravity, joints=joints)
+    robot = robot_of(value, description)
     arm = ArmModel(robot)
     for text in filter(None, value('effects')):
         arm = arm.with_effect(make_effect(text, robot))

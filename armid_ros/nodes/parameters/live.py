@@ -14,8 +14,8 @@ from armid_ros.arm import ArmModel, load_misfit, load_model
 from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.live import LiveDiagnosis, LiveSettings
+from armid_ros.nodes.parameters.identifier import robot_of, ROBOT_PARAMETERS
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
 
 Values = Callable[[str], Any]
 
@@ -76,16 +76,7 @@ LIVE_SETTINGS = (
 )
 
 LIVE_PARAMETERS = (
-    NodeParameter(
-        'robot', '', 'A shipped robot, or a path; empty: what comes on robot_description.'
-    ),
-    NodeParameter(
-        'gravity',
-        'earth',
-        'earth, moon, or x,y,z in the base frame [m/s^2]; that of the model where there is one.',
-        check=parse_gravity,
-    ),
-    NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
+    *ROBOT_PARAMETERS,
     NodeParameter(
         'model',
         '',
@@ -149,7 +140,22 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
         If robot, model, effects, bags or settings are not valid or do not fit each other.
 
     """
-    arm = _arm(value, description)
+    robot = None
+    if description is not None or value('robot'):
+        robot = robot_of(value, description)
+    if value('model'):
+        arm = load_model(Path(value('model')).expanduser(), robot)
+    else:
+        assert robot is not None  # the node waits for robot_description
+        arm = ArmModel(robot)
+    for text in filter(None, value('effects')):
+        effect, values = parse_effect(text, arm.robot)
+        if effect in arm.effects:
+            known = list(arm.values)
+            known[arm.effects.index(effect)] = values
+            arm = replace(arm, values=tuple(known))
+        else:
+            arm = arm.with_effect(effect, values)
     if not arm.robot.rigid_parameters.any():
         raise ModelError(
             f'{arm.robot.name}: no link that moves has an <inertial>, so that the model predicts '
@@ -160,26 +166,3 @@ def make_diagnosis(value: Values, description: str | None = None) -> LiveDiagnos
     return LiveDiagnosis(
         arm, settings_of(value), baseline=tuple(bags), misfit=misfit, seed=value('seed')
     )
-
-
-def _arm(value: Values, description: str | None) -> ArmModel:
-    robot: Robot | None = None
-    joints = tuple(filter(None, value('joints'))) or None
-    if description is not None:
-        robot = robot_from_urdf(description, gravity=value('gravity'), joints=joints)
-    elif value('robot'):
-        robot = load_robot(value('robot'), gravity=value('gravity'), joints=joints)
-    if value('model'):
-        arm = load_model(Path(value('model')).expanduser(), robot)
-    else:
-        assert robot is not None  # the node waits for robot_description
-        arm = ArmModel(robot)
-    for text in filter(None, value('effects')):
-        effect, values = parse_effect(text, arm.robot)
-        if effect in arm.effects:
-            values_before = list(arm.values)
-            values_before[arm.effects.index(effect)] = values
-            arm = replace(arm, values=tuple(values_before))
-        else:
-            arm = arm.with_effect(effect, values)
-    return arm

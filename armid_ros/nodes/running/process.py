@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import faulthandler
+import gc
 import os
 from pathlib import Path
 import signal
@@ -16,13 +17,13 @@ from armid_ros.errors import ArmidError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.table import ParameterError
 from armid_ros.nodes.running.arguments import is_asked_for, stray, unreadable, usage
-from armid_ros.nodes.running.steady import steady
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
+from threadpoolctl import threadpool_limits
 
 #: How long leaving DDS may take [s].
 LEAVING = 20.0
@@ -45,6 +46,25 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
     if kind == 'events':
         return EventsExecutor(context=context)
     return SingleThreadedExecutor(context=context)
+
+
+@contextmanager
+def steady() -> Iterator[None]:
+    """
+    Use one thread of linear algebra, and search no object for garbage that is there already.
+
+    Matrices of a hundred rows are done sooner than threads have met; where another process has
+    the second core, they wait for each other, and 0.2 ms become 20. Objects of the libraries stay
+    for good, but a collection that looks through them stops the process for 70 ms.
+
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        with threadpool_limits(limits=1):
+            yield
+    finally:
+        gc.unfreeze()
 
 
 class _Ending:

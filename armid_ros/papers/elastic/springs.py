@@ -15,7 +15,7 @@ from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
 from armid_ros.papers.elastic.identification.output import springs_document, SPRINGS_SCHEMA
 from armid_ros.papers.elastic.report.springs_page import springs_report
-from armid_ros.recording.imu import LINK
+from armid_ros.recording.elastic import LINK
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import Robot
 import click

@@ -32,7 +32,7 @@ from armid_ros.papers.elastic.plant.signals import (
 )
 from armid_ros.papers.elastic.report.page import elastic_report
 from armid_ros.papers.elastic.springs import identify_springs
-from armid_ros.recording.elastic_topics import write_runs
+from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot

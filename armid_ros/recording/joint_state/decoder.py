@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
@@ -21,48 +21,57 @@ _MOST_ROOM = 1 << 30
 
 
 @dataclass(frozen=True)
-class JointStates:
+class JointSamples:
     """
-    Messages that name the same joints, in the order of storage.
+    Samples of some joints; arrays of shape (N,) and (N, k).
 
     Attributes
     ----------
     joints : tuple of str
-        Those of the joints asked for that the messages name, k of them, in the order asked.
-    number : ndarray, shape (N,)
-        Position of each message among all of the topic.
-    header, receive : ndarray, shape (N,)
-        Stamp of the header, and when the message was recorded [ns].
-    position, velocity, effort : ndarray, shape (N, k), or None
-        Values [rad or m, their rate, N m or N]; None where the messages have none.
+        k names, of messages in the order asked for.
+    stamps : ndarray, shape (N,)
+        Time stamps, of messages those of their headers [ns].
+    values : ndarray, shape (3, N, k), as a tuple of three
+        Positions, velocities, efforts [rad or m, their rate, N m or N]; None for a quantity no
+        message has, NaN where nothing was measured.
+    receive, number : ndarray, shape (N,), or None
+        When each message was recorded [ns], and its position among all of the topic.
 
     """
 
     joints: tuple[str, ...]
-    number: IntArray
-    header: IntArray
-    receive: IntArray
-    position: FloatArray | None
-    velocity: FloatArray | None
-    effort: FloatArray | None
+    stamps: IntArray
+    values: tuple[FloatArray | None, ...]
+    receive: IntArray | None = None
+    number: IntArray | None = None
 
     def __len__(self) -> int:
-        """Return the number of messages."""
-        return len(self.number)
+        """Return the number of samples N."""
+        return len(self.stamps)
 
-    def select(self, which: slice | npt.NDArray[np.intp]) -> JointStates:
-        """Return some of the messages."""
-        values = (self.position, self.velocity, self.effort)
-        q, dq, tau = (None if array is None else array[which] for array in values)
-        stamps = self.header[which], self.receive[which]
-        return JointStates(self.joints, self.number[which], *stamps, q, dq, tau)
+    def select(
+        self, samples: npt.NDArray[np.intp] | npt.NDArray[np.bool_] | slice
+    ) -> JointSamples:
+        """Return some of the samples."""
+        values = tuple(None if v is None else v[samples] for v in self.values)
+        receive, number = (
+            None if one is None else one[samples] for one in (self.receive, self.number)
+        )
+        return JointSamples(self.joints, self.stamps[samples], values, receive, number)
+
+    def columns(self, joints: Sequence[str]) -> JointSamples:
+        """Return some of the joints."""
+        if tuple(joints) == self.joints:
+            return self
+        chosen = [self.joints.index(joint) for joint in joints]
+        values = tuple(None if v is None else v[:, chosen] for v in self.values)
+        return replace(self, joints=tuple(joints), values=values)
 
     @property
     def nbytes(self) -> int:
         """Memory of the arrays [bytes]."""
-        values = (self.position, self.velocity, self.effort)
-        arrays = (self.number, self.header, self.receive, *(v for v in values if v is not None))
-        return sum(array.nbytes for array in arrays)
+        arrays = (self.stamps, self.receive, self.number, *self.values)
+        return sum(array.nbytes for array in arrays if array is not None)
 
 
 class JointStateDecoder:
@@ -110,7 +119,7 @@ class JointStateDecoder:
         """Return all joint names met, in order of appearance."""
         return tuple(self._names)
 
-    def decode(self, block: MessageBlock) -> Iterator[JointStates]:
+    def decode(self, block: MessageBlock) -> Iterator[JointSamples]:
         """Yield the messages of a block that name a joint asked for, grouped by layout."""
         numbers = np.arange(self.messages, self.messages + len(block), dtype=np.int64)
         self.messages += len(block)
@@ -126,7 +135,7 @@ class JointStateDecoder:
 
     def _decode_equal(
         self, raw: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
-    ) -> Iterator[JointStates]:
+    ) -> Iterator[JointSamples]:
         """Decode messages of equal length."""
         for _ in range(_LAYOUTS_A_BLOCK):
             if not len(raw):
@@ -153,7 +162,7 @@ class JointStateDecoder:
 
     def _read(
         self, plan: _Plan, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
-    ) -> Iterator[JointStates]:
+    ) -> Iterator[JointSamples]:
         """Yield what was asked for of messages, and keep where the other joints are."""
         for joint, lowest, highest in plan.ranges_of_others(rows):
             known = self.others.get(joint, (lowest, highest))
@@ -245,7 +254,7 @@ class _Plan:
 
     def read(
         self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room
-    ) -> Iterator[JointStates]:
+    ) -> Iterator[JointSamples]:
         """Yield the values of messages of this layout, if there is a joint asked for in them."""
         if not self.joints:
             return
@@ -258,4 +267,4 @@ class _Plan:
             if place is not None:
                 place[:] = rows[name][:, self.columns]
             values.append(place)
-        yield JointStates(self.joints, numbers, header, receive, *values)
+        yield JointSamples(self.joints, header, tuple(values), receive, numbers)

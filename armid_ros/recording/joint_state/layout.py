@@ -18,10 +18,10 @@ from functools import cached_property
 import struct
 from typing import Any
 
+from armid_ros.recording.message_types import BYTE_ORDERS
 import numpy as np
 import numpy.typing as npt
 
-_ENCAPSULATION = {b'\x00\x00': '>', b'\x00\x01': '<'}
 # Encapsulation 4, stamp 8, then the length of frame_id.
 _FRAME = 12
 
@@ -70,7 +70,7 @@ class JointStateLayout:
             The bytes are not a JointState.
 
         """
-        order = _ENCAPSULATION.get(cdr[:2])
+        order = BYTE_ORDERS.get(cdr[:2])
         if order is None:
             raise MalformedMessage(f'encapsulation {cdr[:2].hex(" ")!r} is not plain CDR')
         try:

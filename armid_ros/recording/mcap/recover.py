@@ -96,22 +96,8 @@ def _copied(path: Path, out: str | Path, settings: ReadSettings) -> RecoveryRepo
             raise RecordingError(
                 f'{path}: there is no message to recover; {source.damage or "the file is whole"}'
             )
-        types = {topic.name: topic.message_type for topic in source.topics()}
         with whole_bag(out) as writer:
-            for topic in source.topics():
-                described = types[topic.name]
-                writer.add_topic(
-                    topic.name,
-                    described.name,
-                    qos=topic.qos,
-                    definition=described.definition,
-                    type_hash=described.type_hash,
-                    encoding=described.encoding,
-                )
-            for message in source.messages():
-                writer.write(
-                    message.topic, message.cdr, message.log_time_ns, message.publish_time_ns
-                )
+            writer.copy(source)
         damage = source.damage
     finally:
         source.close()

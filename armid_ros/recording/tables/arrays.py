@@ -36,7 +36,15 @@ def read_numpy(path: Path) -> Table:
     loaded = np.load(io.BytesIO(raw), allow_pickle=False)
     arrays = {'': loaded} if isinstance(loaded, np.ndarray) else dict(loaded)
     described = 'one NumPy array' if '' in arrays else 'NumPy arrays'
-    return table_of_arrays(str(path), _fields(arrays), described)
+    # take structured arrays apart
+    apart: Arrays = {}
+    for name, values in arrays.items():
+        if values.dtype.names:
+            dot = f'{name}.' if name else ''
+            apart.update({f'{dot}{field}': values[field] for field in values.dtype.names})
+        else:
+            apart[name] = values
+    return table_of_arrays(str(path), apart, described)
 
 
 def read_matlab(path: Path) -> Table:
@@ -80,18 +88,6 @@ def _require_packed(what: str, size: int, stored: int) -> None:
     if size > _MOST_PACKED * stored:
         raise RecordingError(f'{what} states {size} bytes, of which {stored} are there')
     DEFAULT.require(size, what)
-
-
-def _fields(arrays: Mapping[str, npt.NDArray[Any]]) -> Arrays:
-    """Take structured arrays apart."""
-    apart: Arrays = {}
-    for name, values in arrays.items():
-        if values.dtype.names:
-            dot = f'{name}.' if name else ''
-            apart.update({f'{dot}{field}': values[field] for field in values.dtype.names})
-        else:
-            apart[name] = values
-    return apart
 
 
 def _flattened(

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import re
 
-from armid_ros.recording.tables.patterns import by_number, ChosenColumns
+from armid_ros.recording.tables.patterns import by_number, ChosenColumns, in_order
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.words import (
@@ -182,11 +182,10 @@ def _in_order(
     if all(label.isdigit() for label in labels):
         labels.sort(key=by_number)
     if joints is not None:
-        names = [renamed(label, rename) for label in labels]
-        if set(joints) <= set(names):
-            labels = [labels[names.index(joint)] for joint in joints]
-        elif len(labels) != len(joints) or not all(label.isdigit() for label in labels):
+        order = in_order(labels, joints, rename)
+        if order is None:
             return None
+        labels = [labels[k] for k in order]
     return ChosenColumns(tuple(members[label] for label in labels), tuple(labels), pattern)
 
 

@@ -6,16 +6,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.recording import PositionRange, ReadReport, Recording
-from armid_ros.recording.series import gaps, JointSamples, longest_in_order, not_finite
+from armid_ros.recording.joint_state.decoder import JointSamples
+from armid_ros.recording.recording import PositionRange, Recording
+from armid_ros.recording.series import longest_in_order, MAX_NOT_FINITE, not_finite, recorded
+from armid_ros.recording.tables.of_bags import in_si
 from armid_ros.recording.tables.patterns import not_chosen
 from armid_ros.recording.tables.plan import TablePlan
-from armid_ros.recording.tables.settings import on_joint_side, TIME_UNITS
+from armid_ros.recording.tables.settings import TIME_UNITS
 from armid_ros.recording.tables.words import QuantityName
-from armid_ros.recording.turns import unwrapped
 import numpy as np
 import numpy.typing as npt
 
@@ -23,8 +25,6 @@ import numpy.typing as npt
 _EPOCH = 1e8
 #: No stamp is later: nanoseconds beyond the year 2255 do not fit into 64 bits [s].
 _LATEST = 9e9
-#: More rows than this part without a number is no glitch but a fault of the file.
-_MAX_NOT_FINITE = 0.2
 
 
 def measured(plan: TablePlan) -> Recording:
@@ -43,15 +43,11 @@ def measured(plan: TablePlan) -> Recording:
     stamped = np.isfinite(t)
     kept, culprits = _finite(plan, stamped, values)
     rows = np.flatnonzero(kept & stamped)
-    position, velocity, effort = (
-        values[name][rows] if name in values else None
-        for name in ('position', 'velocity', 'effort')
-    )
+    quantities = (values.get(name) for name in ('position', 'velocity', 'effort'))
+    read = tuple(None if array is None else array[rows] for array in quantities)
     counts: Counter[str] = Counter()
     stamps = np.round(t[rows] * 1e9).astype(np.int64)
-    series = longest_in_order(
-        JointSamples(plan.joints, stamps, (position, velocity, effort)), counts
-    )
+    series = longest_in_order(JointSamples(plan.joints, stamps, read), counts)
     found = len(series) + counts['duplicates']
     if counts['duplicates'] > 0.5 * found:
         raise RecordingError(
@@ -60,40 +56,22 @@ def measured(plan: TablePlan) -> Recording:
         )
     if len(series) < 2:
         raise RecordingError(f'{table.source}: {len(series)} rows with numbers are left')
-    position, velocity, effort = series.values
-    assert position is not None
-    position, wrapped = unwrapped(position)
-    q, dq, tau = on_joint_side(plan.settings, plan.joints, position, velocity, effort)
-    time = (series.stamps - series.stamps[0]) * 1e-9
-    report = ReadReport(
-        messages=len(table),
-        samples=len(series),
-        duplicates=counts['duplicates'],
-        out_of_order=counts['out_of_order'],
-        restarted=counts['restarted'],
-        nan=int((~kept & stamped).sum()),
-        unstamped=int((~stamped).sum()) + counts['unstamped'],
-        not_finite=culprits,
-        gaps=gaps(time),
-        absent=plan.absent,
-        unwrapped=tuple(plan.joints[k] for k in wrapped),
-        damage='; '.join(note for note in table.notes if 'cut off' in note),
-    )
+    counts['nan'] = int((~kept & stamped).sum())
+    counts['unstamped'] += int((~stamped).sum())
+    met = {
+        **counts,
+        'messages': len(table),
+        'not_finite': culprits,
+        'absent': plan.absent,
+        'damage': '; '.join(note for note in table.notes if 'cut off' in note),
+    }
     topic = 'the table'
-    if tau is None and plan.unread:
+    if plan.source('effort') is None and plan.unread:
         topic += f' (--effort names columns of it; not read are {plan.unread})'
-    return Recording(
-        joints=plan.joints,
-        t=time,
-        q=q,
-        dq=dq,
-        tau=tau,
-        start_ns=start,
-        source=table.source,
-        topic=topic,
-        report=report,
-        others=tuple(_others(plan)),
-    )
+    about = {'start_ns': start, 'source': table.source, 'topic': topic}
+    recording = recorded(series, met, others=tuple(_others(plan)), **about)
+    sides = replace(plan.settings, degrees=False, position_scale=(), effort_scale=())
+    return in_si(recording, sides)  # units are those of the plan
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
@@ -123,11 +101,11 @@ def _finite(
     """Return where everything is a number, and whose values are not; refuse when many are not."""
     bad, culprits = not_finite(plan.joints, values.items(), len(stamped))
     lost = int((bad | ~stamped).sum())
-    if lost > _MAX_NOT_FINITE * len(stamped):
+    if lost > MAX_NOT_FINITE * len(stamped):
         for source in plan.sources:
             for column in source.chosen.columns:
                 empty = np.flatnonzero(~np.isfinite(column.values))
-                if len(empty) > _MAX_NOT_FINITE * len(stamped):
+                if len(empty) > MAX_NOT_FINITE * len(stamped):
                     where = plan.table.where(int(empty[0]))
                     raise RecordingError(
                         f'{plan.table.source}: column {column.name} has no number in '

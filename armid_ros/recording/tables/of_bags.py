@@ -11,7 +11,7 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, Recording
-from armid_ros.recording.tables.settings import ColumnSettings, on_joint_side, per_joint
+from armid_ros.recording.tables.settings import ColumnSettings, per_joint
 import numpy as np
 
 #: Settings that say where a table has what a bag has by itself, and their options.
@@ -75,15 +75,22 @@ def in_si(
     """
     if not any(getattr(settings, name) for name in _WHAT):
         return recording
-    turn = _turn(recording.joints, settings, slides)
-    torque = per_joint(settings.effort_scale or (1.0,), recording.joints, 'the scale of efforts')
-    q, dq, tau = on_joint_side(
-        settings,
-        recording.joints,
-        recording.q * turn,
-        None if recording.dq is None else recording.dq * turn,
-        None if recording.tau is None else recording.tau * torque,
-    )
+    joints = recording.joints
+    turn = _turn(joints, settings, slides)
+    q, dq, tau = recording.q * turn, recording.dq, recording.tau
+    dq = None if dq is None else dq * turn
+    if tau is not None:
+        tau = tau * per_joint(settings.effort_scale or (1.0,), joints, 'the scale of efforts')
+    if settings.gear:  # motor = G q, whence tau = G^T tau_motor
+        gear = np.diag(per_joint(settings.gear, joints, 'the gear ratio'))
+        for motor, joint, ratio in settings.coupling:
+            gear[_position(motor, joints), _position(joint, joints)] = ratio
+        inverse = np.linalg.inv(gear)
+        q = q @ inverse.T
+        dq = None if dq is None else dq @ inverse.T
+        tau = None if tau is None else tau @ gear
+    if settings.zero:
+        q = q + per_joint(settings.zero, joints, 'the zero of positions')
     return replace(recording, q=q, dq=dq, tau=tau, others=_others(recording, settings, turn))
 
 
@@ -106,4 +113,14 @@ def _others(
         replace(one, lowest=min(ends), highest=max(ends))
         for one in recording.others
         for ends in [(float(one.lowest * turn[0]), float(one.highest * turn[0]))]
+    )
+
+
+def _position(joint: str, joints: Sequence[str]) -> int:
+    if joint in joints:
+        return list(joints).index(joint)
+    if joint.isdigit() and 1 <= int(joint) <= len(joints):
+        return int(joint) - 1
+    raise RecordingError(
+        f"a coupling names '{joint}'; there are {', '.join(joints)}, or their numbers from 1"
     )

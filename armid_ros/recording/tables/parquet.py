@@ -39,13 +39,22 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
     with reading(path / INFO, RecordingError):
         info = load_json(read_text(path / INFO, RecordingError))
         features: Mapping[str, Any] = info['features']
-        names = {key: _element_names(feature) for key, feature in features.items()}
+        names: dict[str, list[str]] = {}
+        for key, feature in features.items():
+            called = feature.get('names')
+            if isinstance(called, Mapping):  # datasets nest the names of elements differently
+                called = next(iter(called.values()), None)
+            names[key] = [str(name) for name in called] if isinstance(called, list) else []
         total = int(info.get('total_episodes', 1))
         rate = finite(info['fps'], 'fps') if 'fps' in info else None
         if rate is not None and rate <= 0.0:
             raise RecordingError(f'fps is {rate:g}, and has to be positive')
     chosen = 0 if episode is None else episode
-    for file in _files(path, chosen):
+    files = sorted((path / 'data').glob('**/*.parquet'))
+    if not files:
+        raise RecordingError(f'{path}: there is no data/**/*.parquet')
+    own = [file for file in files if file.name == f'episode_{chosen:06d}.parquet']
+    for file in own or [file for file in files if not file.name.startswith('episode_')]:
         columns, _ = _columns(file, names)
         index = next((c.values for c in columns if c.name == 'episode_index'), None)
         rows = np.ones(len(columns[0].values), np.bool_) if index is None else index == chosen
@@ -58,25 +67,6 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
             notes = (f'episode {chosen} of 0 to {total - 1}',)
             return Table(str(path), kept, 'LeRobot dataset', rate_hz=rate, notes=notes)
     raise RecordingError(f'{path}: no episode {chosen}; the dataset has 0 to {total - 1}')
-
-
-def _files(path: Path, episode: int) -> Sequence[Path]:
-    """Return the files that may hold an episode, the likeliest first."""
-    own = f'episode_{episode:06d}.parquet'
-    files = sorted((path / 'data').glob('**/*.parquet'))
-    if not files:
-        raise RecordingError(f'{path}: there is no data/**/*.parquet')
-    return [f for f in files if f.name == own] or [
-        f for f in files if not f.name.startswith('episode_')
-    ]
-
-
-def _element_names(feature: Mapping[str, Any]) -> list[str]:
-    """Return what the elements of a feature are called; datasets nest them differently."""
-    names = feature.get('names')
-    if isinstance(names, Mapping):
-        names = next(iter(names.values()), None)
-    return [str(name) for name in names] if isinstance(names, list) else []
 
 
 def _columns(

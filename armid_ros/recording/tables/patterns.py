@@ -89,15 +89,10 @@ def choose(
         )
     if joints is None:
         return ChosenColumns(tuple(columns), tuple(labels), pattern)
-    names = [renamed(label, rename) for label in labels]
-    if set(joints) <= set(names):
-        order = [names.index(joint) for joint in joints]
-    elif len(found) == len(joints) and (
-        ',' in pattern or all(label.isdigit() for label in labels) or len(joints) == 1
-    ):
-        order = list(range(len(joints)))
-    else:
+    order = in_order(labels, joints, rename, listed=',' in pattern or len(joints) == 1)
+    if order is None:
         listed = ', '.join(column.name for column in columns)
+        names = [renamed(label, rename) for label in labels]
         lacking = [joint for joint in joints if joint not in names]
         numbered = all(label.isdigit() for label in labels)
         problem = (
@@ -111,6 +106,27 @@ def choose(
     return ChosenColumns(
         tuple(columns[k] for k in order), tuple(labels[k] for k in order), pattern
     )
+
+
+def in_order(
+    labels: Sequence[str],
+    joints: Sequence[str],
+    rename: Sequence[tuple[str, str]],
+    *,
+    listed: bool = False,
+) -> list[int] | None:
+    """
+    Return the positions of joints among labels: by name, else by number.
+
+    None where names do not fit, and labels are neither numbers nor listed in the order of joints.
+
+    """
+    names = [renamed(label, rename) for label in labels]
+    if set(joints) <= set(names):
+        return [names.index(joint) for joint in joints]
+    if len(labels) == len(joints) and (listed or all(label.isdigit() for label in labels)):
+        return list(range(len(joints)))
+    return None
 
 
 def not_chosen(

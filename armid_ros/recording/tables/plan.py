@@ -155,11 +155,10 @@ class TablePlan:
         if self.unread:
             lines.append(f'  not read  {self.unread}')
         lines += [f'  note: {note}' for note in (*table.notes, *self.notes)]
-        return lines[:1] + [_wrapped(line) for line in lines[1:]]
-
-
-def _wrapped(line: str) -> str:
-    return textwrap.fill(line, 80, subsequent_indent=' ' * 12, break_long_words=False)
+        return lines[:1] + [
+            textwrap.fill(line, 80, subsequent_indent=' ' * 12, break_long_words=False)
+            for line in lines[1:]
+        ]
 
 
 def plan(

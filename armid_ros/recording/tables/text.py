@@ -172,6 +172,15 @@ def _names(header: str, separator: str, width: int, path: Path, first: int) -> l
     return [name or f'[{k}]' for k, name in enumerate(names)]
 
 
+def _number(cell: str, separator: str) -> float:
+    """Return a number, NaN for an empty cell; raise a ValueError for a word."""
+    if cell.lower() in _EMPTY:
+        return np.nan
+    if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
+        cell = cell.replace(',', '.')
+    return float(cell)
+
+
 def _numbers(
     path: Path,
     rows: list[str],
@@ -182,32 +191,10 @@ def _numbers(
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
     """Return the values, shape (N, columns), cells of words by column, and what was met."""
     delimiter = None if separator == ' ' else separator
-    try:
+    with suppress(ValueError):  # quick where every cell is a number
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
         if values.shape[1] == len(names):
             return values, {}, ()
-    except ValueError:
-        pass
-    return _cell_by_cell(path, rows, separator, names, widths, first_line)
-
-
-def _number(cell: str, separator: str) -> float:
-    """Return a number, NaN for an empty cell; raise a ValueError for a word."""
-    if cell.lower() in _EMPTY:
-        return np.nan
-    if separator != ',' and _DECIMAL_COMMA.fullmatch(cell):
-        cell = cell.replace(',', '.')
-    return float(cell)
-
-
-def _cell_by_cell(
-    path: Path,
-    rows: list[str],
-    separator: str,
-    names: list[str],
-    widths: list[int | None],
-    first_line: int,
-) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
     values = np.full((len(rows), len(names)), np.nan)
     said: dict[int, dict[int, str]] = {}
     notes: list[str] = []

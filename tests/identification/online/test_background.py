@@ -11,7 +11,7 @@ import time
 from armid_ros.identification.online import identifier as online_identifier
 from armid_ros.identification.online.background import at_once, Background
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.nodes.running.steady import steady
+from armid_ros.nodes.running.process import steady
 import numpy as np
 import pytest
 

@@ -16,7 +16,7 @@ from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.freshness import Freshness
+from armid_ros.nodes.messages.timeliness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.nodes.running.process import run

@@ -7,8 +7,7 @@ from __future__ import annotations
 from armid_ros.errors import RecordingError
 from armid_ros.papers.elastic.identification import Accelerometers, read_runs
 from armid_ros.recording import BagWriter, read_recording, write_joint_states
-from armid_ros.recording.elastic_topics import write_runs
-from armid_ros.recording.imu import read_accelerations, write_accelerations
+from armid_ros.recording.elastic import read_accelerations, write_accelerations, write_runs
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest

@@ -16,7 +16,7 @@ from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.papers.elastic.identification.output import springs_document
 from armid_ros.recording import write_recording
-from armid_ros.recording.elastic_topics import write_runs
+from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import planar_pair
 from armid_ros.simulation import Reference, Sensors, simulate

@@ -1,28 +1,70 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Arms that are measured on both sides: their topics, and accelerations as sensor_msgs/Imu."""
+"""Bags of arms that are measured on both sides, with accelerations as sensor_msgs/Imu."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 import re
+from typing import TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray
+from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import BYTE_ORDERS
+from armid_ros.recording.joint_state.encoder import write_joint_states
+from armid_ros.recording.message_types import BYTE_ORDERS, STRING
+from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray
-from armid_ros.recording.writer import BagWriter
+from armid_ros.recording.string_message import string_cdr
+from armid_ros.recording.writer import BagWriter, whole_bag
+from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from armid_ros.simulation.accelerometers import LinkAccelerometers
 
 #: Motors as seen at the joints, links, and what the loops are asked for.
 MOTOR, LINK, REFERENCE = '/joint_states', '/link/joint_states', '/reference/joint_states'
 IMU = 'sensor_msgs/msg/Imu'
+#: Between two experiments [ns].
+_PAUSE_NS = 10**9
 #: Orientation, its covariance, angular velocity, covariance, linear acceleration, covariance.
 _NUMBERS = 37
 _ORIENTATION_COVARIANCE, _RATE_COVARIANCE, _ACCELERATION = 4, 16, slice(25, 28)
+
+
+def write_runs(
+    path: str | Path, runs: Sequence[ElasticRun], robot: Robot, sensors: LinkAccelerometers
+) -> None:
+    """
+    Write experiments with any arm to a bag, one after the other with a pause of 1 s.
+
+    Raises
+    ------
+    RecordingError
+        The bag exists already.
+
+    """
+    joints = robot.joints
+    with whole_bag(path) as writer:
+        writer.add_topic('/robot_description', STRING, qos=[LATCHED])
+        writer.write('/robot_description', string_cdr(robot.urdf), _PAUSE_NS)
+        start = _PAUSE_NS
+        for run in runs:
+            motor, link = run.motor, run.link
+            stamps = start + np.rint((motor.t - motor.t[0]) * 1e9).astype(np.int64)
+            dt = float(np.median(np.diff(motor.t)))
+            asked = motor.q[0] + dt * np.cumsum(run.reference, axis=0)
+            write_joint_states(writer, MOTOR, joints, stamps, motor.q, motor.dq, motor.tau)
+            write_joint_states(writer, LINK, joints, stamps, link.q, link.dq)
+            write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
+            felt = sensors.readings(link) if run.felt is None else run.felt
+            for name, values in zip(robot.links, felt, strict=True):
+                write_accelerations(writer, imu_topic(name), name, stamps, values)
+            start = int(stamps[-1]) + _PAUSE_NS
 
 
 def write_accelerations(

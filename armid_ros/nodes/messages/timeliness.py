@@ -1,19 +1,61 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How far the stamps of a topic are from the clock of a node."""
+"""Whether messages still come, and how far their stamps are from the clock of a node."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
+import time
 
 from rclpy.clock import ROSClock
 
+#: Silence after which a stream of messages has stopped [s]; who publishes joint states slower than
+#: at 2 Hz has nothing to identify from.
+STOPPED = 0.5
 #: How old results may be when they are published [s]: tf2, and so RViz, keeps ten seconds, and
 #: nothing that was measured is drawn of what is older. What waits while a node is busy, 1000
 #: messages at most, is younger.
 SHOWN = 10.0
 #: Messages of which the one that waited least shows the difference of the clocks.
 _RECENT = 20
+
+
+class Freshness:
+    """
+    How long a topic has been silent, in the time of the machine, which no clock on topics stops.
+
+    Parameters
+    ----------
+    what : str
+        What comes, such as 'joint states'.
+    now : callable, optional
+        Steady time [s].
+
+    """
+
+    def __init__(self, what: str, now: Callable[[], float] = time.monotonic) -> None:
+        self._what = what
+        self.now = now
+        self._heard: float | None = None
+
+    def heard(self) -> None:
+        """Take note of a message."""
+        self._heard = self.now()
+
+    @property
+    def silence(self) -> float:
+        """Time since the last message [s]; 0 before the first one."""
+        return 0.0 if self._heard is None else self.now() - self._heard
+
+    @property
+    def stopped(self) -> bool:
+        """Whether messages came and come no more."""
+        return self.silence > STOPPED
+
+    def trouble(self) -> str:
+        """Say that nothing comes; empty while something does, and before the first message."""
+        return f'{self._what} stopped {self.silence:.1f} s ago' if self.stopped else ''
 
 
 class StampDifference:
