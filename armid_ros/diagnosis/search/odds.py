@@ -31,7 +31,7 @@ _USUAL_SPREADS = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0
 #: The usual spread without a baseline: the median of 72 arms.
 POPULATION_SPREAD = 1.0
 #: Log odds of values that cannot be.
-IMPOSSIBLE = -50.0
+IMPOSSIBLE = -1e6
 #: Share of a column's squares that is left at the least of it: rounding.
 _ROUNDING = 1e-7
 
