@@ -15,11 +15,14 @@ from armid_ros.papers.elastic.identification.interaction import (
     decibel_error,
     decouple,
     DecoupledJoint,
-    ideal_response,
     interaction_torques,
     joint_signals,
 )
-from armid_ros.papers.elastic.identification.physical import DecoupledFit, fit_joint
+from armid_ros.papers.elastic.identification.physical import (
+    DecoupledFit,
+    fit_joint,
+    ideal_response,
+)
 from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
 from armid_ros.papers.elastic.identification.spectra import measured_response
 from armid_ros.papers.elastic.identification.subspace import identify_subspace, Signals, StateSpace

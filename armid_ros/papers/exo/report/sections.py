@@ -8,10 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.report.poses import Drawing
 from armid_ros.report.charts import Chart, Role, Series
+from armid_ros.report.notation import measured
 from armid_ros.report.page import Section
 from armid_ros.robots.assumptions import Assumption
 import numpy as np
@@ -46,14 +48,11 @@ class Stiffness(Section):
         rows = []
         for found in self.found:
             for k, segment in enumerate(found.segments):
-                reach = 1.96 * found.std[k]
-                decimals = max(0, 1 - int(np.floor(np.log10(reach)))) if reach > 0.0 else 3
                 true = self.truth.get(segment)
                 rows.append(
                     (
                         segment.replace('_', ' '),
-                        f'{found.stiffness[k]:.{decimals}f}',
-                        f'{reach:.{decimals}f}',
+                        *measured(found.stiffness[k], HALF_WIDTH * found.std[k]),
                         f'{100.0 * found.bias[k] / found.stiffness[k]:+.2f} %',
                         '' if true is None else f'{true:g}',
                     )

@@ -101,7 +101,7 @@ class ByTorque(Section):
 
     def _charts(self, d: Driven) -> tuple[Chart, Chart]:
         """Draw angle and error of a joint."""
-        both = (
+        both: tuple[tuple[str, GaitCheck, Role], ...] = (
             ('by its torque', d.right, 'residual'),
             ('springs too soft', d.softer, 'predicted'),
         )
