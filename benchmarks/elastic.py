@@ -15,16 +15,16 @@ from __future__ import annotations
 import time
 
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification import (
+from armid_ros.papers.elastic.identification.interaction import (
     decibel_error,
     decouple,
-    ideal_response,
-    identify_two_inertia,
     joint_signals,
-    measured_response,
-    tune,
 )
 from armid_ros.papers.elastic.identification.names import unpack
+from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
+from armid_ros.papers.elastic.identification.tuning import tune
 from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment, run_all
 from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,

@@ -14,12 +14,9 @@ from armid_ros.cli.terminal import print_parameters, progress, say, Tick
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification import (
-    Accelerometers,
-    identify_two_inertia,
-    read_runs,
-)
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
 from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA, tuning_story
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
 from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,

@@ -10,7 +10,7 @@ from armid_ros.cli.record import simulate
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation
 from armid_ros.papers.elastic.command import elastic
-from armid_ros.papers.elastic.identification import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from click.testing import CliRunner

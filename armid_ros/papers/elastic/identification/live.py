@@ -101,7 +101,13 @@ class OnlineTwoInertia:
         table = np.zeros((4, 16))
         table[:2, -1] = before.tau
         _motor_rows(table, before, sample, 1.0 / _RATE)
-        _link_rows(table, before)
+        # fill the links' equations at a sample
+        joints = np.arange(2)
+        moved = (part[np.newaxis] for part in (before.link_q, before.link_dq, before.link_ddq))
+        table[2:, :3] = link_columns(*moved)[0]
+        table[2 + joints, 5 + joints] = -(before.motor_q - before.link_q)
+        table[2 + joints, 7 + joints] = before.link_dq
+        table[2 + joints, 11 + joints] = -(before.motor_dq - before.link_dq)
         flat = table.reshape(1, -1)
         if self._state is None:
             self._state = np.zeros((len(self._sections), 2, flat.shape[1]))
@@ -134,13 +140,3 @@ def _motor_rows(table: FloatArray, before: TwoLinkSample, after: TwoLinkSample, 
     for number, column in enumerate(columns):
         if column is not None:
             table[joints, 3 + 2 * number + joints] = column
-
-
-def _link_rows(table: FloatArray, now: TwoLinkSample) -> None:
-    """Fill the links' equations at a sample."""
-    joints = np.arange(2)
-    moved = (part[np.newaxis] for part in (now.link_q, now.link_dq, now.link_ddq))
-    table[2:, :3] = link_columns(*moved)[0]
-    table[2 + joints, 5 + joints] = -(now.motor_q - now.link_q)
-    table[2 + joints, 7 + joints] = now.link_dq
-    table[2 + joints, 11 + joints] = -(now.motor_dq - now.link_dq)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.elastic.identification import RigidFit, TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.names import parameter_names, unpack
 from armid_ros.papers.elastic.identification.output import total_damping
-from armid_ros.papers.elastic.identification.rigid import CUTOFF
+from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
+from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.report.notation import digits, measured, pretty
 from armid_ros.report.page import Section
 from armid_ros.robots.two_link import TwoLinkParameters
