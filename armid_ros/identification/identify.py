@@ -240,11 +240,6 @@ def identify(
             arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
-    if not fit.settled:
-        notes += (
-            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
-            'change one another too much in these data; leave some out, or record more',
-        )
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -255,7 +250,7 @@ def identify(
         training=fit.fits,
         used=used,
         settings=settings,
-        notes=notes,
+        notes=notes + _unsettled(fit),
         halves=_halves(whole, fit, settings),
         physical=certificate,
         passes=fit.passes,
@@ -329,6 +324,16 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
     if fit.solution.outliers:
         remarks += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
     return remarks
+
+
+def _unsettled(fit: FittedValues) -> tuple[str, ...]:
+    """Say so where linearising once more would still change the fit."""
+    if fit.settled:
+        return ()
+    return (
+        f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
+        'change one another too much in these data; leave some out, or record more',
+    )
 
 
 def _with_what_shows_now(

@@ -41,8 +41,6 @@ class SimulatedRun:
         step before and the step after.
     reference : Motion
         What the arm should have done.
-    saturated : ndarray, shape (n,)
-        Share of the time during which the drive of a joint gave all the torque it has.
     sides : ElasticRun or None
         What was recorded on both sides of the springs; None where all joints are rigid. The other
         readings are those of the motors.
@@ -56,12 +54,11 @@ class SimulatedRun:
     tau: FloatArray
     truth: Motion
     reference: Motion
-    saturated: FloatArray
     sides: ElasticRun | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ('t', 'q', 'dq', 'tau', 'saturated'):
+        for name in ('t', 'q', 'dq', 'tau'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
@@ -147,7 +144,6 @@ def record(
     last = stride * int(np.floor(duration / (stride * plant.dt) + 1e-9))
     motors, links, tau = _followed(arm, last + 1, progress)
     q, dq, ddq = motors
-    saturated = np.mean(np.abs(tau) >= plant.torque_range[1], axis=0)
     given = tau if plant.action.drive is None else plant.action.drive(tau)
     asked, rows = tau, slice(None, None, stride)
     if plant.springs is None:
@@ -160,7 +156,7 @@ def record(
     measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, arm.rng)
     truth = truth.select(rows)
     desired = curve.sample(truth.t)
-    run = SimulatedRun(truth.joints, truth.t, *measured, truth, desired, saturated)
+    run = SimulatedRun(truth.joints, truth.t, *measured, truth, desired)
     if plant.springs is None:
         return run
     moved = Motion(truth.joints, truth.t, *links[:, rows])

@@ -64,8 +64,6 @@ class Tuning:
     measured, before, after : ndarray, shape (N, E, 4)
         Velocities of motors and links [rad/s], measured and simulated with the parameters at
         the start and at the end.
-    evaluations : int
-        Simulations of all experiments with derivatives.
 
     """
 
@@ -75,7 +73,6 @@ class Tuning:
     measured: FloatArray
     before: FloatArray
     after: FloatArray
-    evaluations: int
 
     @property
     def rms(self) -> tuple[float, float]:
@@ -145,12 +142,12 @@ def tune(
         slopes = white(slopes / weight[:, np.newaxis])
         return np.vstack([slopes.reshape(-1, len(base)), prior])
 
-    factors, evaluations = np.zeros(len(base)), 0
+    factors = np.zeros(len(base))
     for _ in range(_ROUNDS):  # from the second on every sensor counts by its own noise
         fit = least_squares(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )
-        factors, evaluations = fit.x, evaluations + fit.njev
+        factors = fit.x
         left = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
         weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
         white = _Whitener.of(steps, arm(factors), weight)
@@ -170,7 +167,6 @@ def tune(
         measured,
         velocities(steps, start),
         velocities(steps, after),
-        evaluations,
     )
 
 
