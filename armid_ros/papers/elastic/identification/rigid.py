@@ -121,7 +121,8 @@ def _covariance(problem: Sequence[Regression], solution: Solution) -> FloatArray
     ends = np.cumsum([len(part.motion) for part in problem])[:-1]
     middle = score_products(np.split(scores, ends), _LASTING * _KEPT)
     freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
-    return freedom * sandwich(np.linalg.inv(rows.T @ rows), middle)
+    bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
+    return np.asarray(freedom * sandwich(bread, middle))
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:
