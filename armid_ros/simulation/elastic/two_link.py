@@ -34,18 +34,18 @@ def two_link_arm(parameters: TwoLinkParameters, robot: Robot | None = None) -> A
     return arm
 
 
-def two_link_plant(parameters: TwoLinkParameters, *, dt: float = 1e-3, substeps: int = 2) -> Plant:
+def two_link_plant(parameters: TwoLinkParameters, *, substeps: int = 2) -> Plant:
     """Return the two links ready to be integrated."""
     arm = two_link_arm(parameters)
-    return Plant(arm, dt, elasticity=Elasticity(substeps, parameters.link_damping))
+    return Plant(arm, elasticity=Elasticity(substeps, parameters.link_damping))
 
 
 def two_link_loop(shipped: TwoLinkSet, share: float = 1.0) -> VelocityLoop:
     """Return the velocity loop of the shipped arm, or one with a share of its gains."""
-    parameters = shipped.parameters
-    return VelocityLoop.of_drive(
-        share * np.asarray(shipped.assumptions['proportional_gain']),
-        share * np.asarray(shipped.assumptions['integral_gain']),
-        parameters.torque_per_volt,
-        parameters.gear,
+    # gains of the drives are in V s/rad and V/rad at the motors
+    scale = share * shipped.parameters.torque_per_volt * shipped.parameters.gear
+    proportional, integral = (
+        scale * np.asarray(shipped.assumptions[name])
+        for name in ('proportional_gain', 'integral_gain')
     )
+    return VelocityLoop(proportional, integral)
