@@ -14,17 +14,17 @@ from __future__ import annotations
 
 import time
 
-from armid_ros.motion import ElasticRun
-from armid_ros.papers.elastic.identification import (
+from armid_ros.motion import ElasticRun, FloatArray
+from armid_ros.papers.elastic.identification.interaction import (
     decibel_error,
     decouple,
-    ideal_response,
-    identify_two_inertia,
     joint_signals,
-    measured_response,
-    tune,
 )
 from armid_ros.papers.elastic.identification.names import unpack
+from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
+from armid_ros.papers.elastic.identification.tuning import tune
 from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment, run_all
 from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
@@ -36,9 +36,11 @@ from armid_ros.papers.elastic.plant.signals import (
 )
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import ROBOT, two_link_set, TwoLinkParameters
-from armid_ros.simulation.elastic.two_link import modes, two_link_loop, two_link_plant
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
+from armid_ros.simulation.plant import Plant
 import numpy as np
+import pinocchio as pin
 
 DT = 1e-3
 SENSORS = ElasticSensors(motor_velocity=0.006, link_velocity=0.003, link_acceleration=0.2)
@@ -48,6 +50,45 @@ FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 
 LOCKED = {0: (14.6, 55.5), 45: (15.5, 47.1), 90: (18.3, 36.4), 180: (27.7, 29.4)}
 #: Steps of MuJoCo per sample: its error falls with the first power of the step.
 FEW, MANY = 20, 200
+
+
+def modes(plant: Plant, q: FloatArray, *, locked: bool = False) -> FloatArray:
+    """
+    Return the natural frequencies and damping ratios of an elastic arm without dry friction.
+
+    Parameters
+    ----------
+    plant : Plant
+        The arm, with springs.
+    q : ndarray, shape (n,)
+        Position of the links [rad].
+    locked : bool
+        Whether the motors are held, as by a stiff velocity loop.
+
+    Returns
+    -------
+    ndarray, shape (K, 2)
+        Undamped frequency [Hz] and damping ratio of each oscillation, lowest first.
+
+    """
+    springs = plant.springs
+    assert springs is not None
+    model, e = plant.robot.model, len(springs.joints)
+    inertia = springs.rotors.copy()
+    inertia[e:, e:] += pin.crba(model, model.createData(), np.asarray(q, dtype=float))
+    w = springs.to_twists
+    resist = springs.damping + (w.T * springs.transmission.damping) @ w
+    spring = w.T * springs.transmission.stiffness
+    if locked:
+        inertia, resist, spring, w = inertia[e:, e:], resist[e:, e:], spring[e:], w[:, e:]
+    size = e + len(inertia)
+    a = np.zeros((size, size))
+    a[:e, e:] = w
+    a[e:] = np.linalg.solve(inertia, -np.hstack([spring, resist]))
+    poles = np.linalg.eigvals(a)
+    poles = poles[poles.imag > 1e-6]
+    found = np.column_stack([np.abs(poles) / (2.0 * np.pi), -poles.real / np.abs(poles)])
+    return np.asarray(found[np.argsort(found[:, 0])])
 
 
 def excitation(count: int, seed: int = 0) -> list[Experiment]:

@@ -7,8 +7,8 @@ from pathlib import Path
 import armid_ros as ar
 from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.simulation import Reference, Sensors
-from armid_ros.simulation.elastic.record import record
 from armid_ros.simulation.elastic.setup import make_elastic_arm
+from armid_ros.simulation.run import record
 import numpy as np
 
 URDF = Path(__file__).with_name('arm.urdf')
@@ -19,7 +19,7 @@ robot = ar.ArmModel.of(URDF, effects=[compliance, 'rotor_inertia:rotor_inertia=0
 plan = ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10)
 encoders = Sensors(position_noise=1e-5, torque_noise=0.05)
 elastic = make_elastic_arm(robot, rng=np.random.default_rng(1), sensors=encoders)
-run = record(elastic, Reference.of(plan.motion(1000.0)), rate=500.0)
+run = record(elastic, Reference.of(plan.motion(1000.0)), rate=500.0).sides
 
 motors, links = (
     ar.Recording(joints=side.joints, t=side.t, q=side.q, tau=side.tau)

@@ -79,15 +79,15 @@ def simulate(
     from armid_ros.recording import write_recording
     from armid_ros.recording.elastic import write_runs
     from armid_ros.simulation import Sensors
-    from armid_ros.simulation import simulate as run
+    from armid_ros.simulation import simulate as simulated
     from armid_ros.simulation.bodies import require_masses
-    from armid_ros.simulation.elastic.record import record
     from armid_ros.simulation.elastic.setup import (
         elastic_joints,
         make_elastic_arm,
         no_rotor,
         shipped_arm,
     )
+    from armid_ros.simulation.run import record
     import numpy as np
 
     rng = np.random.default_rng(seed)
@@ -110,14 +110,15 @@ def simulate(
             elastic = make_elastic_arm(
                 arm, rng=rng, drives=drives, gain=loop_gain, sensors=sensors
             )
-            both = record(elastic, reference, rate=rate, progress=tick)
-            write_runs(out, [both], elastic.plant.robot, elastic.accelerometers)
-            samples, sides = len(both.motor), ' on both sides'
+            run = record(elastic, reference, rate=rate, progress=tick)
+            assert run.sides is not None
+            write_runs(out, [run.sides], elastic.plant.robot, elastic.accelerometers)
+            sides = ' on both sides'
         else:
-            measured = run(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
-            write_recording(out, measured, robot_description=robot.urdf)
-            samples = len(measured.t)
-    say(f'{out}: {samples} samples of {robot.n_joints} joints{sides}, {reference.duration:.1f} s')
+            run = simulated(arm, reference, rng=rng, sensors=sensors, rate=rate, progress=tick)
+            write_recording(out, run, robot_description=robot.urdf)
+    done = f'{len(run.t)} samples of {robot.n_joints} joints{sides}'
+    say(f'{out}: {done}, {reference.duration:.1f} s')
 
 
 @contextmanager

@@ -163,9 +163,9 @@ def diagnose(
     result = _said(chosen, notes, asked)
     if settings.spans and chosen.look is not None and _hardly_explained(result, settings):
         spans = acting_spans(chosen.look, settings.thresholds)
-        found = _within(spans, asked, recordings, baseline, misfit)
-        if found is not None:
-            return found
+        within = _within(spans, asked, recordings, baseline, misfit)
+        if within is not None:
+            return within
     return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
 
 

@@ -13,7 +13,6 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.simulation.controller import BANDWIDTH, Controller, Desired, Targets
 from armid_ros.simulation.plant import middle_position, Plant
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 #: Share of a motor's velocity that one sampled action of its loop may take away.
@@ -47,18 +46,6 @@ class VelocityLoop:
     def torque(self, error: FloatArray, integral: FloatArray) -> FloatArray:
         """Return the torque for errors of velocity [rad/s] and their integral [rad], (n,)."""
         return np.asarray(self.proportional * error + self.integral * integral)
-
-    @classmethod
-    def of_drive(
-        cls,
-        proportional: npt.ArrayLike,
-        integral: npt.ArrayLike,
-        torque_per_volt: FloatArray,
-        gear: FloatArray,
-    ) -> VelocityLoop:
-        """Convert gains of drives, V s/rad and V/rad at the motors, to the joints."""
-        scale = torque_per_volt * gear
-        return cls(np.asarray(proportional) * scale, np.asarray(integral) * scale)
 
 
 @dataclass(eq=False)

@@ -5,21 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
-from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.simulation.closed_loop import command, run
-from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
+from armid_ros.motion import ElasticRun, FloatArray, Motion, read_only
+from armid_ros.simulation.controller import Controller
 from armid_ros.simulation.plant import Plant
 from armid_ros.simulation.readings import readings
 from armid_ros.simulation.reference import Reference
 from armid_ros.simulation.sensors import Sensors
+from armid_ros.simulation.simulated_arm import SimulatedArm
 import numpy as np
 
-#: Steps between two calls of the progress callback, about 50 ms.
-_BLOCK = 1000
 #: A simulated joint that is faster has left all bounds [rad/s or m/s].
 _LOST = 1e6
 
@@ -43,8 +41,9 @@ class SimulatedRun:
         step before and the step after.
     reference : Motion
         What the arm should have done.
-    saturated : ndarray, shape (n,)
-        Share of the time during which the drive of a joint gave all the torque it has.
+    sides : ElasticRun or None
+        What was recorded on both sides of the springs; None where all joints are rigid. The other
+        readings are those of the motors.
 
     """
 
@@ -55,11 +54,11 @@ class SimulatedRun:
     tau: FloatArray
     truth: Motion
     reference: Motion
-    saturated: FloatArray
+    sides: ElasticRun | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ('t', 'q', 'dq', 'tau', 'saturated'):
+        for name in ('t', 'q', 'dq', 'tau'):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
@@ -80,13 +79,13 @@ def simulate(
     Parameters
     ----------
     arm : ArmModel or Plant
-        The arm; an ArmModel is integrated at 1 kHz with hard stops.
+        The arm; an ArmModel is integrated at 1 kHz with hard stops and rigid joints.
     reference : Reference or Motion
         What it should do. The arm starts on it, at its velocity.
     rng : numpy.random.Generator
         Source of the sensors' noise.
     controller : Controller, optional
-        Computed torque of the true arm by default.
+        Computed torque of the true arm by default; where joints give way, velocity loops.
     sensors : Sensors, optional
         Perfect by default.
     rate : float
@@ -101,56 +100,103 @@ def simulate(
     TrajectoryError
         If the reference does not fit the robot or passes a limit; the message names both.
     ModelError
-        If the rate does not fit the step, or the plant has springs.
+        If the rate does not fit the step.
 
     """
-    plant = arm if isinstance(arm, Plant) else Plant(arm)
-    if plant.springs is not None:
-        raise ModelError(
-            f'{plant.robot.name}: joints that give way are read on both sides, which a run of '
-            'rigid joints has not; use SimulatedArm, or a plant without elasticity'
-        )
-    controller = controller or ComputedTorque(plant.arm)
-    sensors = sensors or Sensors()
+    simulated = SimulatedArm(arm, rng=rng, controller=controller, sensors=sensors)
+    return record(simulated, reference, rate=rate, duration=duration, progress=progress)
+
+
+def record(
+    arm: SimulatedArm,
+    reference: Reference | Motion,
+    *,
+    rate: float = 1000.0,
+    duration: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> SimulatedRun:
+    """
+    Let a simulated arm follow a reference from its first point and record it, as `simulate` does.
+
+    Parameters
+    ----------
+    arm : SimulatedArm
+        With its controller, its sensors and the source of their noise.
+    reference, rate, duration, progress
+        As of `simulate`.
+
+    Raises
+    ------
+    TrajectoryError
+        If the reference does not fit the robot or passes a limit; the message names both.
+    ModelError
+        If the rate does not fit the step.
+
+    """
+    plant, sensors = arm.plant, arm.sensors
     if not rate > 0.0:
         raise ModelError(f'a rate of {rate:g} Hz: samples per second have to be positive')
     stride = whole_steps(1.0 / rate, plant.dt, f'a rate of {rate:g} Hz')
-    curve = reference if isinstance(reference, Reference) else Reference.of(reference)
-    curve = curve.for_robot(plant.robot)
-    curve.require_limits(plant.robot, plant.dt)
+    curve = arm.start_on(
+        reference if isinstance(reference, Reference) else Reference.of(reference)
+    )
     duration = curve.duration if duration is None else duration
     last = stride * int(np.floor(duration / (stride * plant.dt) + 1e-9))
-
-    def targets(first: int, count: int) -> Targets:
-        return controller.targets(curve.sample(plant.times(first, count)))
-
-    start = curve.sample(np.zeros(1))
-    state = plant.state(start.q[0], start.dq[0], start.ddq[0])
-    torque = command(plant, controller, state, next(iter(targets(0, 1))))
-    pieces = []
-    while state.steps <= last:
-        count = min(_BLOCK, last + 1 - state.steps)
-        with np.errstate(over='ignore', invalid='ignore'):  # looked for below
-            trace = run(plant, controller, state, torque, targets(state.steps + 1, count))
-        q, dq, ddq = trace.motors
-        _require_motion(plant, dq[:-1], state.steps)
-        pieces.append((q[:-1], dq[:-1], ddq[1:], trace.tau[:-1]))
-        state, torque = trace.state, trace.tau[-1]
-        if progress is not None:
-            progress(state.steps / (last + 1))
-
-    q, dq, ddq, tau = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    saturated = np.mean(np.abs(tau) >= plant.torque_range[1], axis=0)
+    motors, links, tau = _followed(arm, last + 1, progress)
+    q, dq, ddq = motors
     given = tau if plant.action.drive is None else plant.action.drive(tau)
-    ddq, given, asked = (np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau))
+    asked, rows = tau, slice(None, None, stride)
+    if plant.springs is None:
+        ddq, given, asked = (
+            np.concatenate([x[:1], (x[1:] + x[:-1]) / 2]) for x in (ddq, given, tau)
+        )
     truth = Motion(plant.robot.joints, plant.times(0, last + 1), q, dq, ddq, given)
     q, dq, asked = readings(plant.sensing, truth, asked)
-    rows = slice(None, None, stride)
     late = asked[np.maximum(np.arange(0, last + 1, stride) - sensors.torque_delay, 0)]
-    measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, rng)
+    measured = sensors.measure(q[rows], dq[rows], late, stride * plant.dt, arm.rng)
     truth = truth.select(rows)
     desired = curve.sample(truth.t)
-    return SimulatedRun(truth.joints, truth.t, *measured, truth, desired, saturated)
+    run = SimulatedRun(truth.joints, truth.t, *measured, truth, desired)
+    if plant.springs is None:
+        return run
+    moved = Motion(truth.joints, truth.t, *links[:, rows])
+    return replace(run, sides=_both_sides(arm, run, moved))
+
+
+def _followed(
+    arm: SimulatedArm, steps: int, progress: Callable[[float], None] | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Let an arm go on; return motors, their acceleration over each step, links and torques."""
+    pieces, done = [], 0
+    with np.errstate(over='ignore', invalid='ignore'):  # looked for below
+        for trace in arm.traces(steps):
+            q, dq, ddq = trace.motors
+            _require_motion(arm.plant, dq[:-1], done)
+            motors = np.stack([q[:-1], dq[:-1], ddq[1:]])
+            pieces.append((motors, trace.links[:, :-1], trace.tau[np.newaxis, :-1]))
+            done = trace.state.steps
+            if progress is not None:
+                progress(done / steps)
+    motors, links, tau = (np.concatenate(parts, axis=1) for parts in zip(*pieces, strict=True))
+    return motors, links, tau[0]
+
+
+def _both_sides(arm: SimulatedArm, run: SimulatedRun, moved: Motion) -> ElasticRun:
+    """Return what motors and links of a run read, and what the loops were asked for."""
+    period = run.t[1] - run.t[0] if len(run.t) > 1 else arm.plant.dt
+    sensors, still = arm.sensors, np.zeros_like(moved.q)
+    q, dq, _ = sensors.measure(moved.q, moved.dq, still, period, arm.rng)
+    felt = arm.accelerometers.readings(moved)
+    if np.any(sensors.acceleration_noise):
+        felt = felt + sensors.acceleration_noise * arm.rng.standard_normal(felt.shape)
+    targets = arm.controller.targets(run.reference)
+    before = targets.q[:1] - period * run.reference.dq[:1]
+    return ElasticRun(
+        Motion(run.joints, run.t, run.q, run.dq, still, run.tau),
+        Motion(run.joints, run.t, q, dq, moved.ddq),
+        np.diff(targets.q, axis=0, prepend=before) / period,
+        felt=felt,
+    )
 
 
 def _require_motion(plant: Plant, dq: FloatArray, first: int) -> None:

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.accelerometers import LinkAccelerometers
-from armid_ros.simulation.closed_loop import command, run
+from armid_ros.simulation.closed_loop import command, run, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
 from armid_ros.simulation.course import Course
 from armid_ros.simulation.motor_control import MotorControl
@@ -124,7 +125,7 @@ class SimulatedArm:
         self.controller = controller
         self.sensors = sensors or Sensors()
         self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
-        self._rng = rng
+        self.rng = rng
         start = middle_position(self.plant.robot) if start is None else start
         self._home = self.plant.state(start).q
         self._course = Course(self.plant.robot, self.plant.dt)
@@ -164,9 +165,11 @@ class SimulatedArm:
         hold = Reference(self.joints, np.zeros(1), self._home[np.newaxis])
         self._begin(hold, steps)
 
-    def start_on(self, reference: Reference) -> None:
+    def start_on(self, reference: Reference) -> Reference:
         """
         Put the arm on the first point of a reference, at its velocity, and begin it there.
+
+        Returns the reference with its joints in the order of the robot.
 
         Raises
         ------
@@ -177,6 +180,7 @@ class SimulatedArm:
         curve = reference.for_robot(self.plant.robot)
         curve.require_limits(self.plant.robot, self.plant.dt)
         self._begin(curve, 0)
+        return curve
 
     def become(self, arm: ArmModel) -> None:
         """
@@ -246,25 +250,30 @@ class SimulatedArm:
         """
         if steps < 1:
             raise ValueError(f'an arm advances by 1 step or more, not {steps}')
-        left = steps
-        while left:
+        for _ in self.traces(steps):
+            pass
+        return self.read(steps)
+
+    def traces(self, steps: int) -> Iterator[Trace]:
+        """Let time go on, and yield all that happens, some hundred steps at once."""
+        while steps:
             row = self._row + 1
             if row >= len(self._targets):
                 self._look_ahead(self._targets.q[-1])
                 row = 1
-            taken = min(left, len(self._targets) - row)
+            taken = min(steps, len(self._targets) - row)
             targets = self._targets[row : row + taken]
             trace = run(self.plant, self._acting, self._state, self._torque, targets)
             self._state, self._torque = trace.state, trace.tau[-1]
             self._past.extend(trace)
-            left -= taken
-        return self.read(steps)
+            steps -= taken
+            yield trace
 
     def read(self, steps: int = 1) -> Sample:
         """Read the sensors now, some steps after they were read last."""
         state, dt = self._state, steps * self.plant.dt
         q, dq, tau = (row[np.newaxis] for row in self._past.latest())
-        q, dq, tau = self.sensors.measure(q, dq, tau, dt, self._rng, self._previous)
+        q, dq, tau = self.sensors.measure(q, dq, tau, dt, self.rng, self._previous)
         self._previous = q[0]
         link = None if self.plant.springs is None else self._read_links(dt)
         return Sample(state.steps, state.t, q[0], dq[0], tau[0], link)
@@ -274,17 +283,17 @@ class SimulatedArm:
         state, targets, row = self._state, self._targets, self._row
         q, dq = state.q[np.newaxis], state.dq[np.newaxis]
         none = np.zeros_like(q)
-        q, dq, _ = self.sensors.measure(q, dq, none, dt, self._rng, self._previous_link)
+        q, dq, _ = self.sensors.measure(q, dq, none, dt, self.rng, self._previous_link)
         self._previous_link = q[0]
         felt = self.accelerometers.read(state.q, state.dq, state.ddq)
         if np.any(self.sensors.acceleration_noise):
-            felt = felt + self.sensors.acceleration_noise * self._rng.standard_normal(felt.shape)
+            felt = felt + self.sensors.acceleration_noise * self.rng.standard_normal(felt.shape)
         return LinkSample(q[0], dq[0], state.ddq, felt, targets.q[row], targets.dq[row])
 
     def _begin(self, reference: Reference, steps: int) -> None:
         """Put the arm on a reference, with nothing before it."""
         first = reference.sample(np.zeros(1))
-        self._state = self.plant.state(first.q[0], first.dq[0], steps=steps)
+        self._state = self.plant.state(first.q[0], first.dq[0], first.ddq[0], steps)
         self._course.follow(reference, steps)
         self._acting = self.controller.started()
         self._previous = self._previous_link = None

@@ -133,6 +133,13 @@ class ElasticJoints:
         )
         free, rate = 1.0 / np.diag(np.linalg.inv(mass)), _STOP * elasticity.substeps / dt
         rub = np.diag(np.broadcast_to(np.asarray(elasticity.link_damping, dtype=float), (n,)))
+        # what effects make of the readings of motors, which their springs do not change
+        kept = [
+            (effect, values)
+            for effect, values in zip(arm.effects, arm.values, strict=True)
+            if effect.action(values, ArmModel(arm.robot)).transmission is None
+        ]
+        bare = ArmModel(arm.robot, tuple(e for e, _ in kept), tuple(v for _, v in kept))
         return cls(
             joints=joints,
             transmission=Transmission(
@@ -146,7 +153,7 @@ class ElasticJoints:
             damping=damping + to_links.T @ rub @ to_links,
             friction=np.ascontiguousarray(directions @ to_motors),
             stops=(read_only(free * rate**2), read_only(1.4 * free * rate)),
-            sensing=_sensing(arm),
+            sensing=bare.action(),
         )
 
     def pull_of(self, stiffness: FloatArray, damping: FloatArray) -> FloatArray:
@@ -193,14 +200,3 @@ def _required(robot: Robot, action: Action) -> Transmission:
             'joint_elasticity to the joints with backlash'
         )
     return springs
-
-
-def _sensing(arm: ArmModel) -> Action:
-    """Return what effects make of the readings of motors, which their springs do not change."""
-    kept = [
-        (effect, values)
-        for effect, values in zip(arm.effects, arm.values, strict=True)
-        if effect.action(values, ArmModel(arm.robot)).transmission is None
-    ]
-    bare = ArmModel(arm.robot, tuple(e for e, _ in kept), tuple(v for _, v in kept))
-    return bare.action()

@@ -12,19 +12,19 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 152,
-    'said': 296,
-    'says': 160,
-    'tells': 75,
+    'told': 145,
+    'said': 288,
+    'says': 159,
+    'tells': 72,
     'asks': 21,
-    'asked': 242,
+    'asked': 232,
     'believes': 3,
-    'believed': 75,
-    'denies': 5,
+    'believed': 69,
+    'denies': 1,
     'denied': 11,
-    'beside': 191,
-    'knows': 29,
-    'heard': 15,
+    'beside': 178,
+    'knows': 28,
+    'heard': 14,
 }
 #: Count in the pages: one quotes a message of the package.
 IN_PAGES = {'beside': 1}

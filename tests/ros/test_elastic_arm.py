@@ -7,7 +7,8 @@ from __future__ import annotations
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.recorder import RecorderNode
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
-from armid_ros.papers.elastic.identification import Accelerometers, identify_two_inertia, read_runs
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set

@@ -100,8 +100,6 @@ def test_what_needs_springs_or_has_none_is_told_so():
     )
     arm = ArmModel(robot).with_effect(*springs).with_effect(*rotors)
     plant = Plant(arm, elasticity=Elasticity())
-    with pytest.raises(ModelError, match='SimulatedArm'):
-        simulate(plant, sine(robot.joints), rng=np.random.default_rng(0))
     with pytest.raises(ModelError, match='effects'):
         SimulatedArm(plant, rng=np.random.default_rng(0)).become(ArmModel(robot))
     with pytest.raises(ModelError, match='ComputedTorque'):

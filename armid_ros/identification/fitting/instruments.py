@@ -28,7 +28,8 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
-from armid_ros.identification.fitting.triangle import semi_definite, within
+from armid_ros.identification.fitting.sandwich import sandwich
+from armid_ros.identification.fitting.triangle import within
 from armid_ros.identification.rows.regression import (
     filtered_columns,
     Regression,
@@ -199,7 +200,7 @@ def by_instruments(
     units = np.outer(scale, scale)
     return Instrumented(
         values=values / scale,
-        covariance=semi_definite(by_z @ products[rank:, rank:] @ by_z.T / units),
+        covariance=sandwich(by_z, products[rank:, rank:]) / units,
         difference=(free - by_w @ (w.T @ target)) / scale,
         spread=apart @ products @ apart.T / units,
     )

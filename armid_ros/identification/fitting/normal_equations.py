@@ -21,9 +21,6 @@ import scipy.linalg
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
-#: A direction of which others leave less than this share of what they leave of the best one is
-#: made of them.
-_DEPENDENT = 1e-6
 #: Squares of a column that are this share of those of the largest one are rounding.
 NO_COLUMN = 1e-20
 
@@ -112,33 +109,6 @@ def informative_basis(products: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(scaled)
     good = values > UNINFORMATIVE * max(float(values.max(initial=0.0)), 1e-300)
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
-
-
-def independent_inverse(products: FloatArray, squares: FloatArray) -> FloatArray:
-    """
-    Invert products of columns in the directions that other columns do not make.
-
-    Parameters
-    ----------
-    products : ndarray, shape (..., p, p)
-        Products with each other of what the others leave of the columns.
-    squares : ndarray, shape (p,)
-        Squares of the whole columns.
-
-    Returns
-    -------
-    ndarray, shape (..., p, p)
-        Pseudo-inverses.
-
-    """
-    seen = squares > NO_COLUMN * squares.max(initial=1e-300)
-    scale = np.where(seen, 1.0 / np.sqrt(np.where(seen, squares, 1.0)), 0.0)
-    both = np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(products * both)
-    good = values > np.maximum(_DEPENDENT * values[..., -1:], UNINFORMATIVE)
-    inverse = np.where(good, 1.0 / np.where(good, values, 1.0), 0.0)
-    scaled = vectors * inverse[..., np.newaxis, :] @ np.swapaxes(vectors, -1, -2)
-    return np.asarray(scaled * both)
 
 
 def scaled_inverse(matrix: FloatArray) -> FloatArray:

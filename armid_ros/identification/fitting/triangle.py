@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from armid_ros.identification.fitting.sandwich import sandwich
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
@@ -193,16 +194,7 @@ class TriangleFit:
     def covariance(self, products: FloatArray) -> FloatArray:
         """Return that of the values, given that of the products of columns and noise, (r, r)."""
         bread = self.inverse @ self.inverse.T
-        return semi_definite(bread @ products @ bread)
-
-
-def semi_definite(covariance: FloatArray) -> FloatArray:
-    """Return the nearest positive semi-definite correlations with the same variances, (r, r)."""
-    std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
-    sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
-    root = axes * np.sqrt(sizes.clip(0.0))
-    root *= (std / np.maximum(np.linalg.norm(root, axis=1), 1e-300))[:, np.newaxis]
-    return np.asarray(root @ root.T)
+        return sandwich(bread, products)
 
 
 def joint_std(triangle: Triangle, values: FloatArray) -> FloatArray:

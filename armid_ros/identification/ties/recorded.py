@@ -47,7 +47,6 @@ def recorded_interaction_problem(
     recording: Recording,
     other_recording: Recording,
     *,
-    settings: SignalSettings | None = None,
     inertias: Inertias = 'known',
     separate: bool = False,
     slack: float | FloatArray = 0.0,
@@ -65,8 +64,6 @@ def recorded_interaction_problem(
         Both, and where the springs are.
     recording, other_recording : Recording
         Of both, with overlapping stamps.
-    settings : SignalSettings, optional
-        Filters.
     inertias : {'known', 'free'}
         Whether the machine's inertias are those of its description or are estimated as well.
     separate : bool
@@ -83,7 +80,7 @@ def recorded_interaction_problem(
     if recording.tau is None:
         raise IdentificationError(f'{recording.source}: {recording.topic} has no effort')
     together = recorded_together(recording, other_recording, machines.other, machines.ties)
-    settings = settings or SignalSettings()
+    settings = SignalSettings()
     both = _one_machine(together)
     used = band_of_motion([both], conditioning([both], settings), settings)
     return together_interaction_problem(

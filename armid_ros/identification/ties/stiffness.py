@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.fitting.sandwich import score_products, widened
 from armid_ros.identification.ties.problem import InteractionProblem
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
@@ -240,8 +241,8 @@ def _covariance(
 ) -> FloatArray:
     """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
     # B is that of the scores. Filters make neighbours alike, by how much is known; where the
-    # scores add up to more, as of noise that was not white before, deviations are widened (Newey
-    # and West 1987). Poses are independent, and B is H.
+    # scores add up to more, as of noise that was not white before, deviations are widened. Poses
+    # are independent, and B is H.
     _, information, columns, pull = _gauss_newton(problem, theta, variance)
     size = np.sqrt(np.diag(information))
     scaled = np.linalg.inv(information / np.outer(size, size))
@@ -252,16 +253,12 @@ def _covariance(
     weighted = np.linalg.solve(_noise(problem, by_motion, variance), columns)
     moved = np.einsum('nij,nip->npj', by_motion, weighted)
     scores = np.einsum('nip,ni->np', columns, pull)
-    known, seen = information, scores.T @ scores
+    known = information
     lags = len(problem.torque_lags)
     for lag in range(1, lags):
         alike = np.einsum('npj,jk,nqk->pq', moved[:-lag], problem.motion_lags[lag], moved[lag:])
         torque = problem.torque_lags[lag] * variance
         alike += np.einsum('nip,i,niq->pq', weighted[:-lag], torque, weighted[lag:])
         known = known + alike + alike.T
-        product = (1.0 - lag / lags) * scores[:-lag].T @ scores[lag:]
-        seen = seen + product + product.T
     covariance = excess * inverse @ known @ inverse
-    lasting = np.diag(inverse @ seen @ inverse) / np.diag(covariance)
-    factor = np.sqrt(np.maximum(lasting, 1.0))
-    return np.asarray(covariance * np.outer(factor, factor))
+    return widened(covariance, inverse, score_products([scores], lags))

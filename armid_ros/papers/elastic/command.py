@@ -62,14 +62,7 @@ def elastic(
     are found joint by joint.
 
     """
-    from armid_ros.papers.elastic.work import (
-        DemoOptions,
-        DriveOptions,
-        ElasticData,
-        identify_elastic,
-    )
+    from armid_ros.papers.elastic.work import DriveOptions, ElasticData, identify_elastic
 
-    data, simulated = ElasticData(bags, steps), DemoOptions(demo, experiments, start)
-    identify_elastic(
-        data, simulated, robot_source, DriveOptions(**drives), model, out, seed, as_json
-    )
+    data = ElasticData(bags, steps, robot_source, model, demo, experiments, start)
+    identify_elastic(data, DriveOptions(**drives), out, seed, as_json)

@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from armid_ros.cli import options
+from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
 from armid_ros.papers.elastic.identification.output import springs_document, SPRINGS_SCHEMA
-from armid_ros.papers.elastic.report.springs_page import springs_report
+from armid_ros.papers.elastic.report.springs import springs_report
 from armid_ros.recording.elastic import LINK
-from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import Robot
 import click
 import numpy as np
@@ -47,10 +47,8 @@ def identify_springs(
         found = fit_springs(body, sides, np.random.default_rng(seed))
     document = springs_document(found, source)
     write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
-    provenance = Provenance(
-        files=hash_files(bags), versions=versions(), settings={'model': str(model or source)}
-    )
-    page = springs_report(found, robot.name, provenance=provenance)
+    origin = provenance(bags, {'model': str(model or source)})
+    page = springs_report(found, robot.name, provenance=origin)
     write_file(staged.folder / 'report.html', page)
     staged.keep()
     if as_json:

@@ -9,18 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
+from armid_ros.cli.origin import provenance
 from armid_ros.cli.terminal import print_parameters, progress, say, Tick
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification import (
-    Accelerometers,
-    identify_two_inertia,
-    read_runs,
-    TwoInertiaIdentification,
-)
-from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA
-from armid_ros.papers.elastic.identification.story import TuningStory
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA, tuning_story
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
 from armid_ros.papers.elastic.plant.signals import (
     EXCITATION_RMS,
@@ -34,7 +30,6 @@ from armid_ros.papers.elastic.report.page import elastic_report
 from armid_ros.papers.elastic.springs import identify_springs
 from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new
-from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.two_link import (
     planar_pair,
@@ -58,35 +53,29 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 @dataclass(frozen=True)
 class ElasticData:
     """
-    What is read.
+    What is identified.
 
     Attributes
     ----------
     bags, steps : tuple of Path
         Recordings through the resonances, and of step responses.
-
-    """
-
-    bags: tuple[Path, ...]
-    steps: tuple[Path, ...]
-
-
-@dataclass(frozen=True)
-class DemoOptions:
-    """
-    What is simulated.
-
-    Attributes
-    ----------
+    robot : str
+        The arm.
+    model : Path or None
+        A model.yaml with inertias, of arms that are no pair of links.
     demo : bool
-        Whether anything is.
+        Whether the shipped arm is simulated first.
     experiments : int
-        How many, of 4 s each.
+        How many of 4 s each are.
     start : str or None
         What the tuning begins with.
 
     """
 
+    bags: tuple[Path, ...]
+    steps: tuple[Path, ...]
+    robot: str
+    model: Path | None
     demo: bool
     experiments: int
     start: str | None
@@ -137,86 +126,58 @@ class DriveOptions:
 
 
 def identify_elastic(
-    data: ElasticData,
-    demo: DemoOptions,
-    robot_source: str,
-    drives: DriveOptions,
-    model: Path | None,
-    out: Path,
-    seed: int,
-    as_json: bool,
+    data: ElasticData, drives: DriveOptions, out: Path, seed: int, as_json: bool
 ) -> None:
     """Identify elastic joints."""
-    begin = demo.start or ('before' if demo.demo else 'found')
+    begin = data.start or ('before' if data.demo else 'found')
     printed = None if begin == 'found' else two_link_set(begin).parameters
-    robot = load_robot(robot_source)
+    robot = load_robot(data.robot)
     if not planar_pair(robot):
-        if demo.demo or data.steps:
+        if data.demo or data.steps:
             raise RobotError(
                 f'{robot.name} is no pair of links that move in a horizontal plane: --demo and '
                 '--steps are for such; without them its springs are found joint by joint'
             )
-        identify_springs(data.bags, robot, robot_source, model, out, seed, as_json)
+        identify_springs(data.bags, robot, data.robot, data.model, out, seed, as_json)
         return
-    if model is not None:
+    if data.model is not None:
         raise RobotError('--model has no place in the three steps, which find the inertias')
     pair = drives.pair(robot)
-    staged = options.stage(out, SCHEMA, robot_source)
+    staged = options.stage(out, SCHEMA, data.robot)
     with progress('reading') as tick:
-        if demo.demo:
-            data = _simulate(pair, staged, demo.experiments, seed, tick)
+        if data.demo:
+            data = _simulate(pair, staged, data, seed, tick)
         elif not data.bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
-        result = _identify(pair, data, printed, tick)
-        tick(1.0, 'writing')
-        known, table = _known(robot, pair.shipped, begin)
-        page = elastic_report(
-            result,
-            robot.name,
-            known=known,
-            source=table,
-            provenance=_provenance(data, begin, seed if demo.demo else None),
+        how = options.read_settings(), options.tell_damage
+        runs, responses = (
+            [run for path in paths for run in read_runs(path, robot, pair.sensors, *how)]
+            for paths in (data.bags, data.steps)
         )
+        result = identify_two_inertia(
+            runs, pair.drives, steps=responses, loop=pair.loop, start=printed, progress=tick
+        )
+        tick(1.0, 'writing')
+        known, table = None, ''
+        if robot.name == ROBOT:
+            known, table = pair.shipped.parameters, 'Table 1 of the source, after tuning'
+        elif printed is not None:
+            known, table = printed, f"the set '{begin}', which the tuning began with"
+        files, seeds = [*data.bags, *data.steps], seed if data.demo else None
+        origin = provenance(files, {'start of the tuning': begin}, seeds)
+        page = elastic_report(result, robot.name, known=known, source=table, provenance=origin)
         write_file(staged.folder / 'report.html', page)
-    document = elastic_document(result, robot_source)
-    story = None
-    if demo.demo and result.tuning is not None:
-        start = printed or result.untuned
-        story = TuningStory.of(result.tuning, start, pair.shipped.parameters)
-        document['story'] = story.document()
+    document = elastic_document(result, data.robot)
+    if data.demo and result.tuning is not None:
+        truth = pair.shipped.parameters
+        document['story'] = tuning_story(result.tuning, printed or result.untuned, truth)
     write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
     staged.keep()
     if as_json:
         click.echo(json_text(document))
         return
     _tell(document)
-    if story is not None:
-        say(story.sentence())
     say(f'{out}: elastic.json, report.html')
-
-
-def _provenance(data: ElasticData, begin: str, seed: int | None) -> Provenance:
-    """Return what the result was made from."""
-    return Provenance(
-        files=hash_files([*data.bags, *data.steps]),
-        versions=versions(),
-        settings={'start of the tuning': begin},
-        seed=seed,
-    )
-
-
-def _identify(
-    pair: _Machine, data: ElasticData, start: TwoLinkParameters | None, tick: Tick
-) -> TwoInertiaIdentification:
-    """Read the bags, and find the parameters in three steps."""
-    how = options.read_settings(), options.tell_damage
-    runs, responses = (
-        [run for path in paths for run in read_runs(path, pair.robot, pair.sensors, *how)]
-        for paths in (data.bags, data.steps)
-    )
-    return identify_two_inertia(
-        runs, pair.drives, steps=responses, loop=pair.loop, start=start, progress=tick
-    )
 
 
 def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
@@ -233,7 +194,7 @@ def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
 
 
 def _simulate(
-    pair: _Machine, staged: Staged, experiments: int, seed: int, tick: Tick
+    pair: _Machine, staged: Staged, data: ElasticData, seed: int, tick: Tick
 ) -> ElasticData:
     """Write bags of the simulated arm: through the resonances, and steps."""
     for name in DEMO_BAGS:
@@ -245,7 +206,7 @@ def _simulate(
         (
             resonances,
             two_link_loop(shipped, WEAK),
-            resonance_experiments(experiments, rms=EXCITATION_RMS, rng=rng),
+            resonance_experiments(data.experiments, rms=EXCITATION_RMS, rng=rng),
             SENSORS,
         ),
         (steps, two_link_loop(shipped), step_experiments(STEP_POSES, STEPS), STEP_SENSORS),
@@ -254,16 +215,7 @@ def _simulate(
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
         write_runs(path, runs, pair.robot, pair.sensors.on_links(pair.robot))
-    return ElasticData((resonances,), (steps,))
-
-
-def _known(robot: Robot, shipped: TwoLinkSet, begin: str) -> tuple[TwoLinkParameters | None, str]:
-    """Return what the parameters are compared with, and where it comes from."""
-    if robot.name == ROBOT:
-        return shipped.parameters, 'Table 1 of the source, after tuning'
-    if begin != 'found':
-        return two_link_set(begin).parameters, f"the set '{begin}', which the tuning began with"
-    return None, ''
+    return replace(data, bags=(resonances,), steps=(steps,))
 
 
 def _tell(document: dict[str, Any]) -> None:
@@ -280,4 +232,12 @@ def _tell(document: dict[str, Any]) -> None:
         say(
             f'step responses: {tuning["rms_before"]:.4g} rad/s unexplained before tuning, '
             f'{tuning["rms_after"]:.4g} after'
+        )
+    if 'story' in document:
+        story = document['story']
+        say(
+            f'step responses of the true arm: {story["error_before"]:.3g} rad/s rms off before '
+            f'tuning, {story["error_after"]:.2g} after, {story["factor"]:.0f} times smaller; main '
+            f'parameters within {story["main_parameters_percent_before"]:.2g} % before, '
+            f'{story["main_parameters_percent_after"]:.2g} % after'
         )

@@ -17,10 +17,9 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.driven_cycle import check_cycle
 from armid_ros.papers.exo.plant.exercises import exercise
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
-from armid_ros.papers.exo.plant.gait_cycle import gait_cycle, weight
+from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, GaitCycle, weight
 from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
@@ -31,14 +30,8 @@ from armid_ros.papers.exo.plant.leg_pair import (
 from armid_ros.papers.exo.plant.shares import ground_by_shares
 from armid_ros.papers.exo.plant.torque_driven import check_gait
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.page import (
-    exo_report,
-    GaitChecks,
-    ShownMotion,
-    SimulatedWalk,
-    WholeCycle,
-)
-from armid_ros.papers.exo.report.walk import Driven, SOURCE
+from armid_ros.papers.exo.report.page import exo_report, ShownMotion, SimulatedWalk
+from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, Driven
 from armid_ros.recording import read_recording, Recording, write_joint_states
 from armid_ros.recording.writer import require_new, whole_bag
 from armid_ros.robots.assumptions import read_assumptions
@@ -152,11 +145,32 @@ def identify_pair(
 def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
     """Let the simulated pair walk, its joints driven by torque."""
     tick(0.6, 'driving joints by torque')
-    checks = _checks(pair, gait)
+    known, shown = read_assumptions(), _shown(pair, gait)
+    rate = known['torque_rate'].value
+    soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
+    driven = [
+        Driven(*(check_gait(pair, shown.motions, joint, rate, one) for one in (pair, soft)))
+        for joint in _DRIVEN
+    ]
+    single = ByTorque(driven, _SOFTER, shown.abscissa[::2], rate)
     tick(0.75, 'walking a whole cycle')
-    whole = _whole_cycle(stiffness, gait)
+    walkers = walking_pair(stiffness)
+    cycle, rate = gait_cycle(walkers, gait), known['cycle_torque_rate'].value
+    soft, shared = (
+        walkers.with_stiffness((1.0 - _SOFTER) * walkers.stiffness),
+        ground_by_shares(cycle),
+    )
+    driven = [
+        Driven(
+            check_cycle(cycle, joint, rate),
+            check_cycle(cycle, joint, rate, soft),
+            check_cycle(cycle, joint, rate, ground_forces=shared),
+        )
+        for joint in _DRIVEN_IN_CYCLE
+    ]
     truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
-    return SimulatedWalk(truth, checks, whole)
+    whole = CycleByTorque(driven, _SOFTER, cycle.phase[::2], rate)
+    return SimulatedWalk(truth, single, cycle, whole)
 
 
 def _tell(document: dict[str, Any]) -> None:
@@ -215,38 +229,6 @@ def _shown(pair: TiedPair, gait: Gait) -> ShownMotion:
     return ShownMotion(walking(pair, gait, t), phase, 'gait cycle of the swing leg')
 
 
-def _checks(pair: TiedPair, gait: Gait) -> GaitChecks:
-    shown = _shown(pair, gait)
-    rate = read_assumptions()['torque_rate'].value
-    soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
-    checks = [
-        (
-            check_gait(pair, shown.motions, joint, rate),
-            check_gait(pair, shown.motions, joint, rate, soft),
-        )
-        for joint in _DRIVEN
-    ]
-    return GaitChecks(checks, _SOFTER, shown.abscissa[::2], rate)
-
-
-def _whole_cycle(stiffness: float | None, gait: Gait) -> WholeCycle:
-    """Let the pair walk a cycle, and its hip and knee by their torques."""
-    pair = walking_pair(stiffness)
-    cycle = gait_cycle(pair, gait)
-    rate = read_assumptions()['cycle_torque_rate'].value
-    soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
-    shared = ground_by_shares(cycle)
-    driven = [
-        Driven(
-            check_cycle(cycle, joint, rate),
-            check_cycle(cycle, joint, rate, soft),
-            check_cycle(cycle, joint, rate, ground_forces=shared),
-        )
-        for joint in _DRIVEN_IN_CYCLE
-    ]
-    return WholeCycle(cycle, driven, _SOFTER, rate)
-
-
 def _recorded(machine: Recording, wearer: Recording) -> ShownMotion:
     """Return the recorded motion as it is, of which positions alone are shown."""
     shift = 1e-9 * (machine.start_ns - wearer.start_ns)
@@ -278,18 +260,20 @@ def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> d
     ]
     gait = [
         {
-            'joint': right.joint,
-            'error_deg': float(np.degrees(np.abs(right.error).max())),
-            'error_softer_deg': float(np.degrees(np.abs(wrong.error).max())),
+            'joint': d.joint,
+            'error_deg': d.right.most,
+            'error_softer_deg': d.softer.most,
         }
-        for right, wrong in (walked.gait.checks if walked.gait else ())
+        for d in (walked.gait.driven if walked.gait else ())
     ]
     cycle = [
-        dict(
-            zip(('error_deg', 'error_softer_deg', 'error_shared_deg'), d.errors, strict=True),
-            joint=d.joint,
-            source_deg=SOURCE[d.joint.split('_')[-1]],
-        )
+        {
+            'joint': d.joint,
+            'error_deg': d.right.most,
+            'error_softer_deg': d.softer.most,
+            'error_shared_deg': d.shared.most if d.shared else None,
+            'source_deg': d.source,
+        }
         for d in (walked.whole.driven if walked.whole else ())
     ]
     return {
@@ -298,19 +282,19 @@ def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> d
         'stiffness': rows,
         'gait': gait,
         'cycle': cycle,
-        'feet': _feet(walked.whole) if walked.whole else [],
+        'feet': _feet(walked.cycle) if walked.cycle else [],
     }
 
 
-def _feet(whole: WholeCycle) -> list[dict[str, Any]]:
+def _feet(cycle: GaitCycle) -> list[dict[str, Any]]:
     """Return what the feet of both bear."""
-    pair = whole.cycle.pair
+    pair = cycle.pair
     return [
         {
             'machine': robot.name,
             'weight': weight(robot),
-            'most': float(whole.cycle.feet(other=other)[..., 1].max()),
-            'double_support': float(np.mean(whole.cycle.support(other=other) == 2)),
+            'most': float(cycle.feet(other=other)[..., 1].max()),
+            'double_support': float(np.mean(cycle.support(other=other) == 2)),
             'unit': 'N',
         }
         for robot, other in ((pair.robot, False), (pair.other, True))

@@ -6,16 +6,56 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.cli import parameters as options
+from armid_ros.cli import parameters
 import click
+
+#: Columns of the tables in the terminal, and the keys of the document.
+_HEADS = {
+    'paper': 'paper',
+    'against noise': 'against_noise',
+    'weight': 'weight_alone',
+    'whole': 'whole_dynamics',
+}
 
 
 @click.command(epilog='Example: armid lunar --out result')
-@options.folder
-@options.seed
-@options.as_json
+@parameters.folder
+@parameters.seed
+@parameters.as_json
 def lunar(out: Path, seed: int, as_json: bool) -> None:
     """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
-    from armid_ros.papers.lunar.work import repeat_paper
+    from armid_ros.cli import options
+    from armid_ros.cli.origin import provenance
+    from armid_ros.cli.terminal import print_rows, progress, say
+    from armid_ros.files import json_text, write_file
+    from armid_ros.identification import write_document
+    from armid_ros.papers.lunar.output import lunar_document, SCHEMA
+    from armid_ros.papers.lunar.report import lunar_report, sentences
+    from armid_ros.papers.lunar.reproduction import reproduce
 
-    repeat_paper(out, seed, as_json)
+    staged = options.stage(out, SCHEMA)
+    with progress('designing the trajectory') as tick:
+        found = reproduce(seed=seed, progress=tick)
+    document = lunar_document(found)
+    write_document(staged.folder / 'lunar.json', document)
+    page = lunar_report(found, provenance=provenance([], {'robot': 'humanoid_arm'}, seed))
+    write_file(staged.folder / 'report.html', page)
+    staged.keep()
+    if as_json:
+        click.echo(json_text(document))
+        return
+    for table in document['tables']:
+        unit = 'of noise' if table['measure'] == 'mae_over_noise' else '% of peak'
+        rows = [
+            {
+                'joint': joint,
+                **{head: f'{table[key][joint]:.3g}' for head, key in _HEADS.items()},
+                'unit': unit,
+            }
+            for joint in table['paper']
+        ]
+        say(f'Table {table["number"]}, {table["title"]}')
+        print_rows(rows, as_json=False, right=tuple(_HEADS))
+    for sentence in sentences(found):
+        say(sentence)
+    say(f'{out}: lunar.json, report.html')

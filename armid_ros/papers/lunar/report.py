@@ -30,8 +30,10 @@ def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -
         Files, versions, settings, seed.
 
     """
+    held = all(_as_wanted(one) for one in found.repeated)
+    grade = ('reproduced', 'good') if held else ('in part', 'fair')
     sections: list[Section] = [
-        VerdictSection(*_grade(found), sentences(found)),
+        VerdictSection(*grade, sentences(found)),
         PaperTables(found.repeated),
         TorqueCurves(found.repeated),
         GravityParameters(found.composites, _load(found)),
@@ -69,11 +71,6 @@ def sentences(found: Reproduction) -> tuple[str, ...]:
         f'{LOAD:g} kg is.'
     )
     return tuple(lines)
-
-
-def _grade(found: Reproduction) -> tuple[str, str]:
-    held = all(_as_wanted(one) for one in found.repeated)
-    return ('reproduced', 'good') if held else ('in part', 'fair')
 
 
 def _as_wanted(one: Repeated) -> bool:

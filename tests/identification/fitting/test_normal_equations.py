@@ -3,7 +3,6 @@
 """Normal equations of which data do not tell every direction."""
 
 from armid_ros.identification.fitting.normal_equations import (
-    independent_inverse,
     informative_basis,
     informative_solution,
     NormalEquations,
@@ -42,37 +41,6 @@ def test_a_direction_is_told_by_columns_that_differ_in_more_than_rounding(apart,
     assert basis.shape == (2, told)
     fitted = columns @ (basis @ (basis.T @ (columns.T @ (first + second))))
     np.testing.assert_allclose(fitted, first + (told - 1) * second, atol=1e-5)
-
-
-def test_products_of_independent_columns_are_inverted():
-    columns = np.random.default_rng(3).normal(size=(50, 3)) * [1.0, 1e3, 1e-3]
-    products = columns.T @ columns
-    inverse = independent_inverse(products, np.diag(products))
-    np.testing.assert_allclose(inverse, np.linalg.inv(products), rtol=1e-8, atol=1e-12)
-
-
-def test_several_products_are_inverted_one_by_one():
-    columns = np.random.default_rng(4).normal(size=(4, 50, 2))
-    products = np.einsum('knp,knq->kpq', columns, columns)
-    squares = np.einsum('knp,knp->p', columns, columns)
-    together = independent_inverse(products, squares)
-    for own, inverse in zip(products, together, strict=True):
-        np.testing.assert_allclose(independent_inverse(own, squares), inverse, rtol=1e-12)
-
-
-def test_a_column_of_rounding_gets_no_value_and_hides_no_other():
-    columns = np.random.default_rng(5).normal(size=(50, 2)) * [1.0, 1e-15]
-    products = columns.T @ columns + np.diag([0.0, 0.4])  # held to what is expected of it
-    inverse = independent_inverse(products, np.sum(columns**2, axis=0))
-    np.testing.assert_allclose(inverse, np.diag([1.0 / products[0, 0], 0.0]), rtol=1e-9)
-
-
-def test_of_two_columns_that_are_the_same_only_the_sum_is_told():
-    column = np.random.default_rng(6).normal(size=50)
-    products = np.outer([1.0, 2.0], [1.0, 2.0]) * (column @ column)
-    inverse = independent_inverse(products, np.diag(products))
-    values = inverse @ [column @ column, 2.0 * column @ column]
-    assert values @ [1.0, 2.0] == pytest.approx(1.0)
 
 
 def rows(rng, count, size=3):

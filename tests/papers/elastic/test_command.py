@@ -10,7 +10,7 @@ from armid_ros.cli.record import simulate
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation
 from armid_ros.papers.elastic.command import elastic
-from armid_ros.papers.elastic.identification import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from click.testing import CliRunner
@@ -23,48 +23,41 @@ from tests.cli.conftest import armid
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope='module')
-def folder(tmp_path_factory):
-    """Simulate three experiments and the steps, and identify them."""
-    out = tmp_path_factory.mktemp('elastic') / 'result'
-    arguments = ['--demo', '--experiments', '3', '--out', str(out), '--json']
-    result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
-    assert result.exit_code == 0
-    assert json.loads(result.stdout) == json.loads((out / 'elastic.json').read_text())
-    return out
-
-
 def stiffness(document):
     """Return both spring stiffnesses of a document [N m/rad]."""
     return [row['value'] for row in document['parameters'] if row['name'] == 'kg']
 
 
-def test_demo_finds_the_springs(folder) -> None:
-    document = json.loads((folder / 'elastic.json').read_text())
+def test_demo_finds_the_springs(demo) -> None:
+    document = json.loads((demo / 'elastic.json').read_text())
     wanted = two_link_set('after').parameters.stiffness.tolist()
     assert document['schema'] == 'armid/elastic/1'
     assert faults('elastic', document) == []
     assert stiffness(document) == pytest.approx(wanted, rel=0.02)
-    assert (folder / 'report.html').stat().st_size > 10_000
+    assert (demo / 'report.html').stat().st_size > 10_000
 
 
-def test_demo_tells_the_story_of_the_tuning(folder) -> None:
+def test_demo_tells_the_story_of_the_tuning(demo) -> None:
     """From the printed set before tuning to that after it, of which the arm is made."""
-    story = json.loads((folder / 'elastic.json').read_text())['story']
+    story = json.loads((demo / 'elastic.json').read_text())['story']
     assert story['main_parameters_percent_before'] > 50.0
     assert story['main_parameters_percent_after'] < 0.5
     assert story['factor'] > 150.0
 
 
-def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(folder, tmp_path) -> None:
-    arguments = [str(folder / 'resonances'), '--out', str(tmp_path / 'again')]
+def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(demo, tmp_path) -> None:
+    arguments = [str(demo / 'resonances'), '--out', str(tmp_path / 'again')]
     result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
     assert result.exit_code == 0
     assert 'antiresonance' in result.stdout
     again = json.loads((tmp_path / 'again' / 'elastic.json').read_text())
     assert 'tuning' not in again
+    page = (tmp_path / 'again' / 'report.html').read_text(encoding='utf-8')
+    assert 'no intervals' in page
+    assert 'Step responses</h2>' not in page
+    assert '± 95 %</th><th class="number wide">' not in page
     assert faults('elastic', again) == []
-    assert again['untuned'] == json.loads((folder / 'elastic.json').read_text())['untuned']
+    assert again['untuned'] == json.loads((demo / 'elastic.json').read_text())['untuned']
 
 
 def test_a_simulated_arm_on_springs_is_recorded_on_both_sides(tmp_path) -> None:
@@ -88,13 +81,11 @@ def test_a_simulated_arm_on_springs_is_recorded_on_both_sides(tmp_path) -> None:
     np.testing.assert_allclose(spring[still], load[still], atol=0.02 * np.abs(load).max())
 
 
-def test_an_arm_that_is_not_the_shipped_one_is_not_compared_with_its_table(
-    folder, tmp_path
-) -> None:
+def test_an_arm_that_is_not_the_shipped_one_is_not_compared_with_its_table(demo, tmp_path) -> None:
     urdf = tmp_path / 'mine.urdf'
     text = load_robot('two_link_elastic').urdf
     urdf.write_text(text.replace('name="two_link_elastic"', 'name="mine"'), encoding='utf-8')
-    arguments = [str(folder / 'resonances'), '--robot', str(urdf), '--out', str(tmp_path / 'out')]
+    arguments = [str(demo / 'resonances'), '--robot', str(urdf), '--out', str(tmp_path / 'out')]
     result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
     assert result.exit_code == 0
     assert 'Table 1' not in (tmp_path / 'out' / 'report.html').read_text(encoding='utf-8')

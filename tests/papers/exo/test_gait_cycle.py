@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.papers.exo.plant.driven_cycle import check_cycle, driving_torque
-from armid_ros.papers.exo.plant.gait_cycle import weight
+from armid_ros.papers.exo.plant.gait_cycle import check_cycle, driving_torque, weight
 from armid_ros.papers.exo.plant.shares import feet_by_shares, ground_by_shares
 from armid_ros.papers.exo.plant.walkers import contacts, floating, leg_length
 import numpy as np
@@ -109,7 +108,7 @@ def test_mujoco_walks_the_same_cycle(cycle) -> None:
 def test_a_joint_walks_the_cycle_by_its_torque_in_both_engines(cycle, joint) -> None:
     torque = driving_torque(cycle, joint, RATE)
     path = walk_in_mujoco(cycle, joint, lambda t: torque(t)[2]).driven
-    check = check_cycle(cycle, joint, RATE).check
+    check = check_cycle(cycle, joint, RATE)
     column = cycle.pair.robot.index(joint)
     errors = np.degrees(path - cycle.motions.own.q[:, column])
     assert np.abs(errors).max() < REACH[joint]
@@ -120,8 +119,7 @@ def test_a_joint_walks_the_cycle_by_its_torque_in_both_engines(cycle, joint) -> 
 def test_springs_too_soft_have_errors_of_the_size_of_the_source(cycle) -> None:
     soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
     hip, knee = (
-        np.degrees(np.abs(check_cycle(cycle, joint, RATE, soft).check.error)).max()
-        for joint in REACH
+        np.degrees(np.abs(check_cycle(cycle, joint, RATE, soft).error)).max() for joint in REACH
     )
     assert 0.4 < hip < 1.5
     assert 1.0 < knee < 2.5
@@ -129,5 +127,5 @@ def test_springs_too_soft_have_errors_of_the_size_of_the_source(cycle) -> None:
 
 def test_the_rule_of_shares_is_no_foot_force_to_walk_by(cycle) -> None:
     shared = ground_by_shares(cycle)
-    check = check_cycle(cycle, 'exo_right_knee', RATE, ground_forces=shared).check
+    check = check_cycle(cycle, 'exo_right_knee', RATE, ground_forces=shared)
     assert np.degrees(np.abs(check.error)).max() > 2.5

@@ -30,6 +30,30 @@ ORDER = 3
 _HOLD: tuple[Hold, Hold] = ('zero', 'first')  # drives hold their torque, links move smoothly
 
 
+def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    """
+    Return the derivatives of the torques of both links by alpha, beta and gamma.
+
+    Parameters
+    ----------
+    q, dq, ddq : ndarray, shape (N, 2)
+        Motion of the links.
+
+    Returns
+    -------
+    ndarray, shape (N, 2, 3)
+
+    """
+    cosine, sine = np.cos(q[:, 1]), np.sin(q[:, 1])
+    (v1, v2), (a1, a2) = dq.T, ddq.T
+    table = np.zeros((len(q), 2, 3))
+    table[:, 0, 0] = a1
+    table[:, :, 1] = (a1 + a2)[:, np.newaxis]
+    table[:, 0, 2] = cosine * (2.0 * a1 + a2) - sine * (2.0 * v1 * v2 + v2**2)
+    table[:, 1, 2] = cosine * a1 + sine * v1**2
+    return table
+
+
 def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArray:
     """
     Return what each link feels of the motion of the other one, shape (N, 2) [N m].
@@ -37,13 +61,10 @@ def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArr
     Only beta and gamma of the parameters count. The acceleration has to be measured.
 
     """
-    cosine = parameters.gamma * np.cos(link.q[:, 1])
-    sine = parameters.gamma * np.sin(link.q[:, 1])
-    (v1, v2), (a1, a2) = link.dq.T, link.ddq.T
-    coupling = parameters.beta + cosine
-    first = (parameters.beta + 2.0 * cosine) * a1 + coupling * a2
-    first -= sine * (2.0 * v1 * v2 + v2**2)
-    return np.column_stack([first, coupling * a1 + sine * v1**2])
+    others = np.array([0.0, parameters.beta, parameters.gamma])
+    felt = link_columns(link.q, link.dq, link.ddq) @ others
+    felt[:, 1] -= parameters.beta * link.ddq[:, 1]
+    return np.asarray(felt)
 
 
 def direction(velocity: FloatArray) -> FloatArray:
@@ -68,8 +89,8 @@ class DecoupledJoint:
     joint : str
         Its name.
     system : StateSpace
-        From the motor's torque less Coulomb friction, and from the interaction torque where it
-        was an input, to the velocities of motor and link, all at the joint.
+        From the motor's torque less Coulomb friction, and from the interaction torque, to the
+        velocities of motor and link, all at the joint.
 
     """
 
@@ -109,14 +130,10 @@ def joint_signals(
 
 
 def decouple(
-    runs: Sequence[ElasticRun],
-    parameters: TwoLinkParameters,
-    *,
-    decoupled: bool = True,
-    horizon: int = 24,
+    runs: Sequence[ElasticRun], parameters: TwoLinkParameters
 ) -> tuple[DecoupledJoint, DecoupledJoint]:
     """
-    Identify both joints by subspaces, each with or without its interaction torque as an input.
+    Identify both joints by subspaces, each with its interaction torque as an input.
 
     Raises
     ------
@@ -126,53 +143,16 @@ def decouple(
     """
     t = runs[0].motor.t
     dt = float(t[-1] - t[0]) / (len(t) - 1)
-    hold = _HOLD if decoupled else _HOLD[:1]
     first, second = (
         DecoupledJoint(
             name,
             identify_subspace(
-                joint_signals(runs, parameters, joint, decoupled=decoupled),
-                dt,
-                ORDER,
-                hold,
-                horizon=horizon,
+                joint_signals(runs, parameters, joint, decoupled=True), dt, ORDER, _HOLD
             ),
         )
         for joint, name in enumerate(runs[0].motor.joints)
     )
     return first, second
-
-
-def ideal_response(
-    parameters: TwoLinkParameters, joint: int, frequency: npt.ArrayLike
-) -> npt.NDArray[np.complex128]:
-    """
-    Return the frequency response of one link and its motor on a spring.
-
-    Parameters
-    ----------
-    parameters : TwoLinkParameters
-        The arm.
-    joint : int
-        0 for inertia alpha, 1 for beta.
-    frequency : array_like, shape (K,)
-        [Hz].
-
-    Returns
-    -------
-    ndarray of complex, shape (K, 2, 2)
-        From (motor torque, interaction torque) [N m] to velocities of (motor, link) [rad/s], all
-        at the joint.
-
-    """
-    s = 2j * np.pi * np.asarray(frequency, dtype=float)
-    joint_of = slice(joint, joint + 1)
-    spring = parameters.stiffness[joint_of] / s + parameters.spring_damping[joint_of]
-    motor = parameters.rotor[joint] * s + parameters.joint_motor_damping[joint] + spring
-    link = parameters.inertia[joint] * s + parameters.link_damping[joint] + spring
-    determinant = motor * link - spring**2
-    table = np.array([[link, -spring], [spring, -motor]]) / determinant
-    return np.asarray(np.moveaxis(table, 2, 0))
 
 
 def coupled_response(

@@ -21,11 +21,14 @@ from typing import NamedTuple
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.online.recursive import RecursiveLeastSquares
 from armid_ros.motion import FloatArray
+from armid_ros.papers.elastic.identification.interaction import link_columns
 import numpy as np
 from scipy.signal import butter, sosfilt
 
 #: Low-pass of rows and torques [Hz]: above the resonances.
 CUTOFF = 80.0
+#: Samples per second [Hz].
+_RATE = 1000.0
 #: Samples from one update to the next: rows between are alike.
 _STRIDE = 4
 #: Samples that the filter takes to forget what was before.
@@ -69,21 +72,14 @@ class OnlineTwoInertia:
     ----------
     joints : tuple of str
         Names of both.
-    rate : float
-        Samples per second [Hz].
-    forgetting : float
-        Of the recursion, per update; 1 keeps everything.
 
     """
 
-    def __init__(
-        self, joints: tuple[str, ...], rate: float = 1000.0, forgetting: float = 1.0
-    ) -> None:
+    def __init__(self, joints: tuple[str, ...]) -> None:
         rigid = [ParameterName(name, '', 'kg m^2') for name in ('alpha', 'beta', 'gamma')]
         own = [ParameterName(name, joint, unit) for name, unit in _PER_JOINT for joint in joints]
-        self._recursion = RecursiveLeastSquares((*rigid, *own), forgetting=forgetting)
-        self._sections = butter(2, CUTOFF, fs=rate, output='sos')
-        self._dt = 1.0 / rate
+        self._recursion = RecursiveLeastSquares((*rigid, *own))
+        self._sections = butter(2, CUTOFF, fs=_RATE, output='sos')
         self.interrupt()
 
     @property
@@ -104,8 +100,14 @@ class OnlineTwoInertia:
             return False
         table = np.zeros((4, 16))
         table[:2, -1] = before.tau
-        _motor_rows(table, before, sample, self._dt)
-        _link_rows(table, before)
+        _motor_rows(table, before, sample, 1.0 / _RATE)
+        # fill the links' equations at a sample
+        joints = np.arange(2)
+        moved = (part[np.newaxis] for part in (before.link_q, before.link_dq, before.link_ddq))
+        table[2:, :3] = link_columns(*moved)[0]
+        table[2 + joints, 5 + joints] = -(before.motor_q - before.link_q)
+        table[2 + joints, 7 + joints] = before.link_dq
+        table[2 + joints, 11 + joints] = -(before.motor_dq - before.link_dq)
         flat = table.reshape(1, -1)
         if self._state is None:
             self._state = np.zeros((len(self._sections), 2, flat.shape[1]))
@@ -138,17 +140,3 @@ def _motor_rows(table: FloatArray, before: TwoLinkSample, after: TwoLinkSample, 
     for number, column in enumerate(columns):
         if column is not None:
             table[joints, 3 + 2 * number + joints] = column
-
-
-def _link_rows(table: FloatArray, now: TwoLinkSample) -> None:
-    """Fill the links' equations at a sample."""
-    joints = np.arange(2)
-    cosine, sine = np.cos(now.link_q[1]), np.sin(now.link_q[1])
-    (v1, v2), (a1, a2) = now.link_dq, now.link_ddq
-    table[2, 0] = a1
-    table[2:, 1] = a1 + a2
-    table[2, 2] = cosine * (2.0 * a1 + a2) - sine * (2.0 * v1 * v2 + v2**2)
-    table[3, 2] = cosine * a1 + sine * v1**2
-    table[2 + joints, 5 + joints] = -(now.motor_q - now.link_q)
-    table[2 + joints, 7 + joints] = now.link_dq
-    table[2 + joints, 11 + joints] = -(now.motor_dq - now.link_dq)

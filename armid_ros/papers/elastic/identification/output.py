@@ -8,15 +8,20 @@ from collections.abc import Sequence
 from typing import Any
 
 from armid_ros.arm import parameter_table
-from armid_ros.papers.elastic.identification.interaction import decibel_error, ideal_response
+from armid_ros.papers.elastic.identification.interaction import decibel_error
 from armid_ros.papers.elastic.identification.joints import SpringEstimate
 from armid_ros.papers.elastic.identification.names import parameter_names, unpack
-from armid_ros.papers.elastic.identification.physical import BAND
+from armid_ros.papers.elastic.identification.physical import BAND, ideal_response
+from armid_ros.papers.elastic.identification.response import velocities
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
+from armid_ros.papers.elastic.identification.tuning import Tuning
+from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 
 SCHEMA = 'armid/elastic/1'
 SPRINGS_SCHEMA = 'armid/springs/1'
+#: Parameters that step responses determine well; friction and spring damping are less certain.
+MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
 
 
 def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
@@ -75,6 +80,38 @@ def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def tuning_story(
+    tuning: Tuning, start: TwoLinkParameters, truth: TwoLinkParameters
+) -> dict[str, Any]:
+    """
+    Compare a tuning with the arm that was simulated.
+
+    Returns
+    -------
+    dict
+        Root mean square errors of the velocities against those of the true arm, without noise,
+        and largest errors of a main parameter, at the start and at the end.
+
+    """
+    clean = velocities(tuning.steps, truth)
+    main = np.array([name.name in MAIN for name in parameter_names(('', ''))])
+    before, after = (
+        float(np.sqrt(np.mean((one - clean) ** 2))) for one in (tuning.before, tuning.after)
+    )
+    worst, best = (
+        float(100.0 * np.abs(unpack(found) / unpack(truth) - 1.0)[main].max())
+        for found in (start, tuning.parameters)
+    )
+    return {
+        'error_before': before,
+        'error_after': after,
+        'unit': 'rad/s',
+        'factor': before / after,
+        'main_parameters_percent_before': worst,
+        'main_parameters_percent_after': best,
+    }
 
 
 def springs_document(found: Sequence[SpringEstimate], robot: str) -> dict[str, Any]:

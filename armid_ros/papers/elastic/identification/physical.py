@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.interaction import DecoupledJoint
+from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
@@ -58,7 +59,41 @@ class DecoupledFit:
     resonance: float
 
 
-def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> DecoupledFit:
+def ideal_response(
+    parameters: TwoLinkParameters, joint: int, frequency: npt.ArrayLike
+) -> ComplexArray:
+    """
+    Return the frequency response of one link and its motor on a spring.
+
+    Parameters
+    ----------
+    parameters : TwoLinkParameters
+        The arm.
+    joint : int
+        0 for inertia alpha, 1 for beta.
+    frequency : array_like, shape (K,)
+        [Hz].
+
+    Returns
+    -------
+    ndarray of complex, shape (K, 2, 2)
+        From (motor torque, interaction torque) [N m] to velocities of (motor, link) [rad/s], all
+        at the joint.
+
+    """
+    own = (
+        parameters.rotor,
+        parameters.inertia,
+        parameters.stiffness,
+        parameters.spring_damping,
+        parameters.joint_motor_damping,
+        parameters.link_damping,
+    )
+    values = np.array([*(quantity[joint] for quantity in own), 1.0])
+    return response(np.asarray(2j * np.pi * np.asarray(frequency, dtype=float)), values)[0]
+
+
+def fit_joint(joint: DecoupledJoint) -> DecoupledFit:
     """
     Fit a motor and a link on a spring to an identified response.
 
@@ -68,18 +103,18 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Dec
         If the response has no antiresonance and resonance in the band.
 
     """
-    frequency = np.geomspace(*band, _POINTS)
+    frequency = np.geomspace(*BAND, _POINTS)
     found = joint.system.response(frequency)
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
     start = np.log(_first_guess(joint, frequency, found))
 
     def residual(logarithms: FloatArray) -> FloatArray:
-        ratio = (_response(s, np.exp(logarithms))[0] / found - 1.0).ravel()
+        ratio = (response(s, np.exp(logarithms))[0] / found - 1.0).ravel()
         return np.concatenate([ratio.real, ratio.imag])
 
     def jacobian(logarithms: FloatArray) -> FloatArray:
         values = np.exp(logarithms)
-        ratio = _response(s, values)[1] * values / found[..., np.newaxis]
+        ratio = response(s, values)[1] * values / found[..., np.newaxis]
         flat = ratio.reshape(-1, len(values))
         return np.concatenate([flat.real, flat.imag])
 
@@ -98,7 +133,7 @@ def fit_joint(joint: DecoupledJoint, *, band: tuple[float, float] = BAND) -> Dec
     )
 
 
-def _response(s: ComplexArray, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def response(s: ComplexArray, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """
     Return the response of motor and link on a spring, and its derivatives.
 

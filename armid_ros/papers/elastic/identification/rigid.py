@@ -16,8 +16,12 @@ from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.fitting.least_squares import Solution, solve
+from armid_ros.identification.fitting.sandwich import sandwich, score_products
+from armid_ros.identification.fitting.triangle import Triangle
+from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.motion import ElasticRun, FloatArray
-from armid_ros.papers.elastic.identification.interaction import direction
+from armid_ros.papers.elastic.identification.interaction import direction, link_columns
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
@@ -27,6 +31,8 @@ CUTOFF = 2.5
 _ENDS = 0.4
 #: Rows kept in the time of a period at the cutoff, and periods over which their errors last.
 _KEPT, _LASTING = 10, 2
+#: Columns of which one is this share of the others are not identifiable apart.
+_APART = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +64,9 @@ class RigidFit:
         return self.estimate.values[4:6]
 
 
-def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit:
+def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     """
-    Fit the rigid arm to slow motion by least squares.
+    Fit the rigid arm to slow motion by least squares, each joint weighted by its own noise.
 
     Torques and columns pass the same low-pass filter. Accelerations are those of the links'
     accelerometers, positions those of their encoders, friction follows the motors.
@@ -69,8 +75,6 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
     ----------
     runs : sequence of ElasticRun
         Measured experiments with some motion below the cutoff.
-    cutoff : float
-        Of the filter [Hz].
 
     Raises
     ------
@@ -78,73 +82,23 @@ def fit_rigid(runs: Sequence[ElasticRun], *, cutoff: float = CUTOFF) -> RigidFit
         If no experiment is usable, or the parameters are not identifiable from them.
 
     """
-    tables, torques = [], []
-    for run in runs:
-        assert run.motor.tau is not None
-        t = run.motor.t
-        dt = float(t[-1] - t[0]) / (len(t) - 1)
-        # drives hold their torque from one sample to the next: that is half a sample later
-        columns, signs = _columns(run), direction(run.motor.dq)[:-1]
-        between = 0.5 * (columns[:-1] + columns[1:])
-        between[:, [0, 1], [6, 7]] = signs
-        whole = np.concatenate([between, run.motor.tau[:-1, :, np.newaxis]], axis=2)
-        sections = butter(4, cutoff, fs=1.0 / dt, output='sos')
-        ends = round(_ENDS / dt)
-        if len(t) <= 2 * ends + 1:
-            continue
-        kept = sosfiltfilt(sections, whole, axis=0)[
-            ends : -ends : max(round(1.0 / (_KEPT * cutoff) / dt), 1)
-        ]
-        tables.append(kept[:, :, :-1])
-        torques.append(kept[:, :, -1])
-    if not tables:
+    problem = [part for number, run in enumerate(runs) for part in _rows(run, str(number))]
+    if not problem:
         raise IdentificationError(
             f'the rigid fit needs experiments of more than {2 * _ENDS:g} s; there are none'
         )
-    return _solve(tables, torques, runs[0].motor.joints)
-
-
-def _columns(run: ElasticRun) -> FloatArray:
-    """Return the derivatives of both torques by the parameters, without Coulomb, (N, 2, 8)."""
-    link, motor = run.link, run.motor
-    cosine, sine = np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
-    (v1, v2), (a1, a2) = link.dq.T, link.ddq.T
-    table = np.zeros((len(link), 2, 8))
-    table[:, 0, 0] = a1
-    table[:, :, 1] = (a1 + a2)[:, np.newaxis]
-    table[:, 0, 2] = cosine * (2.0 * a1 + a2) - sine * (2.0 * v1 * v2 + v2**2)
-    table[:, 1, 2] = cosine * a1 + sine * v1**2
-    table[:, 1, 3] = a2
-    for joint in range(2):
-        table[:, joint, 4 + joint] = motor.dq[:, joint]
-    return table
-
-
-def _solve(
-    tables: Sequence[FloatArray], torques: Sequence[FloatArray], joints: tuple[str, ...]
-) -> RigidFit:
-    """Solve both joints together, each weighted by its own noise."""
-    table, torque, weight = np.concatenate(tables), np.concatenate(torques), np.ones(2)
-    for _ in range(3):
-        rows = (table / weight[:, np.newaxis]).reshape(-1, 8)
-        scale = np.linalg.norm(rows, axis=0)
-        if not np.all(scale > 0.0):
-            raise IdentificationError('the rigid fit needs motion of both joints; one stands')
-        solution, _, _, sizes = np.linalg.lstsq(
-            rows / scale, (torque / weight).ravel(), rcond=None
+    triangle = Triangle.of(problem)
+    scale = np.linalg.norm(triangle.stacked, axis=0)
+    if not np.all(scale > 0.0):
+        raise IdentificationError('the rigid fit needs motion of both joints; one stands')
+    sizes = np.linalg.svd(triangle.stacked / scale, compute_uv=False)
+    if sizes[-1] < _APART * sizes[0]:
+        raise IdentificationError(
+            'the slow motion does not tell the rigid parameters apart; let both joints '
+            'accelerate in several poses'
         )
-        if sizes[-1] < 1e-6 * sizes[0]:
-            raise IdentificationError(
-                'the slow motion does not tell the rigid parameters apart; let both joints '
-                'accelerate in several poses'
-            )
-        values = solution / scale
-        left = torque - table @ values
-        weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
-    ends = np.cumsum([len(part) for part in tables])[:-1]
-    covariance = _covariance(
-        np.split(table / weight[:, np.newaxis], ends), np.split(left / weight, ends)
-    )
+    solution = solve(problem, triangle=triangle)
+    joints = runs[0].motor.joints
     names = (
         ParameterName('alpha + mm gear^2', joints[0], 'kg m^2'),
         ParameterName('beta', '', 'kg m^2'),
@@ -153,27 +107,42 @@ def _solve(
         *(ParameterName('dl + dm gear^2', joint, 'N m s/rad') for joint in joints),
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
-    error = 100.0 * float(np.linalg.norm(left) / np.linalg.norm(torque))
-    return RigidFit(Estimate(names, values, covariance), error)
+    left = triangle.squares(solution.values).sum() / triangle.torque_squares.sum()
+    estimate = Estimate(names, solution.values, _covariance(problem, solution))
+    return RigidFit(estimate, 100.0 * float(np.sqrt(left)))
 
 
-def _covariance(tables: Sequence[FloatArray], left: Sequence[FloatArray]) -> FloatArray:
-    """
-    Return the covariance of the parameters, shape (8, 8), from experiments and their residuals.
+def _covariance(problem: Sequence[Regression], solution: Solution) -> FloatArray:
+    """Return the covariance where rows are closer than the filter lets errors change, (8, 8)."""
+    rows, target = weighted_rows(problem, solution.weights)
+    joints = solution.weights.shape[1]
+    scores = rows * (target - rows @ solution.values)[:, np.newaxis]
+    scores = scores.reshape(-1, joints, rows.shape[1]).sum(axis=1)
+    ends = np.cumsum([len(part.motion) for part in problem])[:-1]
+    middle = score_products(np.split(scores, ends), _LASTING * _KEPT)
+    freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
+    bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
+    return np.asarray(freedom * sandwich(bread, middle))
 
-    Rows are closer than the filter lets them change, so that errors last from row to row; scores
-    are added up over the time that they do (Newey and West 1987).
 
-    """
-    scores = [
-        np.einsum('njp,nj->np', table, rest) for table, rest in zip(tables, left, strict=True)
-    ]
-    information = sum(np.einsum('njp,njq->pq', table, table) for table in tables)
-    seen = np.asarray(sum(score.T @ score for score in scores))
-    lags = _LASTING * _KEPT
-    for lag in range(1, lags):
-        product = np.asarray(sum(score[:-lag].T @ score[lag:] for score in scores))
-        seen = seen + (1.0 - lag / lags) * (product + product.T)
-    rows = sum(rest.size for rest in left)
-    inverse = np.linalg.inv(information)
-    return np.asarray(rows / max(rows - len(inverse), 1) * inverse @ seen @ inverse)
+def _rows(run: ElasticRun, source: str) -> list[Regression]:
+    """Return the filtered rows of an experiment; none where it is shorter than the filter."""
+    motor, link = run.motor, run.link
+    assert motor.tau is not None
+    dt = float(motor.t[-1] - motor.t[0]) / (len(motor) - 1)
+    ends = round(_ENDS / dt)
+    if len(motor) <= 2 * ends + 1:
+        return []
+    table = np.zeros((len(link), 2, 9))
+    table[:, :, :3] = link_columns(link.q, link.dq, link.ddq)
+    table[:, 1, 3] = link.ddq[:, 1]
+    table[:, [0, 1], [4, 5]] = motor.dq
+    # drives hold their torque from one sample to the next: that is half a sample later
+    between = 0.5 * (table[:-1] + table[1:])
+    between[:, [0, 1], [6, 7]] = direction(motor.dq)[:-1]
+    between[:, :, 8] = motor.tau[:-1]
+    sections = butter(4, CUTOFF, fs=1.0 / dt, output='sos')
+    kept = slice(ends, -ends, max(round(1.0 / (_KEPT * CUTOFF) / dt), 1))
+    rows = sosfiltfilt(sections, between, axis=0)[kept]
+    moved = link.select(slice(0, -1)).select(kept).with_torque(rows[:, :, 8])
+    return [Regression(source, moved, np.ones(moved.q.shape, dtype=bool), rows[:, :, :8])]

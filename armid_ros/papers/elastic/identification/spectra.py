@@ -21,10 +21,11 @@ def measured_response(
     dt: float,
     *,
     window: float = 1.0,
-    hold: bool = True,
 ) -> tuple[FloatArray, ComplexArray]:
     """
     Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
+
+    The first input is held between samples; its response is that to the continuous, held signal.
 
     Parameters
     ----------
@@ -34,9 +35,6 @@ def measured_response(
         Time between samples [s].
     window : float
         Length of the averaged stretches [s], half overlapping, under a Hann window.
-    hold : bool
-        Whether the first input is held between samples; its response is then that to the
-        continuous, held signal.
 
     Returns
     -------
@@ -69,7 +67,6 @@ def measured_response(
     frequency = np.fft.rfftfreq(size, dt)[1:]
     inverse = np.linalg.pinv(np.sum(power, axis=0)[1:], rcond=1e-12, hermitian=True)
     response = np.asarray(np.sum(cross, axis=0)[1:] @ inverse)
-    if hold:
-        s = 2j * np.pi * frequency * dt
-        response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
+    s = 2j * np.pi * frequency * dt
+    response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
     return np.asarray(frequency, dtype=np.float64), response

@@ -42,15 +42,12 @@ class StateSpace:
         Inputs to modes.
     c : ndarray of complex, shape (p, r)
         Modes to outputs.
-    singular_values : ndarray
-        Of the past-future relation; a gap after the r-th says that the order is r.
 
     """
 
     poles: ComplexArray
     b: ComplexArray
     c: ComplexArray
-    singular_values: FloatArray
 
     def response(self, frequency: npt.ArrayLike) -> ComplexArray:
         """Return the frequency response, shape (K, p, m), at frequencies in Hz, shape (K,)."""
@@ -126,7 +123,7 @@ def identify_subspace(
     if not (np.all(u_scale > 0.0) and np.all(y_scale > 0.0)):
         raise IdentificationError('subspace identification: an input or an output is always zero')
     scaled = [Signals(e.u / u_scale, e.y / y_scale) for e in experiments]
-    a, c, sizes = _observable(scaled, order, horizon)
+    a, c = _observable(scaled, order, horizon)
     eigenvalues, vectors = np.linalg.eig(a)
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
@@ -136,7 +133,7 @@ def identify_subspace(
     poles = np.log(eigenvalues.astype(complex)) / dt
     modal = c @ vectors
     b = _inputs(scaled, dt, poles, modal, hold)
-    return StateSpace(poles, b / u_scale, y_scale[:, np.newaxis] * modal, sizes)
+    return StateSpace(poles, b / u_scale, y_scale[:, np.newaxis] * modal)
 
 
 def _require_data(
@@ -162,8 +159,8 @@ def _require_data(
 
 def _observable(
     experiments: Sequence[Signals], order: int, horizon: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return state and output matrix of a sampled system, and the singular values."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return state and output matrix of a sampled system."""
     m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
     triangle = np.empty((0, 2 * horizon * (m + p)))
     for e in experiments:
@@ -179,7 +176,7 @@ def _observable(
     left, sizes, _ = np.linalg.svd(lower[(2 * m + p) * horizon :, past])
     gamma = left[:, :order] * np.sqrt(sizes[:order])
     a = np.linalg.lstsq(gamma[:-p], gamma[p:], rcond=None)[0]
-    return a, gamma[:p], sizes
+    return a, gamma[:p]
 
 
 def _hankel(values: FloatArray, rows: int) -> FloatArray:

@@ -75,9 +75,6 @@ class TransmissionFit:
     backlash : tuple of float
         Whole free play [rad]; NaN within infinite bounds where the load changes flanks too
         rarely for it to be seen.
-    direction : tuple of float
-        Twist that follows the direction of travel, to either side [rad]; NaN where the torque is
-        what the spring carries.
     delay : tuple of float
         Twist per velocity: by how much the link's encoder is read later than the motor's [s].
     correlation : float
@@ -86,20 +83,16 @@ class TransmissionFit:
         Times that the load changed flanks; without any, backlash is an offset.
     explained : float
         R^2 of the whole model.
-    explained_alone : float
-        R^2 of the one without free play.
 
     """
 
     stiffness: tuple[float, float, float]
     stiffness_alone: tuple[float, float, float]
     backlash: tuple[float, float, float]
-    direction: tuple[float, float, float]
     delay: tuple[float, float, float]
     correlation: float
     reversals: int
     explained: float
-    explained_alone: float
 
     @property
     def backlash_seen(self) -> bool:
@@ -137,11 +130,10 @@ def fit_transmission(
     bare = np.delete(table, 1, axis=1)
     found_alone, spread_alone = _drawn(bare, twist, blocks, draws)
     alone = _inverse(found_alone[0], spread_alone[:, 0])
-    explained_alone = _explained(bare, twist, found_alone)
     if reversals < _REVERSALS:
         found, spread = (np.insert(x, 1, np.nan, axis=-1) for x in (found_alone, spread_alone))
         backlash, correlation = (np.nan, -np.inf, np.inf), np.nan
-        explained = explained_alone
+        explained = _explained(bare, twist, found_alone)
     else:
         found, spread = _drawn(table, twist, blocks, draws)
         backlash = _interval(2.0 * found[1], 2.0 * spread[:, 1])
@@ -151,12 +143,10 @@ def fit_transmission(
         _inverse(found[0], spread[:, 0]),
         alone,
         backlash,
-        (np.nan, -np.inf, np.inf) if records[0].carried else _interval(found[3], spread[:, 3]),
         _interval(found[2], spread[:, 2]),
         correlation,
         reversals,
         explained,
-        explained_alone,
     )
 
 

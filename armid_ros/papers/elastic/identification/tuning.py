@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
+from armid_ros.identification.fitting.sandwich import score_products, widened
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.names import pack, parameter_names, SIZE, unpack
 from armid_ros.papers.elastic.identification.response import (
@@ -63,8 +64,6 @@ class Tuning:
     measured, before, after : ndarray, shape (N, E, 4)
         Velocities of motors and links [rad/s], measured and simulated with the parameters at
         the start and at the end.
-    evaluations : int
-        Simulations of all experiments with derivatives.
 
     """
 
@@ -74,7 +73,6 @@ class Tuning:
     measured: FloatArray
     before: FloatArray
     after: FloatArray
-    evaluations: int
 
     @property
     def rms(self) -> tuple[float, float]:
@@ -85,19 +83,11 @@ class Tuning:
         )
 
 
-def believed(split: float = _SPLIT) -> FloatArray:
-    """
-    Return what is believed of the logarithms of factors, a row of unit deviation each, (4, 15).
-
-    Parameters
-    ----------
-    split : float
-        How far that of motor and link friction is, one deviation.
-
-    """
+def _prior() -> FloatArray:
+    """Return the prior of the logarithms of factors, a row of unit deviation each, (4, 15)."""
     rows = np.zeros((4, SIZE + 2))
     for row, (link, motor) in enumerate(zip(_LINK, _MOTOR, strict=True)):
-        rows[row, link], rows[row, motor] = 1.0 / split, -1.0 / split
+        rows[row, link], rows[row, motor] = 1.0 / _SPLIT, -1.0 / _SPLIT
     rows[[2, 3], list(_COULOMB)] = 1.0 / _BELIEVED
     return rows
 
@@ -106,9 +96,6 @@ def tune(
     runs: Sequence[ElasticRun],
     start: TwoLinkParameters,
     loop: VelocityLoop,
-    *,
-    split: float = _SPLIT,
-    links_only: bool = False,
 ) -> Tuning:
     """
     Tune the parameters to velocity responses under the loop that drove them.
@@ -121,11 +108,6 @@ def tune(
         Where to begin; its drives stay.
     loop : VelocityLoop
         Gains of the loop.
-    split : float
-        How far the split of friction between motor and link of the start is believed: logarithm
-        of a factor, one standard deviation.
-    links_only : bool
-        Whether the velocities of the motors are left out.
 
     Raises
     ------
@@ -140,11 +122,10 @@ def tune(
     measured = np.stack(
         [np.hstack([run.motor.dq[:count], run.link.dq[:count]]) for run in runs], axis=1
     )
-    chosen = slice(2, 4) if links_only else slice(0, 4)
     base = np.concatenate([unpack(start), start.coulomb])
-    prior = believed(split)
-    weight = np.ones(measured[:, :, chosen].shape[-1])
-    white = _Whitener.of(steps, start, chosen, weight)
+    prior = _prior()
+    weight = np.ones(measured.shape[-1])
+    white = _Whitener.of(steps, start, weight)
 
     def arm(factors: FloatArray) -> TwoLinkParameters:
         values = base * np.exp(factors)
@@ -152,29 +133,33 @@ def tune(
 
     def residual(factors: FloatArray) -> FloatArray:
         simulated = velocities(steps, arm(factors))
-        left = white((simulated - measured)[:, :, chosen, np.newaxis] / weight[:, np.newaxis])
+        left = white((simulated - measured)[..., np.newaxis] / weight[:, np.newaxis])
         return np.concatenate([left.ravel(), prior @ factors])
 
     def jacobian(factors: FloatArray) -> FloatArray:
         now = base * np.exp(factors)
         _, slopes = sensitivities(steps, arm(factors), np.diag(now))
-        slopes = white(slopes[:, :, chosen] / weight[:, np.newaxis])
+        slopes = white(slopes / weight[:, np.newaxis])
         return np.vstack([slopes.reshape(-1, len(base)), prior])
 
-    factors, evaluations = np.zeros(len(base)), 0
+    factors = np.zeros(len(base))
     for _ in range(_ROUNDS):  # from the second on every sensor counts by its own noise
         fit = least_squares(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )
-        factors, evaluations = fit.x, evaluations + fit.njev
+        factors = fit.x
         left = fit.fun[: -len(prior)].reshape(-1, len(weight)) * weight
         weight = np.sqrt(np.mean(left**2, axis=0)) + 1e-12
-        white = _Whitener.of(steps, arm(factors), chosen, weight)
+        white = _Whitener.of(steps, arm(factors), weight)
     after = arm(factors)
     found = unpack(after)
     rows, left = jacobian(factors), residual(factors)
-    relative = _covariance(rows) * _lasting(rows, left, measured.shape[:2])
-    relative = relative[:SIZE, :SIZE]
+    # residuals last: scores of a sample are those of its channels, and the prior has none
+    white_noise, data = _covariance(rows), len(left) - len(prior)
+    scores = (rows * left[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
+    lags = max(1, count // _LASTING)
+    middle = prior.T @ prior + score_products(list(scores.transpose(1, 0, 2)), lags)
+    relative = widened(white_noise, white_noise, middle)[:SIZE, :SIZE]
     return Tuning(
         after,
         Estimate(parameter_names(runs[0].motor.joints), found, relative * np.outer(found, found)),
@@ -182,7 +167,6 @@ def tune(
         measured,
         velocities(steps, start),
         velocities(steps, after),
-        evaluations,
     )
 
 
@@ -194,10 +178,8 @@ class _Whitener:
     shares: FloatArray  # (E, 4): what of each is taken away
 
     @classmethod
-    def of(
-        cls, steps: Steps, parameters: TwoLinkParameters, chosen: slice, weight: FloatArray
-    ) -> _Whitener:
-        slopes = ringing(steps, parameters)[:, :, chosen] * _RINGING / weight[:, np.newaxis]
+    def of(cls, steps: Steps, parameters: TwoLinkParameters, weight: FloatArray) -> _Whitener:
+        slopes = ringing(steps, parameters) * _RINGING / weight[:, np.newaxis]
         flat = np.moveaxis(slopes, 1, 0).reshape(slopes.shape[1], -1, slopes.shape[3])
         shapes, sizes, _ = np.linalg.svd(flat, full_matrices=False)
         return cls(shapes.transpose(0, 2, 1), 1.0 - 1.0 / np.sqrt(1.0 + sizes**2))
@@ -210,33 +192,6 @@ class _Whitener:
         count, experiments, channels, columns = values.shape
         clean = clean.reshape(experiments, count, channels, columns)
         return np.asarray(np.moveaxis(clean, 0, 1))
-
-
-def _lasting(jacobian: FloatArray, residual: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-    """
-    Return how much wider covariances are where residuals last, shape (F, F), 1 for white noise.
-
-    Parameters
-    ----------
-    jacobian, residual : ndarray, shapes (K, F) and (K,)
-        Of samples, experiments and channels, in this order, and what is believed after them.
-    shape : tuple of int
-        Samples and experiments.
-
-    """
-    count, experiments = shape
-    data = len(residual) - len(believed())
-    scores = (jacobian * residual[:, np.newaxis])[:data]
-    scores = scores.reshape(count, experiments, -1, jacobian.shape[1]).sum(axis=2)
-    seen = jacobian[data:].T @ jacobian[data:]
-    lags = max(1, count // _LASTING)
-    for lag in range(lags):
-        product = np.einsum('nep,neq->pq', scores[: count - lag], scores[lag:])
-        seen = seen + (1.0 - lag / lags) * (product if lag == 0 else product + product.T)
-    white = _covariance(jacobian)
-    ratio = np.diag(white @ seen @ white) / np.diag(white)
-    factor = np.sqrt(np.maximum(ratio, 1.0))
-    return np.outer(factor, factor)
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:

@@ -16,8 +16,10 @@ import numpy.typing as npt
 EXCITATION_RMS, WEAK = (60.0, 45.0), 0.15
 STEP_POSES = ((0.0, 0.0), (0.0, np.pi / 2), (0.0, np.pi / 4), (0.0, 3 * np.pi / 4))
 STEPS = ((1.0, 0.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0))
-#: Step of experiments through the resonances [s], and the band of their multisine [Hz].
+#: Step of experiments [s], and the band of their multisine [Hz].
 _DT, _BAND = 1e-3, (2.0, 100.0)
+#: Time of an experiment with a step [s].
+_STEP = 0.5
 #: Amplitude of the slow velocity [rad/s], and its lowest and highest frequency [Hz]; each
 #: experiment has its own.
 _SPEED, _SLOW = 0.8, (0.3, 1.0)
@@ -67,11 +69,7 @@ def resonance_experiments(
 
 
 def step_experiments(
-    poses: Sequence[npt.ArrayLike],
-    velocities: Sequence[npt.ArrayLike],
-    *,
-    duration: float = 0.5,
-    dt: float = 1e-3,
+    poses: Sequence[npt.ArrayLike], velocities: Sequence[npt.ArrayLike]
 ) -> list[Experiment]:
     """
     Return steps of the reference velocity from rest.
@@ -80,11 +78,9 @@ def step_experiments(
     ----------
     poses, velocities : sequence of array_like, each of shape (n,)
         Where each begins [rad], and what it asks for [rad/s].
-    duration, dt : float
-        Of each experiment, and its step [s].
 
     """
-    steps = round(duration / dt)
+    steps = round(_STEP / _DT)
     return [
         Experiment(np.asarray(q, dtype=float), np.tile(np.asarray(v, dtype=float), (steps, 1)))
         for q, v in zip(poses, velocities, strict=True)

@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.elastic.identification import (
-    decibel_error,
-    ideal_response,
-    TwoInertiaIdentification,
-)
+from armid_ros.papers.elastic.identification.interaction import decibel_error
+from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.report.parameters import ElasticParameters, RigidParameters
 from armid_ros.papers.elastic.report.steps import COMPARED, Responses, StepResponses
 from armid_ros.report.notation import counted, digits

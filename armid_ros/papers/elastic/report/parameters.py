@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.elastic.identification import RigidFit, TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.names import parameter_names, unpack
 from armid_ros.papers.elastic.identification.output import total_damping
-from armid_ros.papers.elastic.identification.rigid import CUTOFF
-from armid_ros.report.notation import digits, pretty
+from armid_ros.papers.elastic.identification.rigid import CUTOFF, RigidFit
+from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
+from armid_ros.report.notation import digits, measured, pretty
 from armid_ros.report.page import Section
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
@@ -62,7 +62,7 @@ class ElasticParameters(Section):
         rows = [
             (
                 pretty(name.name), name.joint, pretty(name.unit),
-                *_rounded(values[k], HALF_WIDTH * std[k]),
+                *measured(values[k], HALF_WIDTH * std[k]),
                 digits(untuned[k], 4),
                 *_against(values[k], None if base is None else base[k]),
             )
@@ -75,25 +75,12 @@ class ElasticParameters(Section):
             rows.append(
                 (
                     pretty(total['name']), total['joint'], pretty(total['unit']),
-                    *_rounded(total['value'], HALF_WIDTH * total['std']),
+                    *measured(total['value'], HALF_WIDTH * total['std']),
                     digits(float(result.untuned.total_damping[k]), 4),
                     *_against(total['value'], known),
                 )
             )  # fmt: skip
         return rows
-
-
-def _rounded(value: float, reach: float) -> tuple[str, str]:
-    """Return a value to the digit that its interval leaves, and half of that."""
-    if not reach > 0.0:
-        return digits(value, 4), ''
-    place = int(np.floor(np.log10(reach))) - 1
-    if abs(value) < 1e-2:
-        return f'{value:.{max(0, int(np.floor(np.log10(abs(value)))) - place)}e}', f'{reach:.1e}'
-    return (
-        f'{round(value, -place):.{max(0, -place)}f}',
-        f'{round(reach, -place):.{max(0, -place)}f}',
-    )
 
 
 def _against(value: float, known: float | None) -> tuple[str, str]:
@@ -131,7 +118,7 @@ class RigidParameters(Section):
         """Name, joint, value, half width of the interval, unit."""
         estimate = self.fit.estimate
         return [
-            (pretty(name.name), name.joint, *_rounded(value, HALF_WIDTH * std), pretty(name.unit))
+            (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))
             for name, value, std in zip(
                 estimate.parameters, estimate.values, estimate.std, strict=True
             )

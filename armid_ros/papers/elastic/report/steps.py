@@ -9,12 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification import (
-    coupled_response,
-    decibel_error,
-    ideal_response,
-    TwoInertiaIdentification,
-)
+from armid_ros.papers.elastic.identification.interaction import coupled_response, decibel_error
+from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
 from armid_ros.report.charts import Chart, Mark, Role, Series
 from armid_ros.report.notation import digits

@@ -11,13 +11,12 @@ amplitude, late, and with joints that are not quite aligned, as assumed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
-from armid_ros.papers.exo.plant.leg_pair import PairMotion, stepping, TiedPair
-from armid_ros.robots.assumptions import read_assumptions
+from armid_ros.papers.exo.plant.leg_pair import following, PairMotion, stepping, TiedPair
 import numpy as np
 
 
@@ -90,13 +89,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     plan = EXERCISES[name]
     if name.endswith('step'):
         return stepping(pair, gait or read_gait(), t, plan.period)
-    known = read_assumptions()
-    other = _moving(plan, pair.other.joints, t)
-    own = _moving(plan, pair.robot.joints, t - known['exoskeleton_delay'].value)
-    scale = known['exoskeleton_scale'].value
-    offset = np.radians(known['exoskeleton_offset_deg'].value)
-    parts = (scale * own.q + offset, scale * own.dq, scale * own.ddq)
-    return PairMotion(replace(own, t=t, q=parts[0], dq=parts[1], ddq=parts[2]), other)
+    return following(pair, t, lambda joints, time: _moving(plan, joints, time))
 
 
 def _moving(plan: Exercise, joints: tuple[str, ...], t: FloatArray) -> Motion:

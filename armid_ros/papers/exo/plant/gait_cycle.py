@@ -20,6 +20,13 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.plant.contact import Ground
 from armid_ros.papers.exo.plant.gait import Gait
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
+from armid_ros.papers.exo.plant.torque_driven import (
+    drive_by_torque,
+    DrivingTorque,
+    GaitCheck,
+    runge_kutta,
+    splined,
+)
 from armid_ros.papers.exo.plant.walkable import walkable, WalkableGait
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.robots import Robot
@@ -102,7 +109,7 @@ def weight(robot: Robot) -> float:
     return float(robot.rigid_parameters[::10].sum() * np.linalg.norm(robot.gravity))
 
 
-def gait_cycle(pair: TiedPair, gait: Gait, ground: Ground | None = None) -> GaitCycle:
+def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
     """
     Let a pair walk until it does the same every cycle, and return one.
 
@@ -112,12 +119,10 @@ def gait_cycle(pair: TiedPair, gait: Gait, ground: Ground | None = None) -> Gait
         A pair that is free to walk: ``walking_pair``.
     gait : Gait
         Of the wearer; the nearest one that can be walked is taken.
-    ground : Ground, optional
-        As the source has it by default.
 
     """
     known = read_assumptions()
-    ground = ground or Ground(creep=known['ground_creep'].value)
+    ground = Ground(creep=known['ground_creep'].value)
     cycle, late = known['cycle_time'].value, known['exoskeleton_delay'].value
     worn = walkable(gait, leg_length(pair.other), cycle)
     phase = np.arange(100) / 100.0
@@ -260,6 +265,7 @@ def _walk(
     masses = np.array([own.mass, own.mass, far.mass, far.mass])
 
     def rate(k: int, x: FloatArray) -> FloatArray:
+        k %= 2 * _STEPS
         pulls = []
         for course, place, speed in ((own, x[:2], x[4:6]), (far, x[2:4], x[6:])):
             points = course.contact[k] + place
@@ -272,17 +278,12 @@ def _walk(
         force = np.concatenate([pulls[0] + spring, pulls[1] - spring])
         return np.concatenate([x[4:], force / masses])
 
-    h, x, last = cycle / _STEPS, start, 2 * _STEPS
+    h, x = cycle / _STEPS, start
     states, rates = np.empty((_STEPS + 1, 8)), np.empty((_STEPS + 1, 8))
     for _ in range(1 + _SETTLING):
         for step in range(_STEPS):
-            k = 2 * step
-            a = rate(k, x)
-            states[step], rates[step] = x, a
-            b = rate(k + 1, x + 0.5 * h * a)
-            c = rate(k + 1, x + 0.5 * h * b)
-            d = rate((k + 2) % last, x + h * c)
-            x = x + h / 6.0 * (a + 2.0 * (b + c) + d)
+            states[step] = x
+            rates[step], x = runge_kutta(rate, 2 * step, h, x)
         states[-1], rates[-1] = x, rate(0, x)
     return states, rates
 
@@ -303,3 +304,59 @@ def _placed(
         values[:, hips] = found
     t = np.linspace(0.0, cycle, len(rows))
     return Motion(legs.joints, t, *parts)
+
+
+def check_cycle(
+    cycle: GaitCycle,
+    joint: str,
+    rate: float,
+    believed: TiedPair | None = None,
+    ground_forces: FloatArray | None = None,
+) -> GaitCheck:
+    """
+    Let one joint of the machine walk a cycle by its torque, on the ground, its hips free.
+
+    The source puts computed torques into another engine and reads off how far hip and knee are
+    from the gait.
+
+    Parameters
+    ----------
+    cycle : GaitCycle
+        What was prescribed, and what acts then.
+    joint : str
+        The joint that follows its torque.
+    rate : float
+        Torque samples per second, joined by cubic splines.
+    believed : TiedPair, optional
+        The machines that the torques are computed for; by default those that there are.
+    ground_forces : ndarray, shape (N, 4, 2), optional
+        Forces on heels and toes that the torques are computed for [N]; by default those that
+        there are.
+
+    """
+    pair, motions = cycle.pair, cycle.motions
+    torque = driving_torque(cycle, joint, rate, believed, ground_forces)
+    moved = drive_by_torque(pair, *motions, driven_joints(pair.robot, joint), torque, cycle.soil)
+    return GaitCheck(joint, motions.own.q[::2, pair.robot.index(joint)], moved)
+
+
+def driven_joints(robot: Robot, joint: str) -> list[str]:
+    """Return what moves freely when a joint is driven: hips forward and up, and the joint."""
+    return [*(robot.joints[place] for place in floating(robot)[:2]), joint]
+
+
+def driving_torque(
+    cycle: GaitCycle,
+    joint: str,
+    rate: float,
+    believed: TiedPair | None = None,
+    ground_forces: FloatArray | None = None,
+) -> DrivingTorque:
+    """Return nothing for the hips, and the splined torque of a joint, shape (3,) [N, N m]."""
+    tau = cycle.torques.tau
+    if believed is not None or ground_forces is not None:
+        on_feet = cycle.ground if ground_forces is None else ground_forces
+        pair = believed or cycle.pair
+        tau = walking_torques(pair, cycle.motions, on_feet, cycle.other_ground).tau
+    curve = splined(cycle.motions.own.t, tau[:, [cycle.pair.robot.index(joint)]], rate)
+    return lambda t: np.concatenate([[0.0, 0.0], curve(t)])

@@ -244,7 +244,7 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = Non
     known = read_assumptions()
     begin = known['single_support'].value[0] if start is None else start
     cycle = known['cycle_time'].value
-    return _moving(pair, gait, t, lambda time: steady_phase(time, cycle, begin))
+    return _on_one_foot(pair, gait, t, lambda time: steady_phase(time, cycle, begin))
 
 
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
@@ -266,17 +266,34 @@ def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = N
     known = read_assumptions()
     begin, end = known['single_support'].value
     length = known['stepping_period'].value if period is None else period
-    return _moving(pair, gait, t, lambda time: stepping_phase(time, length, begin, end))
+    return _on_one_foot(pair, gait, t, lambda time: stepping_phase(time, length, begin, end))
 
 
-def _moving(
-    pair: TiedPair, gait: Gait, t: FloatArray, phase: Callable[[FloatArray], Phase]
+def following(
+    pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
+    """
+    Let the machine follow its wearer: late, with less amplitude, its joints not quite aligned.
+
+    Parameters
+    ----------
+    pair : TiedPair
+        The shipped pair.
+    t : ndarray, shape (N,)
+        Time [s].
+    moving : callable (joints, t) -> Motion
+        How the wearer moves.
+
+    """
     known = read_assumptions()
-    other = stance_motion(gait, pair.other.joints, t, phase(t))
-    late = phase(t - known['exoskeleton_delay'].value)
-    own = stance_motion(gait, pair.robot.joints, t, late)
+    own = moving(pair.robot.joints, t - known['exoskeleton_delay'].value)
     scale = known['exoskeleton_scale'].value
     offset = np.radians(known['exoskeleton_offset_deg'].value)
-    own = replace(own, q=scale * own.q + offset, dq=scale * own.dq, ddq=scale * own.ddq)
-    return PairMotion(own, other)
+    own = replace(own, t=t, q=scale * own.q + offset, dq=scale * own.dq, ddq=scale * own.ddq)
+    return PairMotion(own, moving(pair.other.joints, t))
+
+
+def _on_one_foot(
+    pair: TiedPair, gait: Gait, t: FloatArray, phase: Callable[[FloatArray], Phase]
+) -> PairMotion:
+    return following(pair, t, lambda joints, time: stance_motion(gait, joints, time, phase(time)))

@@ -12,10 +12,9 @@ weigh and take to accelerate, less what the springs carry. While one foot stands
 from __future__ import annotations
 
 from armid_ros.model.kinematics import points_motion
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.walkers import columns, floating, SIDES
-from armid_ros.robots import Robot
 import numpy as np
 
 _PLANE = np.array([0, 2])
@@ -36,7 +35,15 @@ def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
     robot, motion = (
         (cycle.pair.other, cycle.motions.other) if other else (cycle.pair.robot, cycle.motions.own)
     )
-    place, taken = _bodies(robot, motion)
+    # centroids and m (c'' - g) of all bodies, both
+    bodies = list(robot.model.inertias)[1:]
+    levers = np.array([body.lever for body in bodies])
+    place, jacobian = points_motion(robot, list(robot.joints), levers, motion.q)
+    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
+    hurry = np.gradient(speed, motion.t, axis=0)
+    mass = np.array([body.mass for body in bodies])
+    taken = mass[:, np.newaxis] * (hurry - robot.gravity)
+    place, taken = place[..., _PLANE], taken[..., _PLANE]
     trunk = floating(robot)[2]
     legs = [columns(robot, side) for side in SIDES]
     left, right = trunk_shares(place[:, trunk], place[:, legs[1][0]], place[:, legs[0][0]])
@@ -89,15 +96,3 @@ def trunk_shares(
     to_stance = np.linalg.norm(stance_thigh - trunk, axis=-1)
     swing = np.asarray(to_stance / (to_swing + to_stance))
     return swing, 1.0 - swing
-
-
-def _bodies(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return centroids and m (c'' - g) of all bodies, both of shape (N, n, 2) [m, N]."""
-    bodies = list(robot.model.inertias)[1:]
-    levers = np.array([body.lever for body in bodies])
-    place, jacobian = points_motion(robot, list(robot.joints), levers, motion.q)
-    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
-    hurry = np.gradient(speed, motion.t, axis=0)
-    mass = np.array([body.mass for body in bodies])
-    taken = mass[:, np.newaxis] * (hurry - robot.gravity)
-    return place[..., _PLANE], taken[..., _PLANE]

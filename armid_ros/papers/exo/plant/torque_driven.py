@@ -15,15 +15,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.model.spring_ties import tie_geometry
+from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.papers.exo.plant.contact import Ground
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.walkers import contacts, leg_length
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 #: Torques of the driven joints, shape (d,) [N m], at a time [s].
 DrivingTorque = Callable[[float], FloatArray]
+#: Rate of a state, shape (s,), at a sample of what is prescribed.
+Rate = Callable[[int, FloatArray], FloatArray]
 
 
 def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
@@ -46,12 +50,41 @@ def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
     return lambda time: np.asarray(curve(time))
 
 
+def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Advance a state over samples k to k + 2, of which k + 1 is the middle, to order 4.
+
+    Parameters
+    ----------
+    rate : callable
+        Rate of the state at a sample.
+    k : int
+        Where to begin.
+    h : float
+        Time from sample k to k + 2 [s].
+    x : ndarray, shape (s,)
+        State at sample k.
+
+    Returns
+    -------
+    slope, after : ndarray, shape (s,)
+        Rate at sample k, and state at k + 2.
+
+    """
+    a = rate(k, x)
+    b = rate(k + 1, x + 0.5 * h * a)
+    c = rate(k + 1, x + 0.5 * h * b)
+    d = rate(k + 2, x + h * c)
+    return a, x + h / 6.0 * (a + 2.0 * (b + c) + d)
+
+
 def drive_by_torque(
     pair: TiedPair,
     motion: Motion,
     other_motion: Motion,
     driven: Sequence[str],
     torque: DrivingTorque,
+    ground: Ground | None = None,
 ) -> Motion:
     """
     Integrate the driven joints of the machine; everything else moves as prescribed.
@@ -67,6 +100,8 @@ def drive_by_torque(
         Joints of the machine that follow torques.
     torque : callable
         Their torques.
+    ground : Ground, optional
+        What the feet of a pair that is free to walk stand on.
 
     Returns
     -------
@@ -82,26 +117,80 @@ def drive_by_torque(
     if len(motion) % 2 == 0:
         raise TrajectoryError(f'{len(motion)} samples; steps of two take an odd number')
     columns = [pair.robot.index(joint) for joint in driven]
-    model = pair.robot.model
-    data = model.createData()
+    machine = _Machine(pair, PairMotion(motion, other_motion), columns, ground)
 
-    def acceleration(k: int, q: FloatArray, dq: FloatArray) -> FloatArray:
-        state = [np.array(part[k]) for part in (motion.q, motion.dq, motion.ddq)]
-        state[0][columns], state[1][columns], state[2][columns] = q, dq, 0.0
-        load = pin.rnea(model, data, *state) - _spring_torque(pair, other_motion, k, *state[:2])
-        inertia = pin.crba(model, data, state[0])
-        tau = torque(float(motion.t[k]))
-        return np.asarray(np.linalg.solve(inertia[np.ix_(columns, columns)], tau - load[columns]))
+    def rate(k: int, x: FloatArray) -> FloatArray:
+        return machine.rate(k, x, torque(float(motion.t[k])))
 
-    q, dq = np.array(motion.q[0, columns]), np.array(motion.dq[0, columns])
-    rows = [(q, dq, acceleration(0, q, dq))]
+    x = np.concatenate([motion.q[0, columns], motion.dq[0, columns]])
+    rows = []
     for k in range(0, len(motion) - 2, 2):
-        q, dq = _step(acceleration, k, float(motion.t[k + 2] - motion.t[k]), q, dq)
-        rows.append((q, dq, acceleration(k + 2, q, dq)))
+        slope, after = runge_kutta(rate, k, float(motion.t[k + 2] - motion.t[k]), x)
+        rows.append((x, slope))
+        x = after
+    rows.append((x, rate(len(motion) - 1, x)))
+    states, slopes = (np.array(part) for part in zip(*rows, strict=True))
+    count = len(columns)
     result = [np.array(part[::2]) for part in (motion.q, motion.dq, motion.ddq)]
-    for values, part in zip(result, zip(*rows, strict=True), strict=True):
-        values[:, columns] = part
+    result[0][:, columns], result[1][:, columns] = states[:, :count], states[:, count:]
+    result[2][:, columns] = slopes[:, count:]
     return replace(motion, t=motion.t[::2], q=result[0], dq=result[1], ddq=result[2], tau=None)
+
+
+class _Machine:
+    """The machine of a pair, of which some joints move freely and all others as prescribed."""
+
+    def __init__(
+        self, pair: TiedPair, motions: PairMotion, free: list[int], ground: Ground | None
+    ):
+        robot, ties = pair.robot, pair.ties
+        self._pair, self._own, self._free, self._ground = pair, motions.own, free, ground
+        ends = [(tie.joint, np.array(tie.point)) for tie in ties]
+        if ground is not None:
+            ends += zip(*contacts(robot, leg_length(robot)), strict=True)
+        self._model = pin.Model(robot.model)
+        self._frames = [
+            self._model.addFrame(
+                pin.Frame(
+                    f'end {number}',
+                    robot.index(joint) + 1,
+                    pin.SE3(np.eye(3), point),
+                    pin.FrameType.OP_FRAME,
+                )
+            )
+            for number, (joint, point) in enumerate(ends)
+        ]
+        self._data = self._model.createData()
+        joints = [tie.other_joint for tie in ties]
+        points = np.array([tie.other_point for tie in ties]).reshape(-1, 3)
+        self._far, jacobian = points_motion(pair.other, joints, points, motions.other.q)
+        self._far_speed = np.einsum('nsxj,nj->nsx', jacobian, motions.other.dq)
+
+    def rate(self, k: int, x: FloatArray, tau: FloatArray) -> FloatArray:
+        """Return speeds and accelerations of the free joints at sample k, shape (2 d,)."""
+        model, data, free, own = self._model, self._data, self._free, self._own
+        count, tied = len(free), len(self._pair.ties)
+        q, dq, ddq = (np.array(part[k]) for part in (own.q, own.dq, own.ddq))
+        q[free], dq[free], ddq[free] = x[:count], x[count:], 0.0
+        load = pin.rnea(model, data, q, dq, ddq)
+        inertia = pin.crba(model, data, q)
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        place = np.array([data.oMf[frame].translation for frame in self._frames])
+        jacobian = np.array(
+            [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in self._frames]
+        )
+        speed = jacobian @ dq
+        force = np.zeros_like(place)
+        force[:tied] = self._pair.law(
+            place[:tied] - self._far[k], speed[:tied] - self._far_speed[k]
+        )
+        if self._ground is not None:
+            feet, moving = place[tied:], speed[tied:]
+            force[tied:, ::2] = self._ground.force(feet[:, 2], moving[:, 2], moving[:, 0])
+        push = tau - load[free] + np.einsum('cxj,cx->j', jacobian, force)[free]
+        return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])
 
 
 @dataclass(frozen=True)
@@ -113,22 +202,31 @@ class GaitCheck:
     ----------
     joint : str
         The driven joint.
-    t : ndarray, shape (N,)
-        Time [s].
-    prescribed, followed : ndarray, shape (N,)
-        Position [rad].
+    prescribed : ndarray, shape (N,)
+        Its prescribed position [rad].
+    motion : Motion
+        How the machine moved.
 
     """
 
     joint: str
-    t: FloatArray
     prescribed: FloatArray
-    followed: FloatArray
+    motion: Motion
+
+    @property
+    def followed(self) -> FloatArray:
+        """Position of the joint, shape (N,) [rad]."""
+        return np.asarray(self.motion.q[:, self.motion.joints.index(self.joint)])
 
     @property
     def error(self) -> FloatArray:
         """How far the joint is off, shape (N,) [rad]."""
         return self.followed - self.prescribed
+
+    @property
+    def most(self) -> float:
+        """How far it is off at most [deg]."""
+        return float(np.degrees(np.abs(self.error).max()))
 
 
 def check_gait(
@@ -155,33 +253,4 @@ def check_gait(
     column = pair.robot.index(joint)
     tau = pair_torques(believed or pair, own, other).tau[:, [column]]
     moved = drive_by_torque(pair, own, other, [joint], splined(own.t, tau, rate))
-    return GaitCheck(joint, moved.t, own.q[::2, column], moved.q[:, column])
-
-
-def _step(
-    acceleration: Callable[[int, FloatArray, FloatArray], FloatArray],
-    k: int,
-    h: float,
-    q: FloatArray,
-    dq: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Advance over samples k to k + 2, of which k + 1 is the middle."""
-    a1 = acceleration(k, q, dq)
-    v2 = dq + 0.5 * h * a1
-    a2 = acceleration(k + 1, q + 0.5 * h * dq, v2)
-    v3 = dq + 0.5 * h * a2
-    a3 = acceleration(k + 1, q + 0.5 * h * v2, v3)
-    v4 = dq + h * a3
-    a4 = acceleration(k + 2, q + h * v3, v4)
-    return q + h / 6.0 * (dq + 2.0 * (v2 + v3) + v4), dq + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)
-
-
-def _spring_torque(
-    pair: TiedPair, other_motion: Motion, k: int, q: FloatArray, dq: FloatArray
-) -> FloatArray:
-    """Return what the springs do to the machine's joints at sample k of the other one."""
-    now = tie_geometry(pair.robot, q[np.newaxis], pair.other, other_motion.q[[k]], pair.ties)
-    own = np.einsum('sxj,j->sx', now.jacobian[0], dq)
-    far = np.einsum('sxj,j->sx', now.other_jacobian[0], other_motion.dq[k])
-    force = pair.law(now.way[0], own - far)
-    return np.asarray(np.einsum('sxj,sx->j', now.jacobian[0], force))
+    return GaitCheck(joint, own.q[::2, column], moved)

@@ -11,10 +11,9 @@ from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
-from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.report.poses import draw_poses
-from armid_ros.papers.exo.report.sections import Assumptions, Forces, GaitSection, Poses, Stiffness
-from armid_ros.papers.exo.report.walk import CycleByTorque, Driven, FootForces, Walk
+from armid_ros.papers.exo.report.sections import Assumptions, Forces, Poses, Stiffness
+from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, FootForces, Walk
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
@@ -24,54 +23,6 @@ import numpy as np
 _POSES = 6
 #: Intervals wider than this share of the value are called poor.
 _NARROW = 0.1
-
-
-@dataclass(frozen=True)
-class GaitChecks:
-    """
-    Joints that were driven by their torques.
-
-    Attributes
-    ----------
-    checks : sequence of (GaitCheck, GaitCheck)
-        Each with the right torque and with that for springs that are too soft.
-    softer : float
-        By which share.
-    phase : ndarray, shape (N,)
-        Phase of the swing leg.
-    rate : float
-        Torque samples per second.
-
-    """
-
-    checks: Sequence[tuple[GaitCheck, GaitCheck]]
-    softer: float
-    phase: FloatArray
-    rate: float
-
-
-@dataclass(frozen=True)
-class WholeCycle:
-    """
-    A cycle of walking, and joints by their torque in it.
-
-    Attributes
-    ----------
-    cycle : GaitCycle
-        How both walk.
-    driven : sequence of Driven
-        Joints by their torque.
-    softer : float
-        By which share springs were taken too soft.
-    rate : float
-        Torque samples per second.
-
-    """
-
-    cycle: GaitCycle
-    driven: Sequence[Driven]
-    softer: float
-    rate: float
 
 
 @dataclass(frozen=True)
@@ -104,16 +55,19 @@ class SimulatedWalk:
     ----------
     truth : mapping of str to float
         True stiffnesses [N/m].
-    gait : GaitChecks or None
+    gait : ByTorque or None
         Joints driven by torque in single support.
-    whole : WholeCycle or None
-        The same over a whole cycle of walking.
+    cycle : GaitCycle or None
+        A whole cycle of walking.
+    whole : CycleByTorque or None
+        Joints driven by torque over that.
 
     """
 
     truth: Mapping[str, float] = field(default_factory=dict)
-    gait: GaitChecks | None = None
-    whole: WholeCycle | None = None
+    gait: ByTorque | None = None
+    cycle: GaitCycle | None = None
+    whole: CycleByTorque | None = None
 
 
 def exo_report(
@@ -146,20 +100,16 @@ def exo_report(
     """
     motions, abscissa = shown.motions, shown.abscissa
     walked = walked or SimulatedWalk()
-    gait, whole = walked.gait, walked.whole
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
-    sections: list[Section] = [_verdict(found, gait, whole), Stiffness(found, walked.truth)]
-    if whole is not None:
-        sections += [
-            Walk(whole.cycle, whole.driven),
-            CycleByTorque(whole.cycle, whole.driven, whole.softer, whole.rate),
-            FootForces(whole.cycle),
-        ]
-    if gait is not None:
-        sections.append(GaitSection(gait.checks, gait.softer, gait.phase, gait.rate))
+    sections: list[Section] = [_verdict(found, walked), Stiffness(found, walked.truth)]
+    if walked.cycle is not None and walked.whole is not None:
+        cycle, whole = walked.cycle, walked.whole
+        sections += [Walk(cycle, whole.driven), whole, FootForces(cycle)]
+    if walked.gait is not None:
+        sections.append(walked.gait)
     sections += [
         Forces(
             abscissa,
@@ -179,9 +129,7 @@ def exo_report(
     return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
 
 
-def _verdict(
-    found: Sequence[Interaction], gait: GaitChecks | None, whole: WholeCycle | None
-) -> VerdictSection:
+def _verdict(found: Sequence[Interaction], walked: SimulatedWalk) -> VerdictSection:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
@@ -192,16 +140,13 @@ def _verdict(
         for name, value, std in zip(part.segments, part.stiffness, part.std, strict=True)
         if 1.96 * std > _NARROW * abs(value)
     ]
-    if gait is not None:
-        each = ', '.join(
-            f'{right.joint} {np.degrees(np.abs(right.error).max()):.1e}°'
-            for right, _ in gait.checks
-        )
+    if walked.gait is not None:
+        each = ', '.join(f'{d.joint} {d.right.most:.1e}°' for d in walked.gait.driven)
         sentences.append(
             f'Driven by their torques, joints follow the gait in single support: {each} at most.'
         )
-    if whole is not None:
-        each = ', '.join(f'{d.joint} {d.errors[0]:.2g}°' for d in whole.driven)
+    if walked.whole is not None:
+        each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.whole.driven)
         sentences.append(
             f'Over a whole cycle of walking, on either foot and on both: {each} at most.'
         )

@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.report.poses import Drawing
 from armid_ros.report.charts import Chart, Role, Series
+from armid_ros.report.notation import measured
 from armid_ros.report.page import Section
 from armid_ros.robots.assumptions import Assumption
 import numpy as np
@@ -47,14 +48,11 @@ class Stiffness(Section):
         rows = []
         for found in self.found:
             for k, segment in enumerate(found.segments):
-                reach = 1.96 * found.std[k]
-                decimals = max(0, 1 - int(np.floor(np.log10(reach)))) if reach > 0.0 else 3
                 true = self.truth.get(segment)
                 rows.append(
                     (
                         segment.replace('_', ' '),
-                        f'{found.stiffness[k]:.{decimals}f}',
-                        f'{reach:.{decimals}f}',
+                        *measured(found.stiffness[k], HALF_WIDTH * found.std[k]),
                         f'{100.0 * found.bias[k] / found.stiffness[k]:+.2f} %',
                         '' if true is None else f'{true:g}',
                     )
@@ -76,67 +74,6 @@ def _range(values: FloatArray) -> str:
     """Return the least and the largest of values to two digits, once if they are alike."""
     ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
     return ' to '.join(ends)
-
-
-@dataclass(frozen=True)
-class GaitSection(Section):
-    """
-    Joints driven by their torques against the prescribed gait.
-
-    Attributes
-    ----------
-    checks : sequence of (GaitCheck, GaitCheck)
-        Each joint with the right torque, and with that for springs of another stiffness.
-    softer : float
-        By which share the other stiffness is wrong.
-    phase : ndarray, shape (N,)
-        Phase of the swing leg at the samples of the checks.
-    rate : float
-        Torque samples per second.
-
-    """
-
-    title: ClassVar[str] = 'Gait by torque'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'gait.html'
-
-    checks: Sequence[tuple[GaitCheck, GaitCheck]]
-    softer: float
-    phase: FloatArray
-    rate: float
-
-    @property
-    def panels(self) -> list[tuple[str, str, Chart, Chart]]:
-        """Name, largest errors, angle and error of every joint."""
-        return [self._panel(right, wrong) for right, wrong in self.checks]
-
-    def _panel(self, right: GaitCheck, wrong: GaitCheck) -> tuple[str, str, Chart, Chart]:
-        most = [float(np.degrees(np.abs(check.error).max())) for check in (right, wrong)]
-        angle = Chart(
-            self.phase,
-            [
-                Series('prescribed', np.degrees(right.prescribed), 'measured'),
-                Series('by its torque', np.degrees(right.followed), 'residual'),
-                Series('springs wrong', np.degrees(wrong.followed), 'predicted'),
-            ],
-            '',
-            'angle [°]',
-            link=right.joint,
-        )
-        error = Chart(
-            self.phase,
-            [
-                Series('by its torque', np.degrees(right.error), 'residual'),
-                Series('springs wrong', np.degrees(wrong.error), 'predicted'),
-            ],
-            'gait cycle of the swing leg',
-            'error [°]',
-            height=150,
-            link=right.joint,
-            symmetric=True,
-            legend=False,
-        )
-        return right.joint, f'at most {most[0]:.1e}°; springs wrong {most[1]:.2f}°', angle, error
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.papers.exo.plant.driven_cycle import DrivenCycle
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, weight
 from armid_ros.papers.exo.plant.shares import feet_by_shares
+from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
-from armid_ros.report.charts import Chart, Mark, script_json, Series
+from armid_ros.report.charts import Chart, Mark, Role, script_json, Series
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
 from markupsafe import Markup
@@ -33,31 +33,87 @@ SOURCE = {'hip': 1.5, 'knee': 2.5}
 @dataclass(frozen=True)
 class Driven:
     """
-    A joint by its torque over the whole cycle.
+    A joint by its torque.
 
     Attributes
     ----------
-    right, softer, shared : DrivenCycle
-        With the torque that is right, with that for springs that are too soft, and with that for
-        feet that bear what (20) to (22) say.
+    right, softer : GaitCheck
+        With the torque that is right, and with that for springs that are too soft.
+    shared : GaitCheck or None
+        With the torque for feet that bear what (20) to (22) say.
 
     """
 
-    right: DrivenCycle
-    softer: DrivenCycle
-    shared: DrivenCycle
+    right: GaitCheck
+    softer: GaitCheck
+    shared: GaitCheck | None = None
 
     @property
     def joint(self) -> str:
         """Its name."""
-        return self.right.check.joint
+        return self.right.joint
 
     @property
-    def errors(self) -> tuple[float, float, float]:
-        """How far it is off at most: right, springs too soft, feet by (20) to (22) [deg]."""
-        each = (self.right, self.softer, self.shared)
-        first, second, third = (float(np.degrees(np.abs(d.check.error).max())) for d in each)
-        return first, second, third
+    def source(self) -> float:
+        """How far it is off at most by the source [deg]; NaN for what the source does not have."""
+        return SOURCE.get(self.joint.split('_')[-1], np.nan)
+
+
+@dataclass(frozen=True)
+class ByTorque(Section):
+    """
+    Joints driven by their torques against the prescribed gait, in single support.
+
+    Attributes
+    ----------
+    driven : sequence of Driven
+        Joints by their torque.
+    softer : float
+        By which share springs were taken too soft.
+    phase : ndarray, shape (N,)
+        Phase of a leg at the samples of the checks.
+    rate : float
+        Torque samples per second.
+
+    """
+
+    title: ClassVar[str] = 'Gait by torque'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'gait.html'
+    abscissa: ClassVar[str] = 'gait cycle of the swing leg'
+
+    driven: Sequence[Driven]
+    softer: float
+    phase: FloatArray
+    rate: float
+
+    @property
+    def panels(self) -> list[tuple[str, str, Chart, Chart]]:
+        """Name, largest errors, angle and error of every joint."""
+        return [
+            (
+                d.joint,
+                f'at most {d.right.most:.1e}°; springs too soft {d.softer.most:.2f}°',
+                *self._charts(d),
+            )
+            for d in self.driven
+        ]
+
+    def _charts(self, d: Driven) -> tuple[Chart, Chart]:
+        """Draw angle and error of a joint."""
+        both: tuple[tuple[str, GaitCheck, Role], ...] = (
+            ('by its torque', d.right, 'residual'),
+            ('springs too soft', d.softer, 'predicted'),
+        )
+        angles = [
+            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
+            *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
+        ]
+        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
+        return Chart(self.phase, angles, '', 'angle [°]', link=d.joint), Chart(
+            self.phase, errors, self.abscissa, 'error [°]', height=150, link=d.joint,
+            symmetric=True, legend=False,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -128,8 +184,7 @@ class Walk(Section):
                 'springs': _whole(_placed(np.stack([start, end], axis=2), ahead)),
                 'feet': self._feet(rows, ahead),
                 'error': [
-                    np.round(np.degrees(d.right.check.error[rows // 2]), 4).tolist()
-                    for d in self.driven
+                    np.round(np.degrees(d.right.error[rows // 2]), 4).tolist() for d in self.driven
                 ],
             }
         )
@@ -223,75 +278,26 @@ class FootForces(Section):
 
 
 @dataclass(frozen=True)
-class CycleByTorque(Section):
-    """
-    Hip and knee over the whole cycle, each by its torque.
-
-    Attributes
-    ----------
-    cycle : GaitCycle
-        What was prescribed.
-    driven : sequence of Driven
-        Joints by their torque.
-    softer : float
-        By which share springs were taken too soft.
-    rate : float
-        Torque samples per second.
-
-    """
+class CycleByTorque(ByTorque):
+    """The same over the whole cycle, hips free, with what the source found."""
 
     title: ClassVar[str] = 'Whole cycle by torque'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'cycle.html'
-
-    cycle: GaitCycle
-    driven: Sequence[Driven]
-    softer: float
-    rate: float
+    abscissa: ClassVar[str] = 'gait cycle of the right leg'
 
     @property
     def rows(self) -> list[tuple[str, str, str, str, str]]:
         """Joint, error of the source, and ours: right, springs too soft, feet by the rule."""
-        rows = []
-        for d in self.driven:
-            source = SOURCE.get(d.joint.split('_')[-1])
-            shown = '' if source is None else f'{source:g}'
-            right, soft, shared = d.errors
-            rows.append((d.joint, shown, f'{right:.2g}', f'{soft:.2f}', f'{shared:.2f}'))
-        return rows
-
-    @property
-    def panels(self) -> list[tuple[str, Chart, Chart]]:
-        """Name, angle and error of every joint."""
-        return [self._panel(d) for d in self.driven]
-
-    def _panel(self, d: Driven) -> tuple[str, Chart, Chart]:
-        phase = self.cycle.phase[::2]
-        angle = Chart(
-            phase,
-            [
-                Series('prescribed', np.degrees(d.right.check.prescribed), 'measured'),
-                Series('by its torque', np.degrees(d.right.check.followed), 'residual'),
-                Series('springs too soft', np.degrees(d.softer.check.followed), 'predicted'),
-            ],
-            '',
-            'angle [°]',
-            link=d.joint,
-        )
-        error = Chart(
-            phase,
-            [
-                Series('by its torque', np.degrees(d.right.check.error), 'residual'),
-                Series('springs too soft', np.degrees(d.softer.check.error), 'predicted'),
-            ],
-            'gait cycle of the right leg',
-            'error [°]',
-            height=150,
-            link=d.joint,
-            symmetric=True,
-            legend=False,
-        )
-        return d.joint, angle, error
+        return [
+            (
+                d.joint,
+                f'{d.source:g}' if np.isfinite(d.source) else '',
+                f'{d.right.most:.2g}',
+                f'{d.softer.most:.2f}',
+                '' if d.shared is None else f'{d.shared.most:.2f}',
+            )
+            for d in self.driven
+        ]
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:

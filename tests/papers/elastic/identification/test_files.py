@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.errors import RecordingError
-from armid_ros.papers.elastic.identification import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
 from armid_ros.recording import BagWriter, read_recording, write_joint_states
 from armid_ros.recording.elastic import read_accelerations, write_accelerations, write_runs
 from armid_ros.robots import load_robot

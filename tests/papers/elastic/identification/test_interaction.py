@@ -6,15 +6,14 @@ from __future__ import annotations
 
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
-from armid_ros.papers.elastic.identification import (
+from armid_ros.papers.elastic.identification.interaction import (
     decibel_error,
     decouple,
-    fit_joint,
-    ideal_response,
     interaction_torques,
     joint_signals,
-    measured_response,
 )
+from armid_ros.papers.elastic.identification.physical import fit_joint, ideal_response
+from armid_ros.papers.elastic.identification.spectra import measured_response
 from armid_ros.robots import load_robot
 import control
 import numpy as np

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.elastic.identification import fit_rigid
+from armid_ros.papers.elastic.identification.rigid import fit_rigid
 from armid_ros.papers.elastic.plant.run import run_all
 from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments, WEAK
 from armid_ros.robots.two_link import two_link_set

@@ -7,8 +7,8 @@ from __future__ import annotations
 import json
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.elastic.identification import identify_two_inertia
 from armid_ros.papers.elastic.identification.output import elastic_document
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.run import ElasticSensors
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic.two_link import two_link_loop

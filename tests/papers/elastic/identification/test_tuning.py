@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.elastic.identification import tune, Tuning
 from armid_ros.papers.elastic.identification.names import pack, unpack
 from armid_ros.papers.elastic.identification.response import (
     ringing,
@@ -15,6 +14,7 @@ from armid_ros.papers.elastic.identification.response import (
     Steps,
     velocities,
 )
+from armid_ros.papers.elastic.identification.tuning import tune, Tuning
 from armid_ros.papers.elastic.plant.run import ElasticSensors, run_elastic
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant

@@ -8,17 +8,17 @@ from operator import attrgetter
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
-from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.errors import TrajectoryError
 from armid_ros.motion import Motion
 from armid_ros.papers.elastic.plant.run import run_elastic
 from armid_ros.papers.elastic.plant.signals import step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation import Plant, Reference, Sensors, SimulatedArm
+from armid_ros.simulation import Reference, Sensors, SimulatedArm
 from armid_ros.simulation.accelerometers import LinkAccelerometers
-from armid_ros.simulation.elastic.record import record
 from armid_ros.simulation.elastic.setup import elastic_joints, make_elastic_arm, shipped_arm
-from armid_ros.simulation.elastic.two_link import modes, two_link_loop, two_link_plant
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
+from armid_ros.simulation.run import record
 import numpy as np
 import pytest
 
@@ -135,7 +135,7 @@ def test_a_run_is_recorded_from_the_first_point_of_its_reference():
     t = np.linspace(0.0, 1.0, 1001)
     q = 0.3 * np.sin(2.0 * np.pi * t)[:, np.newaxis] * np.array([1.0, -1.0])
     dq = 0.3 * 2.0 * np.pi * np.cos(2.0 * np.pi * t)[:, np.newaxis] * np.array([1.0, -1.0])
-    run = record(two_links(), Reference(TWO_LINKS.joints, t, q, dq), rate=500.0)
+    run = record(two_links(), Reference(TWO_LINKS.joints, t, q, dq), rate=500.0).sides
     assert len(run.motor) == 501
     np.testing.assert_allclose(run.motor.dq[0], dq[0])
     np.testing.assert_allclose(run.reference, dq[::2], atol=0.02)
@@ -186,9 +186,28 @@ def test_no_more_torque_is_read_than_the_drives_have():
     assert np.all(np.abs(tau) <= limit)
 
 
+def test_a_run_has_what_its_samples_would_have_been():
+    """Sample by sample or as a whole: one arm, without noise."""
+    pose, velocity = np.array([0.0, np.pi / 4]), np.array([1.0, -1.0])
+    reference = ramp(pose, velocity, 0.3, np.array([[5.0, 0.0], [0.0, 5.0]]))
+    run, arm = record(two_links(), reference, rate=250.0).sides, two_links()
+    arm.start_on(reference)
+    samples = [arm.read(4), *(arm.advance(4) for _ in range(len(run.motor) - 1))]
+    for name, values in (
+        ('q', run.motor.q),
+        ('dq', run.motor.dq),
+        ('tau', run.motor.tau),
+        ('link.q', run.link.q),
+        ('link.dq', run.link.dq),
+        ('link.ddq', run.link.ddq),
+        ('link.acceleration', run.felt.transpose(1, 0, 2)),
+    ):
+        wanted = [attrgetter(name)(sample) for sample in samples]
+        np.testing.assert_allclose(values, wanted, atol=1e-9, err_msg=name)
+    np.testing.assert_allclose(run.reference, np.tile(velocity, (len(samples), 1)), atol=1e-9)
+
+
 def test_an_arm_without_springs_is_not_recorded_on_both_sides():
     still = Reference(HUMANOID.joints, np.zeros(1), HUMANOID.lower[np.newaxis] + 0.5)
-    with pytest.raises(ModelError, match='use simulate'):
-        record(SimulatedArm(ArmModel(HUMANOID), rng=np.random.default_rng(0)), still)
-    with pytest.raises(ModelError, match='oscillate'):
-        modes(Plant(ArmModel(HUMANOID)), still.q[0])
+    arm = SimulatedArm(ArmModel(HUMANOID), rng=np.random.default_rng(0))
+    assert record(arm, still).sides is None

@@ -14,10 +14,12 @@ from armid_ros.papers.elastic.plant.signals import step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from armid_ros.simulation import Elasticity, Plant, step
-from armid_ros.simulation.elastic.two_link import modes, two_link_loop, two_link_plant
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 import pytest
+
+from benchmarks.elastic import modes
 
 FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}
 LOCKED = {0: (14.6, 55.5), 45: (15.5, 47.1), 90: (18.3, 36.4), 180: (27.7, 29.4)}

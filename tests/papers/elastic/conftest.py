@@ -1,0 +1,23 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The demo of the command, which its tests and those of the page share."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from armid_ros.papers.elastic.command import elastic
+from click.testing import CliRunner
+import pytest
+
+
+@pytest.fixture(scope='session')
+def demo(tmp_path_factory) -> Path:
+    """Simulate three experiments and the steps, and identify them."""
+    out = tmp_path_factory.mktemp('elastic') / 'result'
+    arguments = ['--demo', '--experiments', '3', '--out', str(out), '--json']
+    result = CliRunner().invoke(elastic, arguments, catch_exceptions=False)
+    assert result.exit_code == 0
+    assert json.loads(result.stdout) == json.loads((out / 'elastic.json').read_text())
+    return out
