@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, stepping, TiedPair
-from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
+from armid_ros.papers.exo.assumptions import Assumption
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
@@ -18,7 +19,6 @@ from armid_ros.papers.exo.report.walk import CycleByTorque, Driven, FootForces, 
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
-from armid_ros.robots.assumptions import Assumption
 import numpy as np
 
 _POSES = 6
