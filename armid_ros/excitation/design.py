@@ -105,7 +105,6 @@ def design(
     *,
     collision: CollisionModel | None = None,
     prior_information: FloatArray | None = None,
-    rival: ArmModel | None = None,
     progress: Callable[[DesignProgress], None] | None = None,
 ) -> Design:
     """
@@ -125,8 +124,6 @@ def design(
     prior_information : ndarray, shape (r, r), optional
         Information of what was recorded before, over the same base parameters: the sum of
         ``DesignProblem.information(motion).matrix`` of the recordings.
-    rival : ArmModel, optional
-        With criterion 'T': the model to tell ``arm`` from.
     progress : callable, optional
         Told after every step.
 
@@ -142,16 +139,16 @@ def design(
         way.
 
     """
-    problem = DesignProblem.of(arm, settings, rng, rival)
+    problem = DesignProblem.of(arm, settings, rng)
     clearance = None if collision is None else ClearanceModel.of(collision)
-    prior = _checked_prior(problem, prior_information, rival)
+    prior = _checked_prior(problem, prior_information)
 
     def watch(done: float, found: Found) -> None:
         if progress is not None:
             progress(DesignProgress(done, found.cost))
 
     outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch)
-    excitation = placed(problem, outcome.found.trajectory, clearance)
+    excitation = placed(problem, outcome.found.trajectory)
     return evaluate(problem, excitation, prior, stopped=outcome.stopped)
 
 
@@ -179,7 +176,7 @@ def evaluate(
     """
     settings = problem.settings
     if isinstance(excitation, FourierTrajectory):
-        excitation = Excitation(excitation, settings.n_periods, settings.run_in, settings.start)
+        excitation = Excitation(excitation, settings.n_periods, settings.run_in)
     trajectory = excitation.trajectory
     count = 4 * settings.samples
     w = problem.periodic_columns(trajectory, count)[:, problem.base.independent]
@@ -194,17 +191,15 @@ def evaluate(
     )
 
 
-def _checked_prior(
-    problem: DesignProblem, prior: FloatArray | None, rival: ArmModel | None
-) -> FloatArray | None:
+def _checked_prior(problem: DesignProblem, prior: FloatArray | None) -> FloatArray | None:
     if prior is None:
         return None
     prior = np.asarray(prior, dtype=float)
     expected = (problem.base.rank,) * 2
-    if rival is not None or prior.shape != expected:
+    if prior.shape != expected:
         raise TrajectoryError(
             f'prior information: a matrix {expected} over the base parameters of the arm is '
-            f"needed, and none with criterion 'T'; got {prior.shape}"
+            f'needed, got {prior.shape}'
         )
     if not np.all(np.isfinite(prior)):
         raise TrajectoryError('prior information: not all entries are finite numbers')

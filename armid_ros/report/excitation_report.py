@@ -239,7 +239,7 @@ def _asked(
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
-    start = 'the trajectory itself' if run.start is None else _numbers(run.start)
+    start = 'the trajectory itself'
     if whole is not None:
         start = (
             f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
@@ -269,8 +269,6 @@ def _asked(
 
 
 def _speed(settings: DesignSettings) -> str:
-    if settings.limits is not None:
-        return 'limits of your own'
     name = settings.speed
     share = SPEED_CLASSES[name] if isinstance(name, str) else name
     return f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
-from armid_ros.excitation.geometry.chain import Pose
+from armid_ros.excitation.geometry.pose import Pose
 from armid_ros.motion import FloatArray
 import coal
 import numpy as np

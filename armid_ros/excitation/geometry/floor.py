@@ -16,8 +16,7 @@ import math
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.environment import Obstacle
-from armid_ros.excitation.geometry.heights import link_heights, vertical, zero_pose
-from armid_ros.excitation.random_trajectory import UNLIMITED_HALF_RANGE
+from armid_ros.excitation.geometry.heights import link_heights, vertical
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import CollisionModel, read_mounting, Robot
 import numpy as np
@@ -145,8 +144,8 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
     """
     assert floor.height is not None
     robot = collision.robot
-    lower, upper = _range(robot)
-    q = np.random.default_rng(_SEED).uniform(lower, upper, (_POSES, robot.n_joints))
+    size = (_POSES, robot.n_joints)
+    q = np.random.default_rng(_SEED).uniform(*robot.position_range(), size)
     highest: dict[str, FloatArray] = {}
     for link, lowest, _ in link_heights(collision, floor.up, q):
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
@@ -157,12 +156,6 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
             'height above the origin of the base [m]'
         )
     return touching
-
-
-def _range(robot: Robot) -> tuple[FloatArray, FloatArray]:
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -UNLIMITED_HALF_RANGE)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, UNLIMITED_HALF_RANGE)
-    return lower, upper
 
 
 def _height(text: str) -> float | None:
@@ -197,7 +190,7 @@ def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
             f'{carrier} is mounted turned by {np.rad2deg(lean):.0f} degrees, as on a wall or a '
             'ceiling that the description does not have (give it with --environment)'
         )
-    q = zero_pose(collision.robot)[np.newaxis]
+    q = collision.robot.zero_pose[np.newaxis]
     heights = [
         (link, float(low[0]), float(high[0]))
         for link, low, high in link_heights(collision, normal, q, fixed=True)

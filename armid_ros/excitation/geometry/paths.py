@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
-from armid_ros.excitation.random_trajectory import UNLIMITED_HALF_RANGE
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
 import numpy as np
 
 #: Longest straight line of a tree, and the interval with which the proof of one begins
