@@ -125,7 +125,7 @@ def design(
         Information of what was recorded before, over the same base parameters: the sum of
         ``DesignProblem.information(motion).matrix`` of the recordings.
     progress : callable, optional
-        Told after every step.
+        Receives the progress after every step.
 
     Returns
     -------
@@ -147,9 +147,10 @@ def design(
         if progress is not None:
             progress(DesignProgress(done, found.cost))
 
-    outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch)
-    excitation = placed(problem, outcome.found.trajectory)
-    return evaluate(problem, excitation, prior, stopped=outcome.stopped)
+    task = Task(problem, clearance, prior)
+    found, stopped = search_all(task, rng.spawn(settings.starts), watch)
+    excitation = placed(problem, found.trajectory)
+    return evaluate(problem, excitation, prior, stopped=stopped)
 
 
 def evaluate(
