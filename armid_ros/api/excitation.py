@@ -262,6 +262,7 @@ def design_excitation(
     scene: CollisionScene | None = None,
     start: FloatArray | None = None,
     after: RecordingLike | Sequence[RecordingLike] = (),
+    rival: ArmModel | None = None,
     progress: Callable[[DesignProgress], None] | None = None,
     **settings: Any,
 ) -> ExcitationResult:
@@ -296,6 +297,8 @@ def design_excitation(
         Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
     after : recording or path, or several
         Recordings whose information the trajectory adds to.
+    rival : ArmModel, optional
+        With ``criterion='T'``: what may be there in place of the effects of ``arm``.
     progress : callable, optional
         Called with the progress of the search.
     **settings
@@ -350,6 +353,7 @@ def design_excitation(
         generator(rng),
         collision=scene.bodies,
         prior_information=_information(model, known, earlier, rng) if earlier else None,
+        rival=rival,
         progress=progress,
     )
     names = tuple(recording.source for recording in earlier)

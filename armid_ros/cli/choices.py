@@ -27,6 +27,7 @@ CRITERIA = {
     'A': 'mean variance of the parameters, each scaled to the torque it makes',
     'E': 'variance along the worst direction, parameters scaled to the torque they make',
     'condition': 'condition number of the weighted regressor',
+    'T': 'torque that a rival model cannot explain',
 }
 #: Of which parameters; `armid_ros.excitation.TARGETS`.
 TARGETS = {

@@ -105,6 +105,7 @@ def design(
     *,
     collision: CollisionModel | None = None,
     prior_information: FloatArray | None = None,
+    rival: ArmModel | None = None,
     progress: Callable[[DesignProgress], None] | None = None,
 ) -> Design:
     """
@@ -124,6 +125,8 @@ def design(
     prior_information : ndarray, shape (r, r), optional
         Information of what was recorded before, over the same base parameters: the sum of
         ``DesignProblem.information(motion).matrix`` of the recordings.
+    rival : ArmModel, optional
+        With criterion 'T': the model to tell ``arm`` from.
     progress : callable, optional
         Receives the progress after every step.
 
@@ -139,9 +142,9 @@ def design(
         way.
 
     """
-    problem = DesignProblem.of(arm, settings, rng)
+    problem = DesignProblem.of(arm, settings, rng, rival)
     clearance = None if collision is None else ClearanceModel.of(collision)
-    prior = _checked_prior(problem, prior_information)
+    prior = _checked_prior(problem, prior_information, rival)
 
     def watch(done: float, found: Found) -> None:
         if progress is not None:
@@ -192,15 +195,17 @@ def evaluate(
     )
 
 
-def _checked_prior(problem: DesignProblem, prior: FloatArray | None) -> FloatArray | None:
+def _checked_prior(
+    problem: DesignProblem, prior: FloatArray | None, rival: ArmModel | None
+) -> FloatArray | None:
     if prior is None:
         return None
     prior = np.asarray(prior, dtype=float)
     expected = (problem.base.rank,) * 2
-    if prior.shape != expected:
+    if rival is not None or prior.shape != expected:
         raise TrajectoryError(
             f'prior information: a matrix {expected} over the base parameters of the arm is '
-            f'needed, got {prior.shape}'
+            f"needed, and none with criterion 'T'; got {prior.shape}"
         )
     if not np.all(np.isfinite(prior)):
         raise TrajectoryError('prior information: not all entries are finite numbers')

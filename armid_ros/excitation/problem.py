@@ -7,12 +7,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
+from armid_ros.effects import Effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.search.criteria import (
     Criterion,
     Information,
+    RivalCriterion,
     SpectralCriterion,
     SubsetCriterion,
 )
@@ -48,7 +50,10 @@ class DesignProblem:
         Standard deviation of the torque noise [N m or N].
     scale : ndarray, shape (r,)
         See `Information`.
-    criterion : SpectralCriterion or SubsetCriterion
+    selected : ndarray of int, shape (r,)
+        Columns of ``arm.parameters`` that the criterion looks at: those of ``base``, or for a
+        comparison of two models the rival's and what it lacks.
+    criterion : SpectralCriterion, SubsetCriterion or RivalCriterion
         The cost.
 
     """
@@ -59,11 +64,16 @@ class DesignProblem:
     base: BaseParameters
     noise: FloatArray = field(repr=False)
     scale: FloatArray = field(repr=False)
+    selected: npt.NDArray[np.intp] = field(repr=False)
     criterion: Criterion = field(repr=False)
 
     @classmethod
     def of(
-        cls, arm: ArmModel, settings: DesignSettings, rng: np.random.Generator
+        cls,
+        arm: ArmModel,
+        settings: DesignSettings,
+        rng: np.random.Generator,
+        rival: ArmModel | None = None,
     ) -> DesignProblem:
         """
         Derive limits, noise, base parameters and criterion.
@@ -71,29 +81,41 @@ class DesignProblem:
         Raises
         ------
         TrajectoryError
-            If the arm has no such parameter.
+            If the arm has no such parameter, or no motion can tell it from the rival.
 
         """
         limits = Limits.of(arm.robot, speed=settings.speed, acceleration=settings.acceleration)
         noise = _noise(arm, settings)
+        if (settings.criterion == 'T') != (rival is not None):
+            raise TrajectoryError(
+                "criterion 'T' compares two models: it needs a rival, and a rival needs it"
+            )
+        whole = arm if rival is None else _joined(arm, rival)
         motion = random_motion(arm.robot, rng)
-        columns = target_columns(arm, settings.target, motion)
+        columns = target_columns(whole, settings.target, motion)
         if not columns.any():
             raise TrajectoryError(
                 f"target '{settings.target}': {arm.robot.name} has no such parameter to see"
             )
-        level = replace(arm, robot=levelled(arm.robot))
+        level = replace(whole, robot=levelled(whole.robot))
         flat = target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
-        base = group_columns(flat, arm.parameters)
+        base = group_columns(flat, whole.parameters)
         columns = (columns / noise[:, np.newaxis]).reshape(flat.shape)
+        selected = base.independent
+        if rival is not None:
+            selected = _selection_against(whole, rival, columns)
         size = np.sqrt(np.sum(columns**2, axis=0) / len(motion))
         scale = 1.0 / size[base.independent]
         criterion: Criterion
-        if settings.focus:
-            criterion = SubsetCriterion(_wanted(arm, settings.focus, base.independent), scale)
+        if rival is not None:
+            criterion = _rival_criterion(whole, rival, selected, columns[:, selected])
+        elif settings.focus:
+            criterion = SubsetCriterion(_wanted(whole, settings.focus, selected), scale)
         else:
             criterion = SpectralCriterion(settings.criterion, scale, settings.balance)
-        return cls(arm, settings, limits, base, read_only(noise), read_only(scale), criterion)
+        return cls(
+            whole, settings, limits, base, read_only(noise), read_only(scale), selected, criterion
+        )
 
     def columns(self, motion: Motion) -> FloatArray:
         """Return the weighted columns of all parameters, shape (N n, P)."""
@@ -158,6 +180,46 @@ def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
     finite = np.isfinite(limit)
     fallback = limit[finite].max() if finite.any() else 100.0
     return np.asarray(NOISE_SHARE * np.where(finite, limit, fallback))
+
+
+def _key(effect: Effect) -> tuple[str, tuple[str, ...]]:
+    return effect.name, effect.joints
+
+
+def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
+    """Return the rival's effects and those it lacks, these last."""
+    known = {_key(effect) for effect in rival.effects}
+    joined = replace(rival, robot=arm.robot)
+    for effect, values in zip(arm.effects, arm.values, strict=True):
+        if _key(effect) not in known:
+            joined = joined.with_effect(effect, values)
+    return joined
+
+
+def _selection_against(
+    whole: ArmModel, rival: ArmModel, columns: FloatArray
+) -> npt.NDArray[np.intp]:
+    """Columns the rival can use, as many as are independent, then what it lacks."""
+    own = len(rival.parameters)
+    usable = group_columns(columns[:, :own], whole.parameters[:own]).independent
+    return np.concatenate([usable, np.arange(own, columns.shape[1])])
+
+
+def _rival_criterion(
+    whole: ArmModel, rival: ArmModel, selected: npt.NDArray[np.intp], columns: FloatArray
+) -> RivalCriterion:
+    own = selected < len(rival.parameters)
+    values = np.where(own, 0.0, whole.theta[selected])
+    torque = columns @ values
+    fitted = columns[:, own] @ np.linalg.lstsq(columns[:, own], torque, rcond=None)[0]
+    if np.linalg.norm(torque - fitted) <= 1e-9 * max(float(np.linalg.norm(torque)), 1e-300):
+        names = ', '.join(e.name for e in whole.effects[len(rival.effects) :]) or 'nothing'
+        raise TrajectoryError(
+            f'no motion can tell the two models apart: what the rival lacks is {names}, with '
+            f'parameters {np.array2string(values[~own], precision=3)}, and it can make the same '
+            'torques' + ('' if values.any() else '; give what it lacks a size')
+        )
+    return RivalCriterion(own.astype(float), values)
 
 
 def _wanted(arm: ArmModel, focus: tuple[str, ...], selected: npt.NDArray[np.intp]) -> FloatArray:

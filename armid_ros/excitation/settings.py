@@ -44,7 +44,7 @@ class DesignSettings:
     clearance : float
         Distance to keep between bodies that may touch [m].
     criterion : str
-        'D', 'A', 'E' or 'condition'.
+        'D', 'A', 'E', 'condition', or 'T' to tell the arm from a rival.
     balance : float
         Criterion 'D' minimises -log det / r + balance * log(condition number), r parameters: of
         trajectories that tell about equally much it takes the one without a blind direction. 0:

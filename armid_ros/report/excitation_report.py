@@ -182,7 +182,7 @@ def _verdict(
             f'The search was stopped early ({design.stopped}). This is the best result so far; '
             'the same seed may give another one.'
         )
-    if settings.acceleration is None and settings.limits is None:
+    if settings.acceleration is None:
         beware.append(
             'Acceleration limits are assumed, as a URDF has none: each joint reaches its top '
             'speed in 0.25 s.'

@@ -153,10 +153,13 @@ def test_speed_classes_come_in_folders_each_as_it_is_alone(tmp_path):
 
 
 def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
-    arguments = ('--robot', ROBOT, '--duration', 8, *QUICK, '--focus', 'quadratic_friction')
-    others = ('--effects', 'viscous_friction,coulomb_friction')
-    armid('excite', *arguments, *others, '--out', tmp_path / 'plan')
-    assert 'quadratic_friction' in (tmp_path / 'plan' / 'report.html').read_text()
+    arguments = ('--robot', ROBOT, '--duration', 8, *QUICK, '--criterion', 'T', '--effects', '')
+    size = 'quadratic_friction@elbow_pitch:quadratic_coefficient=0.05'
+    rival = ('--rival', 'viscous_friction,coulomb_friction')
+    armid('excite', *arguments, '--effect', size, *rival, '--out', tmp_path / 'plan')
+    assert (tmp_path / 'plan' / 'report.html').is_file()
+    sizeless = ('--effect', 'quadratic_friction', *rival, '--out', tmp_path / 'no')
+    assert 'quadratic_friction' in armid('excite', *arguments, *sizeless, code=2).stderr
 
 
 def test_options_of_a_design_do_not_go_with_steps(tmp_path):
@@ -190,6 +193,7 @@ def test_options_of_a_design_do_not_go_with_steps(tmp_path):
         (('recover', 'no.mcap', '--out', 'o'), 'no.mcap'),
         (('excite', '--robot', ROBOT, '--clearance', '5', '--out', 'o'), 'clearance'),
         (('excite', '--robot', ROBOT, '--focus', 'stiction', '--out', 'o'), 'viscous_friction'),
+        (('excite', '--robot', ROBOT, '--rival', 'payload', '--out', 'o'), "criterion 'T'"),
         (('excite', '--robot', ROBOT, '--start', '1,2', '--out', 'o'), 'wrist_pitch'),
         (('excite', '--robot', ROBOT, '--speed', '1.5', '--out', 'o'), '1.5'),
     ],

@@ -222,13 +222,17 @@ def test_a_recording_where_the_trajectory_goes_is_not_replaced(made, tmp_path, b
 @pytest.mark.parametrize(
     ('kind', 'criterion'),
     [(kind, 'D') for kind in ('revolute', 'continuous', 'prismatic')]
-    + [('revolute', criterion) for criterion in ('A', 'E', 'condition')],
+    + [('revolute', criterion) for criterion in ('A', 'E', 'condition', 'T')],
 )
 @pytest.mark.filterwarnings('error')
 def test_an_arm_of_one_joint_is_excited(tmp_path, kind, criterion):
     urdf = tmp_path / 'hinge.urdf'
     urdf.write_text(HINGE.format(kind=kind))
-    excite(urdf, tmp_path / 'plan', '--criterion', criterion)
+    options = ('--criterion', criterion)
+    if criterion == 'T':
+        size = ('--effect', 'quadratic_friction:quadratic_coefficient=0.05')
+        options += (*size, '--effects', '', '--rival', 'viscous_friction,coulomb_friction')
+    excite(urdf, tmp_path / 'plan', *options)
     motion = plan_of(urdf, tmp_path / 'plan')
     assert np.ptp(motion.q) > 0.05
     assert (tmp_path / 'plan' / 'report.html').is_file()

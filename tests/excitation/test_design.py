@@ -187,23 +187,23 @@ def test_focus_sees_its_parameters_better(two_link_arm, quick):
     assert np.prod(deviations(focused)) < np.prod(deviations(plain))
 
 
-def test_focus_leaves_another_explanation_more_to_explain(two_link, with_effects, quick):
-    """Friction that grows with speed against friction that does not: what T-optimality is for."""
+def test_design_against_a_rival_leaves_it_more_to_explain(two_link, with_effects, quick):
+    """Friction that grows with speed against friction that does not."""
     arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.3])
     rival = with_effects(two_link, 'coulomb_friction')
-    both = ArmModel(two_link, (*arm.effects, *rival.effects), (*arm.values, *rival.values))
-    settings = replace(quick, focus=('viscous_friction',), starts=1)
+    settings = replace(quick, criterion='T', starts=1)
     rng = np.random.default_rng(0)
-    problem = DesignProblem.of(both, settings, rng)
-
-    def unexplained(trajectory):
-        motion = trajectory.one_period(160)
-        weight = 1.0 / problem.noise[:, np.newaxis]
-        w = (rival.columns(motion) * weight).reshape(-1, len(rival.parameters))
-        torque = (arm.torque(motion) * weight[:, 0]).reshape(-1)
-        left = torque - w @ np.linalg.lstsq(w, torque, rcond=1e-12)[0]
-        return left @ left
-
-    chance = [unexplained(random_feasible(both, problem.limits, 6.0, 3, rng)) for _ in range(20)]
-    found = design(both, settings, rng).excitation.trajectory
-    assert unexplained(found) > max(chance)
+    problem = DesignProblem.of(arm, settings, rng, rival)
+    chance = [
+        evaluate(problem, random_feasible(arm, problem.limits, 6.0, 3, rng)).cost
+        for _ in range(20)
+    ]
+    result = design(arm, settings, rng, rival=rival)
+    assert result.cost < min(chance)
+    motion = result.excitation.trajectory.one_period(160)
+    weight = 1.0 / problem.noise[:, np.newaxis]
+    w = (rival.columns(motion) * weight).reshape(-1, len(rival.parameters))
+    torque = (arm.torque(motion) * weight[:, 0]).reshape(-1)
+    left = torque - w @ np.linalg.lstsq(w, torque, rcond=1e-12)[0]
+    recorded = settings.rate * settings.period * settings.n_periods / 160
+    assert result.cost == pytest.approx(-np.log(recorded * left @ left), abs=0.05)

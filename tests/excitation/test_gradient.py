@@ -4,6 +4,8 @@
 
 from dataclasses import replace
 
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignProblem, DesignSettings
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.random_trajectory import random_feasible
@@ -104,6 +106,14 @@ def test_gradient_of_each_target(humanoid, with_effects, target, effects):
 def test_gradient_of_a_subset(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, samples=40, focus=('coulomb_friction',))
     problem = DesignProblem.of(two_link_arm, settings, np.random.default_rng(3))
+    assert_gradient(Objective.of(problem), problem)
+
+
+def test_gradient_against_a_rival(two_link, with_effects):
+    settings = DesignSettings(period=5.0, harmonics=2, samples=40, criterion='T')
+    arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.2])
+    rival = with_effects(two_link, 'coulomb_friction', 'torque_offset')
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(3), rival)
     assert_gradient(Objective.of(problem), problem)
 
 

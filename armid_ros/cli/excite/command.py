@@ -121,6 +121,11 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     help='An effect of known size, which counts against the torque limits.',
 )
 @click.option(
+    '--rival',
+    metavar='E,...|none',
+    help='With --criterion T: what may be there in place of --effect.',
+)
+@click.option(
     '--model', type=click.Path(path_type=Path), help='model.yaml with what is known of the arm.'
 )
 @click.option(
@@ -195,6 +200,7 @@ def excite(
     focus: str,
     effects: str,
     texts: tuple[str, ...],
+    rival: str | None,
     model: Path | None,
     start: str | None,
     acceleration: str | None,
@@ -237,7 +243,7 @@ def excite(
     if kind in COURSES:
         write_course(kind, scene, duration, share, seed, out)
         return
-    arm = _arm(robot, model, effects, focus, texts)
+    arm, other = _arms(robot, model, effects, focus, texts, rival)
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
     settings = {name: value for name, value in settings.items() if value is not None} | {
@@ -266,6 +272,7 @@ def excite(
                 scene=scene,
                 start=pose,
                 after=recordings,
+                rival=other,
                 rng=seed,
                 progress=_shown(tick, number, len(folders), speed),
                 speed=speed,
@@ -324,19 +331,26 @@ def _start(given: FloatArray | None, planner: TransferPlanner) -> tuple[FloatArr
     return pose, f'{zero} is not free: {fault}' if fault else zero
 
 
-def _arm(
-    robot: Robot, model: Path | None, effects: str, focus: str, texts: tuple[str, ...]
-) -> ArmModel:
-    """Return the prior model."""
+def _arms(
+    robot: Robot,
+    model: Path | None,
+    effects: str,
+    focus: str,
+    texts: tuple[str, ...],
+    rival: str | None,
+) -> tuple[ArmModel, ArmModel | None]:
+    """Return the prior model, and the one to tell it from."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.effects import parse_effect
 
     arm = ArmModel(robot) if model is None else options.model_of(model, robot)
-    arm = options.with_effects(options.with_effects(arm, effects), focus)
+    arm = options.with_effects(arm, effects)
+    other = None if rival is None else options.with_effects(arm, rival.removesuffix('none'))
+    arm = options.with_effects(arm, focus)
     for text in texts:
         arm = arm.with_effect(*parse_effect(text, robot))
-    return arm
+    return arm, other
 
 
 def _written(staged: Staged, result: ExcitationResult, origin: ResultOrigin) -> dict[str, Any]:

@@ -26,6 +26,7 @@ CRITERIA = {
     'A': 'mean variance of the parameters, each scaled to the torque it makes',
     'E': 'variance along the worst direction, parameters scaled to the torque they make',
     'condition': 'condition number of the weighted regressor',
+    'T': 'torque that a rival model cannot explain',
 }
 
 #: The largest and the smallest eigenvalue have a kink where two of them cross. A search follows a
@@ -220,4 +221,54 @@ class SubsetCriterion:
         return float(cost), gradient * np.outer(self.scale, self.scale) / count
 
 
-Criterion = SpectralCriterion | SubsetCriterion
+@dataclass(frozen=True)
+class RivalCriterion:
+    """
+    T-optimality: make the torque that a rival model cannot explain as large as possible.
+
+    The information matrix is over the columns of the rival and those of what it lacks.
+    Source: Atkinson and Fedorov 1975, for models linear in their parameters.
+
+    Attributes
+    ----------
+    rival : ndarray of bool, shape (r,)
+        True for the columns that the rival can use.
+    values : ndarray, shape (r,)
+        Parameters of what the rival lacks; zero for its own columns.
+
+    """
+
+    rival: FloatArray
+    values: FloatArray
+
+    def cost(self, matrix: FloatArray) -> float:
+        """Return - log of the sum of squares, in noise units, that the rival leaves."""
+        return self.smooth(matrix)[0]
+
+    def smooth(self, matrix: FloatArray) -> tuple[float, FloatArray]:
+        """Return the cost and its gradient by the matrix."""
+        own = np.flatnonzero(self.rival)
+        direction = np.array(self.values, dtype=float)
+        direction[own] -= _best_fit(matrix[np.ix_(own, own)], matrix[own] @ direction)
+        power = float(direction @ matrix @ direction)
+        if power <= 0.0:
+            return float(np.inf), np.zeros_like(matrix)
+        return float(-np.log(power)), -np.outer(direction, direction) / power
+
+
+def _best_fit(block: FloatArray, reach: FloatArray) -> FloatArray:
+    """
+    Solve the normal equations, also where a motion does not tell all columns apart.
+
+    An arm of one joint that moves with one frequency has fewer independent columns than others.
+
+    """
+    size = np.sqrt(np.maximum(np.diag(block), 0.0))
+    unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+    values, vectors = np.linalg.eigh(block * np.outer(unit, unit))
+    seen = values > _BLIND
+    along = vectors[:, seen]
+    return np.asarray(unit * (along @ ((along.T @ (unit * reach)) / values[seen])))
+
+
+Criterion = SpectralCriterion | SubsetCriterion | RivalCriterion

@@ -149,7 +149,7 @@ def exact_cost(
     """Return the cost with the true direction of motion and many samples."""
     settings = problem.settings
     count = 4 * settings.samples
-    w = problem.periodic_columns(trajectory, count)[:, problem.base.independent]
+    w = problem.periodic_columns(trajectory, count)[:, problem.selected]
     weight = settings.rate * settings.period * settings.n_periods / count
     matrix = weight * (w.T @ w)
     return problem.criterion.cost(matrix if prior is None else matrix + prior)

@@ -101,9 +101,7 @@ class Objective:
         effects = [self._effect(effect, motion, x) for effect in problem.arm.effects]
         columns = np.concatenate([body, *(effect.columns for effect in effects)], axis=2)
         inverse_noise = (1.0 / problem.noise)[:, np.newaxis]
-        w = (columns[:, :, problem.base.independent] * inverse_noise).reshape(
-            -1, len(problem.base.independent)
-        )
+        w = (columns[:, :, problem.selected] * inverse_noise).reshape(-1, len(problem.selected))
         settings = problem.settings
         weight = settings.rate * settings.period * settings.n_periods / len(self.t)
         matrix = weight * (w.T @ w)
@@ -114,7 +112,7 @@ class Objective:
         def gradient() -> FloatArray:
             weights = np.zeros_like(columns)
             by_w = (2.0 * weight * (w @ by_matrix)).reshape(*motion.q.shape, -1)
-            weights[:, :, problem.base.independent] = by_w * inverse_noise
+            weights[:, :, problem.selected] = by_w * inverse_noise
             return self._gradient(weights, rigid, effects, still)
 
         return cost, gradient

@@ -5,7 +5,7 @@
 from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import ParameterName
 from armid_ros.excitation import DesignProblem, DesignSettings, Information
-from armid_ros.excitation.search.criteria import SpectralCriterion, SubsetCriterion
+from armid_ros.excitation.search.criteria import RivalCriterion, SpectralCriterion, SubsetCriterion
 from armid_ros.model import random_motion
 import numpy as np
 import pytest
@@ -97,6 +97,46 @@ def test_subset_is_judged_with_the_others_fitted(w):
     covariance = np.linalg.inv(w.T @ w)[np.ix_([1, 3], [1, 3])]
     cost = SubsetCriterion(wanted, np.array([1.0, 9.0, 2.0, 1.0, 1.0])).cost(w.T @ w)
     assert cost == pytest.approx(np.linalg.slogdet(covariance)[1] / 2)
+
+
+def test_rival_is_judged_by_its_best_fit(w):
+    rival = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
+    values = np.array([0.0, 0.0, 0.0, 0.7, -2.0])
+    torque = w @ values
+    _, residual, *_ = np.linalg.lstsq(w[:, :3], torque, rcond=None)
+    assert RivalCriterion(rival, values).cost(w.T @ w) == pytest.approx(-np.log(residual[0]))
+
+
+@pytest.mark.parametrize('spoil', ['equal', 'idle', 'all idle'])
+def test_rival_columns_that_a_motion_does_not_tell_apart_are_no_reason_to_stop(w, spoil):
+    """One joint that moves slowly: of the rival's columns some are equal, or nothing happens."""
+    w = w.copy()
+    w[:, 1] = w[:, 0] if spoil == 'equal' else 0.0
+    if spoil == 'all idle':
+        w[:, :3] = 0.0
+    values = np.array([0.0, 0.0, 0.0, 0.7, -2.0])
+    torque = w @ values
+    fitted = w[:, :3] @ np.linalg.lstsq(w[:, :3], torque, rcond=None)[0]
+    criterion = RivalCriterion(np.array([1.0, 1.0, 1.0, 0.0, 0.0]), values)
+    cost, gradient = criterion.smooth(w.T @ w)
+    assert cost == pytest.approx(-np.log(np.sum((torque - fitted) ** 2)))
+    assert np.all(np.isfinite(gradient))
+
+
+def test_models_that_no_motion_can_tell_apart_are_refused(two_link, with_effects):
+    arm = with_effects(two_link, 'torque_offset')
+    with pytest.raises(TrajectoryError, match='torque_offset'):
+        DesignProblem.of(
+            arm, DesignSettings(criterion='T'), np.random.default_rng(0), with_effects(two_link)
+        )
+
+
+def test_rival_needs_criterion_t_and_the_other_way_round(two_link_arm, two_link, with_effects):
+    rng = np.random.default_rng(0)
+    with pytest.raises(TrajectoryError, match="criterion 'T'"):
+        DesignProblem.of(two_link_arm, DesignSettings(), rng, with_effects(two_link))
+    with pytest.raises(TrajectoryError, match='needs a rival'):
+        DesignProblem.of(two_link_arm, DesignSettings(criterion='T'), rng)
 
 
 def test_gravity_target_has_the_gravity_composites_only(humanoid, with_effects):
