@@ -29,7 +29,7 @@ class BlurredMotion(Motion):
 
     """
 
-    width: FloatArray = field(default_factory=lambda: np.ones(1), kw_only=True)
+    width: FloatArray = field(kw_only=True)
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
