@@ -18,7 +18,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.environment import Obstacle
 from armid_ros.excitation.geometry.heights import link_heights, vertical
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.robots import CollisionModel, read_mounting, Robot
+from armid_ros.robots import CollisionModel, read_mounting
 import numpy as np
 
 #: Name of the floor as an obstacle.
@@ -172,23 +172,19 @@ def _height(text: str) -> float | None:
     return height
 
 
-def _carrier(robot: Robot, up: FloatArray) -> tuple[str, float]:
-    """Return the fixed link that carries the first joint, and how far it leans [rad]."""
-    model = robot.model
-    frame = model.frames[model.frames[model.getFrameId(model.names[1])].parentFrame]
-    return str(frame.name), float(np.arccos(np.clip(frame.placement.rotation[:, 2] @ up, -1, 1)))
-
-
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
     """Say why the floor of an arm is not its base plane; empty when it is."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'
-    carrier, lean = _carrier(collision.robot, up)
+    model = collision.robot.model
+    # the fixed link that carries the first joint
+    carrier = model.frames[model.frames[model.getFrameId(model.names[1])].parentFrame]
+    lean = float(np.arccos(np.clip(carrier.placement.rotation[:, 2] @ up, -1, 1)))
     if lean > np.pi / 4.0:
         return (
-            f'{carrier} is mounted turned by {np.rad2deg(lean):.0f} degrees, as on a wall or a '
-            'ceiling that the description does not have (give it with --environment)'
+            f'{carrier.name} is mounted turned by {np.rad2deg(lean):.0f} degrees, as on a wall or '
+            'a ceiling that the description does not have (give it with --environment)'
         )
     q = collision.robot.zero_pose[np.newaxis]
     heights = [
