@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import armid_ros as ar
-from armid_ros.effects import Action
-from armid_ros.effects.layout import joint_columns, scatter
+from armid_ros.effects import joint_columns
 import numpy as np
 
 URDF = Path(__file__).with_name('arm.urdf')
@@ -23,13 +22,8 @@ class Hose(ar.Effect):
     quantities = (ar.Quantity('hose_stiffness', 'N m/rad^3', typical=(0.1, 10.0)),)
 
     def columns(self, motion, arm):
-        """Return dtau/dk = q^3, which the identification needs."""
+        """Return dtau/dk = q^3; the torque is k times that."""
         return joint_columns(self, motion, motion.q**3)
-
-    def action(self, values, arm):
-        """Return the torque, which the simulation needs."""
-        (stiffness,) = scatter(self, values, arm.robot)
-        return Action(link_torque=lambda t, q, dq: stiffness * q**3)
 
 
 arm = ar.ArmModel.of(URDF)

@@ -51,8 +51,7 @@ def arm_urdf(arm: ArmModel) -> Exported:
         If the parameters of a link are not those of a body.
 
     """
-    missing = _without_place(arm, lambda effect: effect.traits.urdf_attribute)
-    found = _of_joints(arm, lambda effect: effect.traits.urdf_attribute)
+    found, missing = _placed(arm, lambda effect: effect.traits.urdf_attribute)
     text = export_urdf(
         arm.body,
         damping=found.get('damping'),
@@ -79,8 +78,7 @@ def arm_mjcf(arm: ArmModel) -> Exported:
         If the parameters of a link are not those of a body.
 
     """
-    missing = _without_place(arm, lambda effect: effect.traits.mjcf_attribute)
-    found = _of_joints(arm, lambda effect: effect.traits.mjcf_attribute)
+    found, missing = _placed(arm, lambda effect: effect.traits.mjcf_attribute)
     found['friction'] = found.pop('frictionloss', {})
     text, left_out = export_mjcf(
         arm.body,
@@ -92,29 +90,25 @@ def arm_mjcf(arm: ArmModel) -> Exported:
     return Exported(text, missing, left_out, found)
 
 
-def _of_joints(arm: ArmModel, place: Callable[[Effect], str]) -> dict[str, dict[str, float]]:
-    """Return values by attribute and joint, of effects that have a place in the format."""
+def _placed(
+    arm: ArmModel, attribute: Callable[[Effect], str]
+) -> tuple[dict[str, dict[str, float]], tuple[str, ...]]:
+    """Return values by attribute and joint, and a line for each that has no place in a format."""
     found: dict[str, dict[str, float]] = {}
+    missing = []
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if place(effect):
-            own = found.setdefault(place(effect), {})
+        if attribute(effect):
+            own = found.setdefault(attribute(effect), {})
             for joint, value in zip(effect.joints, values, strict=True):
                 own[joint] = own.get(joint, 0.0) + float(value)
-    return found
-
-
-def _without_place(arm: ArmModel, place: Callable[[Effect], str]) -> tuple[str, ...]:
-    lines = []
-    for effect, values in zip(arm.effects, arm.values, strict=True):
-        if place(effect) or effect.changes_body:
-            continue
-        names = [*effect.parameters(arm.robot), *effect.shape_parameters(arm.robot)]
-        numbers = [*values, *np.ravel(effect.shape_values)]
-        for parameter, value in zip(names, numbers, strict=True):
-            where = f' of {parameter.joint}' if parameter.joint else ''
-            line = f'{effect.name}: {parameter.name}{where} = {float(value)!r} {parameter.unit}'
-            lines.append(line.rstrip())
-    return tuple(lines)
+        elif not effect.changes_body:
+            names = [*effect.parameters(arm.robot), *effect.shape_parameters(arm.robot)]
+            numbers = [*values, *np.ravel(effect.shape_values)]
+            for parameter, value in zip(names, numbers, strict=True):
+                where = f' of {parameter.joint}' if parameter.joint else ''
+                text = f'{effect.name}: {parameter.name}{where} = {float(value)!r}'
+                missing.append(f'{text} {parameter.unit}'.rstrip())
+    return found, tuple(missing)
 
 
 def _remarks(form: str, missing: tuple[str, ...]) -> tuple[str, ...]:

@@ -80,6 +80,8 @@ class _Memoized(ArmModel):
 
     def link_motion(self, motion: Motion) -> Motion:
         """Return where the links are along a recorded motion."""
+        if self.action().displacement is None:
+            return motion
         linked: Motion = self._once('link', motion, super().link_motion)
         return linked
 

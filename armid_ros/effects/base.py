@@ -23,7 +23,6 @@ from typing import Any, ClassVar, Protocol, Self
 
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.quantities import joint_unit, Quantity, Shape
-from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.effects.traits import TRAITS, Traits
 from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import meant, ModelError
@@ -50,7 +49,7 @@ class Effect(ABC):
     Examples
     --------
     >>> import armid_ros as ar
-    >>> from armid_ros.effects import Action, joint_columns, scatter
+    >>> from armid_ros.effects import joint_columns
     >>> class Hose(ar.Effect):
     ...     name = 'hose'
     ...     summary = 'hose that stiffens as it bends'
@@ -58,10 +57,6 @@ class Effect(ABC):
     ...
     ...     def columns(self, motion, arm):
     ...         return joint_columns(self, motion, motion.q**3)
-    ...
-    ...     def action(self, values, arm):
-    ...         (stiffness,) = scatter(self, values, arm.robot)
-    ...         return Action(link_torque=lambda t, q, dq: stiffness * q**3)
     >>> Hose.on(ar.load_robot('my_arm.urdf'), ('elbow',)).joints
     ('elbow',)
 
@@ -86,8 +81,6 @@ class Effect(ABC):
     changes_body: ClassVar[bool] = False
     #: Whether it is learned from the residual, and so names no cause.
     learned: ClassVar[bool] = False
-    #: Whether its columns are made of the measured torque where there is one, noise included.
-    reads_torque: ClassVar[bool] = False
     #: Whether its torque changes smoothly with position and velocity.
     smooth: ClassVar[bool] = False
 
@@ -277,22 +270,6 @@ class Effect(ABC):
         """Return the rigid parameters that its own add to, one each; none for most effects."""
         return ()
 
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns | None:
-        """
-        Return columns that are smooth in the motion, with their gradient, if these are known.
-
-        The search for a motion takes finite differences where they are not.
-
-        Parameters
-        ----------
-        motion : Motion
-            N samples.
-        width : ndarray, shape (n,)
-            Velocity below which the direction of motion is blurred [rad/s or m/s].
-
-        """
-        return None
-
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the points beside the arm that it ends at."""
@@ -322,10 +299,12 @@ class Effect(ABC):
 
         """
 
-    @abstractmethod
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """
-        Say how the effect acts on the plant with given parameter values.
+        Return how the effect acts on the plant with given parameter values.
+
+        By default the links are held by columns @ values: right for a torque that is linear in the
+        values and depends on time, position and velocity alone.
 
         Parameters
         ----------
@@ -335,6 +314,15 @@ class Effect(ABC):
             The arm it acts on, with the effects before it applied.
 
         """
+        joints = arm.robot.joints
+
+        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
+            rows = np.reshape(q, (-1, len(joints)))
+            times = np.broadcast_to(np.ravel(t), (len(rows),))
+            motion = Motion(joints, times, rows, np.reshape(dq, rows.shape), np.zeros_like(rows))
+            return np.asarray((self.columns(motion, arm) @ values).reshape(np.shape(q)))
+
+        return Action(link_torque=torque if np.any(values) else None)
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
         """

@@ -110,7 +110,7 @@ def register(kind: _Kind) -> _Kind:
     Examples
     --------
     >>> import armid_ros as ar
-    >>> from armid_ros.effects import Action, CATALOGUE, joint_columns, scatter
+    >>> from armid_ros.effects import CATALOGUE, joint_columns
     >>> @ar.register
     ... class Hose(ar.Effect):
     ...     name = 'hose'
@@ -119,10 +119,6 @@ def register(kind: _Kind) -> _Kind:
     ...
     ...     def columns(self, motion, arm):
     ...         return joint_columns(self, motion, motion.q**3)
-    ...
-    ...     def action(self, values, arm):
-    ...         (stiffness,) = scatter(self, values, arm.robot)
-    ...         return Action(link_torque=lambda t, q, dq: stiffness * q**3)
     >>> ar.ArmModel.of('humanoid_arm', effects='hose@elbow_pitch:hose_stiffness=1.5').values[0]
     array([1.5])
     >>> CATALOGUE.remove('hose')  # only if nobody is to name it any more

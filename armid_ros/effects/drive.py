@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import TorqueReading
-from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.effects.unexplained import Unexplained, wave_orders
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -46,10 +45,6 @@ class RotorInertia(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dIa = ddq [rad/s^2], shape (N, n, P)."""
         return joint_columns(self, motion, motion.ddq)
-
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
-        """Return the same with its gradient."""
-        return smooth_joint_columns(self, motion, (motion.ddq, 2, np.ones_like(motion.ddq)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the inertia on the diagonal."""
@@ -136,7 +131,6 @@ class ActuatorSaturation(TorqueReading):
 
     name = 'actuator_saturation'
     summary = 'torque beyond a level that the drive does not give, or does not report'
-    reads_torque = True
     quantities = (
         Quantity('lost_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),
         Quantity('clipped_share', '', lower=0.0, upper=1.0, typical=(0.05, 1.0)),

@@ -10,9 +10,9 @@ from typing import ClassVar
 
 from armid_ros.effects.action import Action, DryFriction, merge_actions
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.direction import direction
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
-from armid_ros.effects.smooth import smooth_direction, SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -30,16 +30,11 @@ class ViscousFriction(Effect):
 
     name = 'viscous_friction'
     summary = 'torque proportional to joint velocity'
-    urdf_attribute = mjcf_attribute = 'damping'
     quantities = (Quantity('viscous_coefficient', 'N m s/rad', lower=0.0, typical=(0.004, 10.0)),)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dFv = dq [rad/s], shape (N, n, P)."""
         return joint_columns(self, motion, motion.dq)
-
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
-        """Return the same with its gradient."""
-        return smooth_joint_columns(self, motion, (motion.dq, 1, np.ones_like(motion.dq)))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the damping matrix."""
@@ -65,11 +60,7 @@ class CoulombFriction(Effect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dFc = sign(dq) [-], shape (N, n, P)."""
-        return joint_columns(self, motion, np.sign(motion.dq))
-
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
-        """Return the same with a smooth direction."""
-        return smooth_joint_columns(self, motion, smooth_direction(motion.dq, width))
+        return joint_columns(self, motion, direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return dry friction between -Fc and Fc."""
@@ -107,17 +98,8 @@ class AsymmetricFriction(Effect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/d(dFc, dFv) = (|sign(dq)|, |dq|), shape (N, n, P)."""
-        return joint_columns(self, motion, np.abs(np.sign(motion.dq)), np.abs(motion.dq))
-
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
-        """Return the same with a smooth direction."""
-        sign, _, slope = smooth_direction(motion.dq, width)
-        return smooth_joint_columns(
-            self,
-            motion,
-            (sign**2, 1, 2.0 * sign * slope),
-            (sign * motion.dq, 1, sign + motion.dq * slope),
-        )
+        forwards = direction(motion)
+        return joint_columns(self, motion, forwards**2, forwards * motion.dq)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the shift of the dry friction's levels, and the torque that grows with |dq|."""
@@ -185,7 +167,7 @@ class StribeckFriction(Effect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/ddFs = exp(-|dq / vs|^d) sign(dq) [-], shape (N, n, P)."""
-        return joint_columns(self, motion, self._left(motion.dq, arm) * np.sign(motion.dq))
+        return joint_columns(self, motion, self._left(motion.dq, arm) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return dry friction of the breakaway torque, and what motion takes away of it."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.direction import direction
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.slipping import Hysteresis
@@ -34,7 +35,7 @@ class LoadDependentFriction(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/dKl = |tau_load| sign(dq) [N m], shape (N, n, P)."""
         load = arm.load(arm.link_motion(motion))
-        return joint_columns(self, motion, np.abs(load) * np.sign(motion.dq))
+        return joint_columns(self, motion, np.abs(load) * direction(motion))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return dry friction whose levels move apart with the load."""

@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from armid_ros.effects.base import Effect
-from armid_ros.effects.smooth import Gradient, SmoothColumns, SmoothFactor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -72,33 +71,3 @@ def scatter(effect: Effect, values: FloatArray, robot: Robot) -> FloatArray:
     spread = np.zeros((len(effect.quantities), robot.n_joints))
     spread[:, effect.indices(robot.joints)] = values.reshape(len(effect.joints), -1).T
     return spread
-
-
-def smooth_joint_columns(
-    effect: Effect, motion: Motion, *quantities: SmoothFactor
-) -> SmoothColumns:
-    """
-    Place smooth sensitivities of an effect that acts on each of its joints alone.
-
-    Parameters
-    ----------
-    effect : Effect
-        Gives the joints.
-    motion : Motion
-        Gives the joint order.
-    *quantities : SmoothFactor
-        One per quantity of the effect, for all joints of the motion.
-
-    """
-    joints, count = effect.indices(motion.joints), len(quantities)
-    columns = joint_columns(effect, motion, *(values for values, _, _ in quantities))
-
-    def pullback(weights: FloatArray) -> Gradient:
-        gradient = (np.zeros_like(motion.q), np.zeros_like(motion.q), np.zeros_like(motion.q))
-        for position, joint in enumerate(joints):
-            for offset, (_, argument, slope) in enumerate(quantities):
-                weight = weights[:, joint, count * position + offset]
-                gradient[argument][:, joint] += weight * slope[:, joint]
-        return gradient
-
-    return SmoothColumns(columns, pullback)

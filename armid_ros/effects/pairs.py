@@ -10,9 +10,9 @@ from itertools import combinations, pairwise, permutations
 
 from armid_ros.effects.action import Action, DryFriction
 from armid_ros.effects.base import Arm, Effect
+from armid_ros.effects.direction import direction
 from armid_ros.effects.quantities import pair_unit, Quantity
 from armid_ros.effects.readings import TorqueReading
-from armid_ros.effects.smooth import Gradient, smooth_direction, SmoothColumns
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
@@ -110,39 +110,12 @@ class CoupledJointFriction(_Pairs):
         """Return dtau/d(Ia, Fv, Fc) of every pair, shape (N, n, P)."""
         columns = np.zeros((len(motion), motion.n_joints, 3 * len(self.owners)))
         for position, (i, k) in enumerate(self.pairs(motion.joints)):
-            direction = np.sign(motion.dq[:, i] + motion.dq[:, k])
+            forwards = direction(motion, (i, k))
             for row, other in ((i, k), (k, i)):
                 columns[:, row, 3 * position] = motion.ddq[:, other]
                 columns[:, row, 3 * position + 1] = motion.dq[:, other]
-                columns[:, row, 3 * position + 2] = direction
+                columns[:, row, 3 * position + 2] = forwards
         return columns
-
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
-        """Return the same with a smooth direction of the shaft."""
-        pairs = self.pairs(motion.joints)
-        columns = np.zeros((*motion.q.shape, 3 * len(pairs)))
-        slopes = []
-        for position, (i, k) in enumerate(pairs):
-            shaft = motion.dq[:, i] + motion.dq[:, k]
-            sign, _, slope = smooth_direction(shaft, np.minimum(width[i], width[k]))
-            slopes.append(slope)
-            for row, other in ((i, k), (k, i)):
-                columns[:, row, 3 * position] = motion.ddq[:, other]
-                columns[:, row, 3 * position + 1] = motion.dq[:, other]
-                columns[:, row, 3 * position + 2] = sign
-
-        def pullback(weights: FloatArray) -> Gradient:
-            by_dq, by_ddq = np.zeros_like(motion.q), np.zeros_like(motion.q)
-            for position, (i, k) in enumerate(pairs):
-                for row, other in ((i, k), (k, i)):
-                    by_ddq[:, other] += weights[:, row, 3 * position]
-                    by_dq[:, other] += weights[:, row, 3 * position + 1]
-                    turn = weights[:, row, 3 * position + 2] * slopes[position]
-                    by_dq[:, i] += turn
-                    by_dq[:, k] += turn
-            return np.zeros_like(motion.q), by_dq, by_ddq
-
-        return SmoothColumns(columns, pullback)
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return inertia and damping between the joints, and dry friction of the shaft."""
@@ -203,19 +176,6 @@ class JointCoupling(_Pairs):
             columns[:, i, position] = -q[:, k]
             columns[:, k, position] = -q[:, i]
         return columns
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of the cables."""
-        n = arm.robot.n_joints
-        stiffness = np.zeros((n, n))
-        for value, (i, k) in zip(values, self.pairs(arm.robot.joints), strict=True):
-            stiffness[i, k] -= value
-            stiffness[k, i] -= value
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(q @ stiffness)
-
-        return Action(link_torque=torque)
 
 
 @dataclass(frozen=True)

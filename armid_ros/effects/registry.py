@@ -102,16 +102,13 @@ class Catalogue(Mapping[str, type[Effect]]):
             raise ModelError(
                 f"no effect '{name}'; did you mean '{near}'? 'armid effects' lists all of them"
             )
-        lost = ''.join(f'; {package} cannot be loaded: {why}' for package, why in self.lost())
+        lost = ''.join(
+            f'; {package} cannot be loaded: {why}' for package, why in self.broken.items()
+        )
         raise ModelError(
             f"no effect '{name}'; the catalogue has {', '.join(self)}{lost}"
             '; effects of other packages are there once those are installed'
         )
-
-    def lost(self) -> tuple[tuple[str, str], ...]:
-        """Return packages whose effects cannot be loaded, and why."""
-        self._complete_once()
-        return tuple(self.broken.items())
 
     def add(self, kind: type[Effect]) -> None:
         """

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 from armid_ros.effects.action import Action, Displacement
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.layout import joint_columns, scatter, smooth_joint_columns
+from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
-from armid_ros.effects.smooth import SmoothColumns
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -37,11 +36,6 @@ class TorqueOffset(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return dtau/doffset = 1 [-], shape (N, n, P)."""
         return joint_columns(self, motion, np.ones_like(motion.q))
-
-    def smooth_columns(self, motion: Motion, width: FloatArray) -> SmoothColumns:
-        """Return the same with its gradient."""
-        one = np.ones_like(motion.q)
-        return smooth_joint_columns(self, motion, (one, 0, 0.0 * one))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the constant torque."""

@@ -44,7 +44,7 @@ class JointSpring(Effect):
         return joint_columns(self, motion, arm.link_motion(motion).q, np.ones_like(motion.q))
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of the springs."""
+        """Return the torque of the springs, without columns: simulations have many of them."""
         stiffness, preload = scatter(self, values, arm.robot)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
@@ -95,18 +95,6 @@ class SoftLimit(Effect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return how deep each bumper is pressed, with its sign [rad], shape (N, n, P)."""
-        return joint_columns(self, motion, *self._pressed(arm.link_motion(motion).q, arm))
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of the bumpers."""
-        at_lower, at_upper = scatter(self, values, arm.robot)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            low, high = self._pressed(q, arm)
-            return np.asarray(at_lower * low + at_upper * high)
-
-        return Action(link_torque=torque)
-
-    def _pressed(self, q: FloatArray, arm: Arm) -> tuple[FloatArray, FloatArray]:
+        q = arm.link_motion(motion).q
         lower, upper = self.shape_over_joints(arm.robot)
-        return -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0)
+        return joint_columns(self, motion, -np.maximum(lower - q, 0.0), np.maximum(q - upper, 0.0))

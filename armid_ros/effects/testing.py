@@ -234,32 +234,6 @@ def shapes_stay_possible(trial: EffectCase) -> None:
             assert inside, f'{shape.name}: {value} is beyond its bounds'
 
 
-def smooth_columns_have_their_gradient(trial: EffectCase) -> None:
-    """Fail where smooth columns, if there are any, are others or have another gradient."""
-    motion, width = trial.motion, np.full(trial.robot.n_joints, 1e-9)
-    sharp = trial.effect.smooth_columns(motion, width)
-    if sharp is None:
-        return
-    columns = ArmModel(trial.robot).columns_of(trial.effect, motion)
-    np.testing.assert_allclose(sharp.columns, columns, atol=1e-9)
-    width = np.full(trial.robot.n_joints, 0.5)
-    smooth = trial.effect.smooth_columns(motion, width)
-    weights = np.random.default_rng(0).normal(size=columns.shape)
-    assert smooth is not None
-    gradient = smooth.pullback(weights)
-    state = np.array([motion.q, motion.dq, motion.ddq])
-    for argument, joint in np.ndindex(3, motion.n_joints):
-        ends = []
-        for step in (_STEP, -_STEP):
-            moved = state.copy()
-            moved[argument, :, joint] += step
-            at = trial.effect.smooth_columns(Motion(motion.joints, motion.t, *moved), width)
-            assert at is not None
-            ends.append(np.sum(weights * at.columns, axis=(1, 2)))
-        difference = (ends[0] - ends[1]) / (2.0 * _STEP)
-        np.testing.assert_allclose(gradient[argument][:, joint], difference, atol=1e-4)
-
-
 def it_goes_to_other_processes(trial: EffectCase) -> None:
     """Fail where it does not survive being pickled."""
     assert pickle.loads(pickle.dumps(trial.effect)) == trial.effect
@@ -291,6 +265,5 @@ CHECKS: tuple[Callable[[EffectCase], None], ...] = (
     linear_means_exact,
     instantaneous_means_sample_by_sample,
     shapes_stay_possible,
-    smooth_columns_have_their_gradient,
     it_goes_to_other_processes,
 )

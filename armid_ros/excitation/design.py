@@ -128,7 +128,7 @@ def design(
     rival : ArmModel, optional
         With criterion 'T': the model to tell ``arm`` from.
     progress : callable, optional
-        Told after every step.
+        Receives the progress after every step.
 
     Returns
     -------
@@ -150,9 +150,10 @@ def design(
         if progress is not None:
             progress(DesignProgress(done, found.cost))
 
-    outcome = search_all(Task(problem, clearance, prior), rng.spawn(settings.starts), watch)
-    excitation = placed(problem, outcome.found.trajectory, clearance)
-    return evaluate(problem, excitation, prior, stopped=outcome.stopped)
+    task = Task(problem, clearance, prior)
+    found, stopped = search_all(task, rng.spawn(settings.starts), watch)
+    excitation = placed(problem, found.trajectory)
+    return evaluate(problem, excitation, prior, stopped=stopped)
 
 
 def evaluate(
@@ -179,7 +180,7 @@ def evaluate(
     """
     settings = problem.settings
     if isinstance(excitation, FourierTrajectory):
-        excitation = Excitation(excitation, settings.n_periods, settings.run_in, settings.start)
+        excitation = Excitation(excitation, settings.n_periods, settings.run_in)
     trajectory = excitation.trajectory
     count = 4 * settings.samples
     w = problem.periodic_columns(trajectory, count)[:, problem.base.independent]

@@ -96,31 +96,20 @@ def trajectory_faults(
     return Faults(violations, () if approach is None else (approach,))
 
 
-def excitation_faults(
-    arm: ArmModel,
-    limits: Limits,
-    excitation: Excitation,
-    clearance: ClearanceModel | None,
-    margin: float,
-) -> Faults:
-    """Look for anything wrong on the way in and out of a trajectory; see trajectory_faults."""
+def excitation_faults(arm: ArmModel, limits: Limits, excitation: Excitation) -> Faults:
+    """
+    Look for limits exceeded on the way in and out of a trajectory, along its own path.
+
+    The clearance of that path is what `trajectory_faults` proves.
+
+    """
     step = excitation.trajectory.period / (_DENSITY * excitation.trajectory.harmonics)
-    ways: list[Motion] = []
-    ends = (0.0, excitation.duration - excitation.run_in)
     count = max(int(np.ceil(excitation.run_in / step)), 20)
-    for start in ends:
-        ways.append(excitation.at(start + np.linspace(0.0, excitation.run_in, count + 1)))
-    violations = tuple(v for way in ways for v in _violations(arm, limits, way, periodic=False))
-    if clearance is None or excitation.start is None:
-        return Faults(violations)
-    approaches = []
-    for start, way in zip(ends, ways, strict=True):
-        times = start + np.linspace(0.0, excitation.run_in, count // 5 + 1)
-        acceleration = 1.5 * np.abs(way.ddq).max(axis=0)
-        approach = clearance.first_fault(excitation.at, acceleration, times, margin)
-        if approach is not None:
-            approaches.append(approach)
-    return Faults(violations, tuple(approaches))
+    violations: list[Violation] = []
+    for start in (0.0, excitation.duration - excitation.run_in):
+        way = excitation.at(start + np.linspace(0.0, excitation.run_in, count + 1))
+        violations += _violations(arm, limits, way, periodic=False)
+    return Faults(tuple(violations))
 
 
 def _violations(

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +92,6 @@ def excitation_text(excitation: Excitation) -> str:
         'period': trajectory.period,
         'n_periods': excitation.n_periods,
         'run_in': excitation.run_in,
-        'start': None if excitation.start is None else excitation.start.tolist(),
         'joints': joints,
     }
     head = (
@@ -115,13 +113,19 @@ def _from_yaml(text: str) -> Excitation:
         np.array([joint['a'] for joint in joints], dtype=float),
         np.array([joint['b'] for joint in joints], dtype=float),
     )
-    start = content.get('start')
+    _refuse_start(content.get('start') is not None)
     return Excitation(
-        trajectory,
-        _whole(content['n_periods']),
-        finite(content['run_in'], 'run_in'),
-        None if start is None else np.array(start, dtype=float),
+        trajectory, _whole(content['n_periods']), finite(content['run_in'], 'run_in')
     )
+
+
+def _refuse_start(given: bool) -> None:
+    """Refuse a start pose: an excitation without it would be another motion."""
+    if given:
+        raise TrajectoryError(
+            'an excitation has no start pose of its own; take it out, and plan the way from that '
+            'pose with --start'
+        )
 
 
 def _whole(value: Any) -> int:
@@ -141,12 +145,10 @@ def _to_csv(excitation: Excitation) -> str:
     text.write(f'# run_in [s],{excitation.run_in!r}\n')
     numbers = range(1, trajectory.harmonics + 1)
     head = ['joint', 'q0', *(f'a{k}' for k in numbers), *(f'b{k}' for k in numbers)]
-    text.write(','.join([*head, 'start']) + '\n')
+    text.write(','.join(head) + '\n')
     for j, joint in enumerate(trajectory.joints):
         values = [trajectory.q0[j], *trajectory.a[j], *trajectory.b[j]]
-        start = '' if excitation.start is None else repr(float(excitation.start[j]))
-        cells = [csv_cell(joint), *(repr(float(value)) for value in values), start]
-        text.write(','.join(cells) + '\n')
+        text.write(','.join([csv_cell(joint), *(repr(float(value)) for value in values)]) + '\n')
     return text.getvalue()
 
 
@@ -165,7 +167,7 @@ def _from_csv(text: str) -> Excitation:
     def column(key: str) -> list[float]:
         return [float(row[key]) for row in rows]
 
-    starts = [float(row['start']) if row['start'] else math.nan for row in rows]
+    _refuse_start(any(row.get('start') for row in rows))
     trajectory = FourierTrajectory(
         tuple(cell_name(row['joint']) for row in rows),
         float(run['period [s]']),
@@ -173,5 +175,4 @@ def _from_csv(text: str) -> Excitation:
         np.array([column(f'a{k}') for k in range(1, harmonics + 1)]).T,
         np.array([column(f'b{k}') for k in range(1, harmonics + 1)]).T,
     )
-    start = None if all(map(math.isnan, starts)) else np.array(starts)
-    return Excitation(trajectory, _whole(run['n_periods']), float(run['run_in [s]']), start)
+    return Excitation(trajectory, _whole(run['n_periods']), float(run['run_in [s]']))

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from armid_ros.errors import TrajectoryError
@@ -222,7 +221,33 @@ def check_limits(
             f'but the limits are for {", ".join(limits.joints)}'
         )
     torque = motion.tau if torque is None else torque
-    return tuple(_violations(limits, motion, torque))
+    slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
+    checks: list[tuple[str, str, FloatArray, FloatArray, FloatArray]] = [
+        ('lower position', 'position', motion.q, limits.lower, limits.lower - slack - motion.q),
+        ('upper position', 'position', motion.q, limits.upper, motion.q - limits.upper - slack),
+    ]
+    rates = [('velocity', motion.dq, limits.velocity)]
+    rates.append(('acceleration', motion.ddq, limits.acceleration))
+    if torque is not None:
+        rates.append(('torque', torque, limits.torque))
+    for name, values, bound in rates:
+        checks.append((name, name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
+    found = []
+    for name, quantity, values, bound, excess in checks:
+        for j in np.flatnonzero((excess > 0.0).any(axis=0)):
+            worst = int(excess[:, j].argmax())
+            found.append(
+                Violation(
+                    joint=limits.joints[j],
+                    limit=name,
+                    time=float(motion.t[worst]),
+                    value=float(values[worst, j]),
+                    bound=float(bound[j]),
+                    samples=int(np.count_nonzero(excess[:, j] > 0.0)),
+                    unit=limits.unit(quantity, int(j)),
+                )
+            )
+    return tuple(found)
 
 
 def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
@@ -247,29 +272,3 @@ def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str,
     ):
         shares[name] = np.abs(values).max(axis=0) / bound
     return shares
-
-
-def _violations(limits: Limits, motion: Motion, torque: FloatArray | None) -> Iterator[Violation]:
-    slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
-    checks: list[tuple[str, str, FloatArray, FloatArray, FloatArray]] = [
-        ('lower position', 'position', motion.q, limits.lower, limits.lower - slack - motion.q),
-        ('upper position', 'position', motion.q, limits.upper, motion.q - limits.upper - slack),
-    ]
-    rates = [('velocity', motion.dq, limits.velocity)]
-    rates.append(('acceleration', motion.ddq, limits.acceleration))
-    if torque is not None:
-        rates.append(('torque', torque, limits.torque))
-    for name, values, bound in rates:
-        checks.append((name, name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
-    for name, quantity, values, bound, excess in checks:
-        for j in np.flatnonzero((excess > 0.0).any(axis=0)):
-            worst = int(excess[:, j].argmax())
-            yield Violation(
-                joint=limits.joints[j],
-                limit=name,
-                time=float(motion.t[worst]),
-                value=float(values[worst, j]),
-                bound=float(bound[j]),
-                samples=int(np.count_nonzero(excess[:, j] > 0.0)),
-                unit=limits.unit(quantity, int(j)),
-            )

@@ -84,9 +84,7 @@ class DesignProblem:
             If the arm has no such parameter, or no motion can tell it from the rival.
 
         """
-        limits = settings.limits or Limits.of(
-            arm.robot, speed=settings.speed, acceleration=settings.acceleration
-        )
+        limits = Limits.of(arm.robot, speed=settings.speed, acceleration=settings.acceleration)
         noise = _noise(arm, settings)
         if (settings.criterion == 'T') != (rival is not None):
             raise TrajectoryError(

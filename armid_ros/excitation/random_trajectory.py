@@ -12,6 +12,7 @@ from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Limits
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import CollisionModel
+from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
 import numpy as np
 
 #: Trajectories drawn before the rest is looked for around single poses.
@@ -25,9 +26,6 @@ _SHRINK, _SHRINKS = 0.75, 6
 
 #: Samples per period and harmonic at which a drawn trajectory is looked at first.
 _SAMPLES = 40
-
-#: Half range that a joint without position limits is given [rad or m].
-UNLIMITED_HALF_RANGE = np.pi
 
 
 def random_feasible(

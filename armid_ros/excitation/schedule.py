@@ -3,19 +3,18 @@
 """
 A whole excitation run: from rest into a periodic trajectory, through it, and back to rest.
 
-Without a start pose the arm speeds up and slows down along the trajectory's own path, so the runs
-in and out visit no pose that the periods do not visit. With one, it leaves that pose and blends
-into the trajectory, staying between the two, joint by joint.
+The arm speeds up and slows down along the trajectory's own path, so the run-in and the run-out
+visit no pose that the periods do not visit. The way from another pose is a `Transfer`.
 
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory
-from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.motion import FloatArray, Motion
 import numpy as np
 import numpy.typing as npt
 
@@ -38,18 +37,15 @@ class Excitation:
         Number of identical periods; from two on their difference shows the noise floor.
     run_in : float
         Duration of the run-in, and of the run-out [s].
-    start : ndarray, shape (n,), or None
-        Pose to leave from and to return to [rad or m]; None: poses on the trajectory itself.
 
     """
 
     trajectory: FourierTrajectory
     n_periods: int = 2
     run_in: float = 2.0
-    start: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Check the numbers and freeze the start pose."""
+        """Check the numbers."""
         if int(self.n_periods) != self.n_periods or self.n_periods < 1:
             raise TrajectoryError(f'excitation: {self.n_periods} periods; at least one is needed')
         if not (np.isfinite(self.run_in) and self.run_in > 0.0):
@@ -59,14 +55,6 @@ class Excitation:
                 f'excitation: {self.n_periods} periods of {self.trajectory.period:g} s, run-ins '
                 f'of {self.run_in:g} s last {self.duration:.3g} s; a day is the most'
             )
-        if self.start is not None:
-            start = read_only(self.start)
-            object.__setattr__(self, 'start', start)
-            if start.shape != (self.trajectory.n_joints,) or not np.isfinite(start).all():
-                raise TrajectoryError(
-                    f'excitation: the start pose has to be {self.trajectory.n_joints} finite '
-                    f'numbers, for {", ".join(self.joints)}; got {start}'
-                )
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -91,9 +79,20 @@ class Excitation:
         time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         before = np.maximum(self.run_in - time, 0.0) / self.run_in
         after = np.maximum(time - (self.duration - self.run_in), 0.0) / self.run_in
-        if self.start is None:
-            return self._along_orbit(time, before, after)
-        return self._blended(time, before, after, self.start)
+        phase = time - self.run_in
+        # 1 - before is the share of the run-in done, x; the phase rate is _step(x), and the phase
+        # that is still to come before the first period is run_in * integral of _step from x to 1.
+        lead = self.run_in * (_STEP_AREA - _step_integral(1.0 - before))
+        lag = self.run_in * (_STEP_AREA - _step_integral(1.0 - after))
+        end = self.n_periods * self.trajectory.period
+        phase = np.where(before > 0.0, -lead, np.where(after > 0.0, end + lag, phase))
+        speed = _step(1.0 - before) * _step(1.0 - after)
+        change = (_step_slope(1.0 - before) - _step_slope(1.0 - after)) / self.run_in
+        orbit = self.trajectory.motion(phase)
+        speed, change = speed[:, np.newaxis], change[:, np.newaxis]
+        return Motion(
+            self.joints, time, orbit.q, orbit.dq * speed, orbit.ddq * speed**2 + orbit.dq * change
+        )
 
     def for_joints(self, joints: tuple[str, ...]) -> Excitation:
         """
@@ -112,8 +111,7 @@ class Excitation:
         order = [self.joints.index(joint) for joint in joints]
         path = self.trajectory
         path = FourierTrajectory(joints, path.period, path.q0[order], path.a[order], path.b[order])
-        start = None if self.start is None else self.start[order]
-        return Excitation(path, self.n_periods, self.run_in, start)
+        return replace(self, trajectory=path)
 
     def at_speed(self, share: float, rate: float) -> Excitation:
         """
@@ -137,7 +135,7 @@ class Excitation:
         samples = self._period_samples(rate)
         longer = float(np.ceil(samples / share - _WHOLE_SAMPLES)) / samples
         path = self.trajectory.stretched(self.trajectory.period * longer)
-        return Excitation(path, self.n_periods, self.run_in * longer, self.start)
+        return replace(self, trajectory=path, run_in=self.run_in * longer)
 
     def motion(self, rate: float) -> Motion:
         """
@@ -190,42 +188,6 @@ class Excitation:
             )
         return whole
 
-    def _along_orbit(self, t: FloatArray, before: FloatArray, after: FloatArray) -> Motion:
-        """Run through the orbit with a phase that starts and ends at rest."""
-        phase = t - self.run_in
-        # 1 - before is the share of the run-in done, x; the phase rate is _step(x), and the phase
-        # that is still to come before the first period is run_in * integral of _step from x to 1.
-        lead = self.run_in * (_STEP_AREA - _step_integral(1.0 - before))
-        lag = self.run_in * (_STEP_AREA - _step_integral(1.0 - after))
-        end = self.n_periods * self.trajectory.period
-        phase = np.where(before > 0.0, -lead, np.where(after > 0.0, end + lag, phase))
-        speed = _step(1.0 - before) * _step(1.0 - after)
-        change = (_step_slope(1.0 - before) - _step_slope(1.0 - after)) / self.run_in
-        orbit = self.trajectory.motion(phase)
-        speed, change = speed[:, np.newaxis], change[:, np.newaxis]
-        return Motion(
-            self.joints, t, orbit.q, orbit.dq * speed, orbit.ddq * speed**2 + orbit.dq * change
-        )
-
-    def _blended(
-        self, t: FloatArray, before: FloatArray, after: FloatArray, start: FloatArray
-    ) -> Motion:
-        """Mix the start pose and the orbit, as it gets going, with a weight from 0 to 1."""
-        orbit = self._along_orbit(t, before, after)
-        sign = np.where(after > 0.0, -1.0, 1.0)
-        share = 1.0 - np.maximum(before, after)
-        weight = _step(share)[:, np.newaxis]
-        slope = (sign * _step_slope(share) / self.run_in)[:, np.newaxis]
-        bend = (_step_bend(share) / self.run_in**2)[:, np.newaxis]
-        away = orbit.q - start
-        return Motion(
-            self.joints,
-            t,
-            start + weight * away,
-            weight * orbit.dq + slope * away,
-            weight * orbit.ddq + 2.0 * slope * orbit.dq + bend * away,
-        )
-
 
 #: Integral of _step from 0 to 1.
 _STEP_AREA = 0.5
@@ -238,10 +200,6 @@ def _step(x: FloatArray) -> FloatArray:
 
 def _step_slope(x: FloatArray) -> FloatArray:
     return np.asarray(30.0 * x**2 * (1.0 - x) ** 2)
-
-
-def _step_bend(x: FloatArray) -> FloatArray:
-    return np.asarray(60.0 * x * (1.0 - x) * (1.0 - 2.0 * x))
 
 
 def _step_integral(x: FloatArray) -> FloatArray:

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.excitation.search.criteria import CRITERIA
 from armid_ros.motion import FloatArray
@@ -37,15 +36,11 @@ class DesignSettings:
     run_in : float
         Shortest duration of the run-in and of the run-out [s]; they are made longer where the
         limits need it.
-    start : ndarray, shape (n,), or None
-        Pose to start from and to end in [rad or m]; None: poses on the trajectory.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
     acceleration : ndarray, shape (n,), or None
         What the drives can do [rad/s^2 or m/s^2], which no URDF says; None: the top speed in
         0.25 s. ``speed`` applies to it.
-    limits : Limits or None
-        Limits in place of all of those; ``speed`` does not apply to them.
     clearance : float
         Distance to keep between bodies that may touch [m].
     criterion : str
@@ -86,10 +81,8 @@ class DesignSettings:
     harmonics: int = 5
     n_periods: int = 2
     run_in: float = 2.0
-    start: FloatArray | None = None
     speed: str | float = 'fast'
     acceleration: FloatArray | None = None
-    limits: Limits | None = None
     clearance: float = 0.01
     criterion: str = 'D'
     balance: float = 1.0

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.geometry.heights import zero_pose
 from armid_ros.excitation.geometry.paths import clear_line, find_path, PathError
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
 from armid_ros.motion import FloatArray, Motion, read_only
@@ -201,7 +200,7 @@ class TransferPlanner:
 
         """
         assert self.limits is not None
-        zero = zero_pose(self.arm.robot)
+        zero = self.arm.robot.zero_pose
         reason = self.fault(zero)
         if not reason:
             return zero, ''

@@ -199,12 +199,10 @@ def random_motion(robot: Robot, rng: np.random.Generator, n_samples: int | None 
     n = robot.n_joints
     if n_samples is None:
         n_samples = min(40 * n, _MOST_STATES)
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     return Motion(
         joints=robot.joints,
         t=np.arange(n_samples, dtype=float),
-        q=rng.uniform(lower, upper, (n_samples, n)),
+        q=rng.uniform(*robot.position_range(), (n_samples, n)),
         dq=rng.normal(size=(n_samples, n)),
         ddq=rng.normal(size=(n_samples, n)),
     )

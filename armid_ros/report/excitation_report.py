@@ -182,7 +182,7 @@ def _verdict(
             f'The search was stopped early ({design.stopped}). This is the best result so far; '
             'the same seed may give another one.'
         )
-    if settings.acceleration is None and settings.limits is None:
+    if settings.acceleration is None:
         beware.append(
             'Acceleration limits are assumed, as a URDF has none: each joint reaches its top '
             'speed in 0.25 s.'
@@ -239,7 +239,7 @@ def _asked(
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
-    start = 'the trajectory itself' if run.start is None else _numbers(run.start)
+    start = 'the trajectory itself'
     if whole is not None:
         start = (
             f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
@@ -269,8 +269,6 @@ def _asked(
 
 
 def _speed(settings: DesignSettings) -> str:
-    if settings.limits is not None:
-        return 'limits of your own'
     name = settings.speed
     share = SPEED_CLASSES[name] if isinstance(name, str) else name
     return f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'

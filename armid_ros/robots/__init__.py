@@ -9,7 +9,7 @@ Robots: what a URDF says of an arm, and the robots that come with the package.
 
 """
 
-from armid_ros.robots.collision import Clearance, collision_model, CollisionModel
+from armid_ros.robots.collision import collision_model, CollisionModel
 from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
 from armid_ros.robots.mounting import Mounting, read_mounting
@@ -42,7 +42,6 @@ __all__ = [
     'GRAVITIES',
     'collision_model',
     'CollisionModel',
-    'Clearance',
     'Mounting',
     'read_mounting',
 ]

@@ -22,24 +22,6 @@ import pinocchio as pin
 RANGE_SAMPLES = 73  # every 5 deg of a full turn
 
 
-@dataclass(frozen=True)
-class Clearance:
-    """
-    The smallest distance between two links that may touch.
-
-    Attributes
-    ----------
-    distance : float
-        [m]; negative is the depth of penetration; infinite when no pair of links is checked.
-    links : tuple of str
-        The two links; empty when no pair is checked.
-
-    """
-
-    distance: float
-    links: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class CollisionModel:
     """
@@ -75,20 +57,6 @@ class CollisionModel:
         numbers = range(len(self.geometry.collisionPairs))
         return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
-    def distance(self, q: npt.ArrayLike) -> Clearance:
-        """
-        Return the smallest clearance in one pose, q of shape (n,) [rad or m].
-
-        Raises
-        ------
-        RobotError
-            If q does not have a position for each driven joint.
-
-        """
-        clearances, closest = self._check(np.asarray(q, dtype=np.float64)[None])
-        links = () if closest[0] < 0 else _links(self.robot, self.geometry, int(closest[0]))
-        return Clearance(float(clearances[0]), links)
-
     def path_clearance(self, q: npt.ArrayLike) -> FloatArray:
         """
         Return the smallest clearance in each pose of a path.
@@ -101,7 +69,7 @@ class CollisionModel:
         Returns
         -------
         ndarray, shape (N,)
-            Clearances [m]; negative in collision.
+            Clearances [m]; negative in collision, infinite when no pair of links is checked.
 
         Raises
         ------
@@ -109,29 +77,19 @@ class CollisionModel:
             If the poses do not have a position for each driven joint.
 
         """
-        return self._check(np.asarray(q, dtype=np.float64))[0]
-
-    def closest(self, q: npt.ArrayLike) -> tuple[int, Clearance]:
-        """Return the sample of a path, shape (N, n), where links come closest, and how close."""
-        sample = int(np.argmin(self.path_clearance(q)))
-        return sample, self.distance(np.asarray(q, dtype=np.float64)[sample])
-
-    def _check(self, q: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-        """Clearance of each pose and the number of its closest pair, -1 without pairs."""
+        q = np.asarray(q, dtype=np.float64)
         model = self.robot.model
         if q.ndim != 2 or q.shape[1] != model.nq:
             raise RobotError(
                 f'{self.robot.name}: poses of shape {q.shape} do not fit {model.nq} driven joints'
             )
         clearances = np.full(len(q), np.inf)
-        closest = np.full(len(q), -1, dtype=np.intp)
         if len(self.geometry.collisionPairs) > 0:
             data, placed = model.createData(), self.geometry.createData()
             for sample, pose in enumerate(q):
-                closest[sample] = pin.computeDistances(model, data, self.geometry, placed, pose)
-                result = placed.distanceResults[int(closest[sample])]
-                clearances[sample] = result.min_distance
-        return read_only(clearances), closest
+                closest = pin.computeDistances(model, data, self.geometry, placed, pose)
+                clearances[sample] = placed.distanceResults[closest].min_distance
+        return read_only(clearances)
 
 
 def collision_model(
@@ -192,7 +150,7 @@ def collision_model(
 def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tuple[str, str], ...]:
     """Remove the pairs of links that touch at zero; return them in alphabetical order."""
     data, placed = robot.model.createData(), geometry.createData()
-    pin.computeDistances(robot.model, data, geometry, placed, _zero(robot))
+    pin.computeDistances(robot.model, data, geometry, placed, robot.zero_pose)
     touching = {
         _links(robot, geometry, number)
         for number, result in enumerate(placed.distanceResults)
@@ -224,7 +182,7 @@ def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
         span = 1.0 if robot.prismatic[joint - 1] else np.pi
         first, last = np.clip((robot.lower[joint - 1], robot.upper[joint - 1]), -span, span)
         for position in np.linspace(first, last, RANGE_SAMPLES):
-            pose = _zero(robot)
+            pose = robot.zero_pose
             pose[joint - 1] = position
             pin.updateGeometryPlacements(robot.model, data, geometry, placed, pose)
             distances = [pin.computeDistance(geometry, placed, n).min_distance for n in numbers]
@@ -239,10 +197,6 @@ def _keep(geometry: pin.GeometryModel, numbers: list[int]) -> None:
     geometry.removeAllCollisionPairs()
     for pair in pairs:
         geometry.addCollisionPair(pair)
-
-
-def _zero(robot: Robot) -> FloatArray:
-    return np.clip(np.zeros(robot.n_joints), robot.lower, robot.upper)
 
 
 def _links(robot: Robot, geometry: pin.GeometryModel, pair: int) -> tuple[str, str]:

@@ -24,6 +24,9 @@ PARAMETERS_PER_BODY = 10
 #: inertia about its centre to 1e-7.
 NO_MASS = 1e-9
 
+#: Half range that a joint without position limits is given [rad or m].
+UNLIMITED_HALF_RANGE = np.pi
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -173,6 +176,18 @@ class Robot:
     def torque_units(self) -> tuple[str, ...]:
         """Return the unit of each joint torque or force: 'N m' or 'N'."""
         return tuple('N' if slides else 'N m' for slides in self.prismatic)
+
+    @property
+    def zero_pose(self) -> FloatArray:
+        """Return where all joints are at zero, or at the limits nearest to it, shape (n,)."""
+        return np.clip(np.zeros(self.n_joints), self.lower, self.upper)
+
+    def position_range(self) -> tuple[FloatArray, FloatArray]:
+        """Return the position limits, shape (n,); `UNLIMITED_HALF_RANGE` where there is none."""
+        return (
+            np.where(np.isfinite(self.lower), self.lower, -UNLIMITED_HALF_RANGE),
+            np.where(np.isfinite(self.upper), self.upper, UNLIMITED_HALF_RANGE),
+        )
 
     def index(self, joint: str) -> int:
         """Return the position of a driven joint; RobotError lists those that exist."""

@@ -111,7 +111,7 @@ def test_the_arm_can_make_the_run_without_hitting_its_own_pedestal(bench, chosen
     limits = Limits.of(bench.robot, speed=0.9)
     run = chosen.excitation
     assert not trajectory_faults(bench.arm, limits, run.trajectory, clearance, CLEARANCE)
-    assert not excitation_faults(bench.arm, limits, run, clearance, CLEARANCE)
+    assert not excitation_faults(bench.arm, limits, run)
     assert bodies.path_clearance(run.motion(100.0).q).min() >= CLEARANCE
     assert run.n_periods == 2
 

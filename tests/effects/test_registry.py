@@ -24,18 +24,13 @@ class Hose(ar.Effect):
         """Return dtau/dk = q^3."""
         return joint_columns(self, motion, motion.q**3)
 
-    def action(self, values, arm):
-        """Return the torque."""
-        (stiffness,) = scatter(self, values, arm.robot)
-        return Action(link_torque=lambda t, q, dq: stiffness * q**3)
-
 
 class Twice(Hose):
-    """A hose of which the identification knows twice too much."""
+    """A hose that pulls half as much in a simulation as an identification takes it to."""
 
-    def columns(self, motion, arm):
-        """Return too much."""
-        return 2.0 * super().columns(motion, arm)
+    def action(self, values, arm):
+        """Return too little."""
+        return super().action(0.5 * values, arm)
 
 
 class Bent(Hose):
@@ -167,7 +162,7 @@ def test_a_class_without_its_methods_is_refused():
     kind = type(
         'Bare', (ar.Effect,), {'name': 'bare', 'summary': 'no', 'quantities': Hose.quantities}
     )
-    with pytest.raises(ar.ArmidError, match=r'action.*columns'):
+    with pytest.raises(ar.ArmidError, match=r'bare .* has no columns'):
         ar.register(kind)
     with pytest.raises(ar.ArmidError, match='no class'):
         ar.register(Hose(('joint1',)))

@@ -14,13 +14,9 @@ from armid_ros.excitation import (
     DesignProblem,
     DesignSettings,
     evaluate,
-    Limits,
-    Obstacle,
     random_feasible,
-    with_obstacles,
 )
 from armid_ros.excitation.search.parallel import search_all, Task
-from armid_ros.robots import collision_model
 import numpy as np
 import pytest
 
@@ -211,48 +207,3 @@ def test_design_against_a_rival_leaves_it_more_to_explain(two_link, with_effects
     left = torque - w @ np.linalg.lstsq(w, torque, rcond=1e-12)[0]
     recorded = settings.rate * settings.period * settings.n_periods / 160
     assert result.cost == pytest.approx(-np.log(recorded * left @ left), abs=0.05)
-
-
-def test_run_starts_and_ends_in_the_start_pose(humanoid, humanoid_collision, with_effects, quick):
-    start = np.array([0.5, -0.8, 0.2, 0.6, 0.0, 0.0])
-    arm = with_effects(humanoid)
-    settings = replace(quick, start=start, starts=1, iterations=5, target='gravity')
-    result = design(arm, settings, np.random.default_rng(0), collision=humanoid_collision)
-    motion = result.excitation.motion(500.0)
-    np.testing.assert_allclose(motion.q[[0, -1]], [start, start], atol=1e-12)
-    assert check_limits(result.limits, motion, arm.torque(motion)) == ()
-    assert humanoid_collision.path_clearance(motion.q).min() >= settings.clearance
-
-
-@pytest.mark.parametrize(
-    ('start', 'message'),
-    [
-        (np.full(6, 9.0), 'start pose: joint shoulder_pitch: upper position'),
-        (np.zeros(2), '6 positions are needed, for shoulder_pitch'),
-    ],
-)
-def test_impossible_start_pose_is_refused(humanoid, with_effects, quick, start, message):
-    settings = replace(quick, start=start, starts=1, iterations=1, target='gravity')
-    with pytest.raises(TrajectoryError, match=message):
-        design(with_effects(humanoid), settings, np.random.default_rng(0))
-
-
-def test_start_pose_in_a_wall_is_refused_with_the_wall(two_link_arm, quick):
-    settings = replace(quick, start=np.zeros(2), starts=1, iterations=1)
-    wall = Obstacle('wall', 'sphere', (0.3,), (0.3, 0.0, 1.0))
-    with pytest.raises(TrajectoryError, match=r'start pose.* wall'):
-        design(
-            two_link_arm,
-            settings,
-            np.random.default_rng(0),
-            collision=with_obstacles(collision_model(two_link_arm.robot), [wall]),
-        )
-
-
-def test_own_limits_are_kept_in_place_of_the_robots(two_link_arm, quick):
-    limits = replace(Limits.of(two_link_arm.robot), velocity=np.array([0.3, 0.2]))
-    settings = replace(quick, limits=limits, starts=1)
-    result = design(two_link_arm, settings, np.random.default_rng(0))
-    speed = np.abs(result.excitation.motion(500.0).dq).max(axis=0)
-    assert np.all(speed <= limits.velocity)
-    assert np.all(speed > 0.5 * limits.velocity)

@@ -7,13 +7,13 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignProblem, DesignSettings
-from armid_ros.excitation.geometry.chain import Chain
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.random_trajectory import random_feasible
 from armid_ros.excitation.search.constraints import Constraints
 from armid_ros.excitation.search.objective import Objective
 from armid_ros.excitation.search.rigid_gradient import RigidRegressor
 from armid_ros.model import random_motion, regressor
+from armid_ros.motion import Motion
 import numpy as np
 import pytest
 
@@ -38,7 +38,7 @@ def coefficients(problem, rng):
 def test_regressor_is_pinocchios(name, request):
     robot = request.getfixturevalue(name)
     motion = random_motion(robot, np.random.default_rng(1), 20)
-    ours = RigidRegressor.of(Chain.of(robot), motion.q, motion.dq, motion.ddq).matrix()
+    ours = RigidRegressor.of(robot, motion).matrix()
     np.testing.assert_allclose(ours, regressor(robot, motion), atol=1e-11)
 
 
@@ -47,14 +47,14 @@ def test_regressor_is_pinocchios(name, request):
 def test_pullback_of_the_regressor_is_its_derivative(name, argument, request):
     robot = request.getfixturevalue(name)
     rng = np.random.default_rng(2)
-    motion, chain = random_motion(robot, rng, 5), Chain.of(robot)
+    motion = random_motion(robot, rng, 5)
     weights = rng.normal(size=(5, robot.n_joints, 10 * robot.n_joints))
     states = [motion.q, motion.dq, motion.ddq]
-    analytic = RigidRegressor.of(chain, *states).pullback(weights)[argument]
+    analytic = RigidRegressor.of(robot, motion).pullback(weights)[argument]
 
     def number(values):
-        moved = [*states[:argument], values, *states[argument + 1 :]]
-        return np.sum(weights * RigidRegressor.of(chain, *moved).matrix(), axis=(1, 2))
+        moved = Motion(robot.joints, motion.t, *states[:argument], values, *states[argument + 1 :])
+        return np.sum(weights * RigidRegressor.of(robot, moved).matrix(), axis=(1, 2))
 
     for joint in range(robot.n_joints):
         direction = np.eye(robot.n_joints)[joint]
@@ -67,7 +67,7 @@ EFFECTS = {
     'friction': ('viscous_friction', 'coulomb_friction', 'torque_offset', 'asymmetric_friction'),
     'drive': ('rotor_inertia', 'coupled_joint_friction'),
     'gravity': ('base_tilt',),
-    'state': ('stribeck_friction', 'torque_ripple'),
+    'state': ('stribeck_friction', 'load_dependent_friction', 'torque_ripple'),
     'history': ('time_delay',),
 }
 

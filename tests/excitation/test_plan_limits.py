@@ -5,7 +5,7 @@
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import CollisionScene, Limits, with_joint_limits
 from armid_ros.excitation.limits import SLOW_VELOCITY, TIME_TO_TOP_SPEED
-from armid_ros.robots import inertia_doubts, joints_beside_arms, load_arms, robot_from_urdf
+from armid_ros.robots import joints_beside_arms, load_arms, robot_from_urdf
 import numpy as np
 import pytest
 
@@ -89,9 +89,3 @@ def test_wheels_head_and_torso_belong_to_no_arm():
     robot = robot_from_urdf(urdf(*one))
     assert set(joints_beside_arms(robot)) == {'wheel0', 'wheel1', 'head'}
     assert joints_beside_arms(robot_from_urdf(urdf(*parts[1:3]))) == ()
-
-
-def test_an_impossible_inertia_is_named_with_its_link():
-    text = arm_urdf().replace('iyy="0.03"', 'iyy="0.025"').replace('iyy="0.025"', 'iyy="0.3"', 1)
-    (line,) = inertia_doubts(robot_from_urdf(text))
-    assert "'a'" in line

@@ -9,10 +9,10 @@ from armid_ros.errors import ArmidError, RobotError
 from armid_ros.excitation import load_environment, load_excitation
 from armid_ros.files import read_text
 from armid_ros.identification.parameters_file import read_parameters
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.recording import Bag, read_recording, recover
 from armid_ros.robots import collision_model, load_robot
-from armid_ros.robots.assumptions import read_assumptions
 from armid_ros.robots.two_link import two_link_set
 import pytest
 

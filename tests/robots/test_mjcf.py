@@ -103,8 +103,8 @@ def test_shapes_are_collision_bodies_of_their_size(written):
         'size="0.1 0.3"/></body><body name="b" pos="0 0 2"><joint axis="0 0 1"/><geom type="box" '
         'size="1 1 0.5"/></body></worldbody></mujoco>'
     )
-    clearance = collision_model(load_robot(written(two))).distance(np.zeros(2))
-    assert clearance.distance == pytest.approx(1.1)
+    clearance = collision_model(load_robot(written(two))).path_clearance(np.zeros((1, 2)))
+    assert clearance == pytest.approx(1.1)
 
 
 def test_meshes_are_found_and_those_that_are_not_are_said(written, tmp_path):

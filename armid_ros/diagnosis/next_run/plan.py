@@ -176,7 +176,7 @@ def next_run(
         settings = _settings(run.template)
         problem = DesignProblem.of(arm, settings, rng)
         try:
-            excitation = placed(problem, run.trajectory, clearance)
+            excitation = placed(problem, run.trajectory)
         except TrajectoryError as error:
             refused.append(str(error))
             continue

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
-from armid_ros.excitation.geometry.chain import Pose
+from armid_ros.excitation.geometry.pose import Pose
 from armid_ros.motion import FloatArray
 import coal
 import numpy as np
@@ -67,7 +67,11 @@ class Capsules:
                 continue
             points, skin = outline(body.geometry)
             if len(points):
-                middle, half, radius = _smallest_capsule(points)
+                spread = np.linalg.svd(points - points.mean(axis=0))[2]
+                middle, half, radius = min(
+                    (_capsule_along(points, direction) for direction in (*np.eye(3), *spread)),
+                    key=lambda c: c[2] ** 2 * (np.linalg.norm(c[1]) + 2.0 / 3.0 * c[2]),
+                )
                 centres[number] = body.placement.act(middle)
                 halves[number] = body.placement.rotation @ half
                 radii[number] = radius + skin
@@ -154,13 +158,6 @@ def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
     if not np.all(np.abs(ends) < _ENDLESS):
         return np.empty((0, 3)), 0.0
     return np.array(list(product(*ends.T))), 0.0
-
-
-def _smallest_capsule(points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return middle, half segment and radius of the smallest of a few capsules about points."""
-    directions = [*np.eye(3), *np.linalg.svd(points - points.mean(axis=0))[2]]
-    capsules = [_capsule_along(points, direction) for direction in directions]
-    return min(capsules, key=lambda c: c[2] ** 2 * (np.linalg.norm(c[1]) + 2.0 / 3.0 * c[2]))
 
 
 def _capsule_along(

@@ -13,10 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from armid_ros.excitation.geometry.capsules import Capsules
-from armid_ros.excitation.geometry.chain import Chain, cross
 from armid_ros.excitation.geometry.environment import body_name
+from armid_ros.excitation.geometry.pose import carried_by, cross, Pose
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import CollisionModel
+from armid_ros.robots import CollisionModel, Robot
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -88,8 +88,6 @@ class ClearanceModel:
     ----------
     collision : CollisionModel
         Bodies and pairs.
-    chain : Chain
-        The arm that moves them.
     capsules : Capsules
         Bounds of the bodies.
     numbers : ndarray of int, shape (number of pairs,)
@@ -104,7 +102,6 @@ class ClearanceModel:
     """
 
     collision: CollisionModel
-    chain: Chain
     capsules: Capsules = field(repr=False)
     numbers: IntArray = field(repr=False)
     pairs: IntArray = field(repr=False)
@@ -114,31 +111,28 @@ class ClearanceModel:
     @classmethod
     def of(cls, collision: CollisionModel) -> ClearanceModel:
         """Prepare a collision model."""
-        chain = Chain.of(collision.robot)
+        robot = collision.robot
         capsules = Capsules.of(collision.geometry)
         joints = capsules.joints
         pairs = np.array(
             [(int(p.first), int(p.second)) for p in collision.geometry.collisionPairs],
             dtype=np.intp,
         ).reshape(-1, 2)
-        moved = np.hstack([chain.carries, np.zeros((chain.n_joints, 1))]).T  # base: last row, -1
+        moved = np.hstack(
+            [carried_by(robot), np.zeros((robot.n_joints, 1))]
+        ).T  # base: last row, -1
         between = moved[joints[pairs[:, 1]]] - moved[joints[pairs[:, 0]]]
         levers = np.array(
-            [
-                _levers(chain, collision, j, r)
-                for j, r in zip(joints, capsules.reach(), strict=True)
-            ]
-        ).reshape(len(joints), chain.n_joints)
+            [_levers(robot, j, r) for j, r in zip(joints, capsules.reach(), strict=True)]
+        ).reshape(len(joints), robot.n_joints)
         first, second = levers[pairs[:, 0]], levers[pairs[:, 1]]
         reach = np.where(between > 0.0, second, np.where(between < 0.0, first, 0.0))
         numbers = np.arange(len(pairs))
-        return cls(collision, chain, capsules, numbers, pairs, between, reach)
+        return cls(collision, capsules, numbers, pairs, between, reach)
 
     def watched(self, q: FloatArray, reach: float) -> ClearanceModel:
         """Return the model with those pairs only that come closer than ``reach`` [m] in poses."""
-        sample, pair = np.nonzero(self._bound(q) < reach)
-        distance, _, _ = self._measure(q, sample, pair)
-        kept = np.unique(pair[distance < reach])
+        kept = np.unique(self.near(q, reach).pair)
         return replace(
             self,
             numbers=self.numbers[kept],
@@ -154,7 +148,7 @@ class ClearanceModel:
         Pairs further apart than that may be missing from the answer or in it.
 
         """
-        pose = self.chain.pose(q)
+        pose = Pose.of(self.collision.robot, q)
         sample, pair = np.nonzero(self.capsules.distance(pose, self.pairs) < reach)
         distance, normal, point = self._measure(q, sample, pair)
         keep = distance < reach
@@ -282,7 +276,7 @@ class ClearanceModel:
 
     def _bound(self, q: FloatArray) -> FloatArray:
         """Bound the distance of every pair from below, shape (N, number of pairs) [m]."""
-        return self.capsules.distance(self.chain.pose(q), self.pairs)
+        return self.capsules.distance(Pose.of(self.collision.robot, q), self.pairs)
 
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray
@@ -307,14 +301,13 @@ class ClearanceModel:
         return Approach(first, second, time, distance)
 
 
-def _levers(chain: Chain, collision: CollisionModel, joint: int, length: float) -> FloatArray:
+def _levers(robot: Robot, joint: int, length: float) -> FloatArray:
     """Most that any point of a body can move per unit of every joint, shape (n,)."""
-    levers = np.zeros(chain.n_joints)
-    robot = collision.robot
+    levers = np.zeros(robot.n_joints)
     stroke = np.where(robot.prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
     stroke = np.minimum(stroke, _LONGEST_STROKE)
     while joint >= 0:
-        levers[joint] = 1.0 if chain.prismatic[joint] else length
-        length += float(np.linalg.norm(chain.placements[joint][1])) + float(stroke[joint])
-        joint = chain.parents[joint]
+        levers[joint] = 1.0 if robot.prismatic[joint] else length
+        length += float(np.linalg.norm(robot.geometry[joint].origin)) + float(stroke[joint])
+        joint = robot.geometry[joint].parent
     return levers

@@ -16,10 +16,9 @@ import math
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.environment import Obstacle
-from armid_ros.excitation.geometry.heights import link_heights, vertical, zero_pose
-from armid_ros.excitation.random_trajectory import UNLIMITED_HALF_RANGE
+from armid_ros.excitation.geometry.heights import link_heights, vertical
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.robots import CollisionModel, read_mounting, Robot
+from armid_ros.robots import CollisionModel, read_mounting
 import numpy as np
 
 #: Name of the floor as an obstacle.
@@ -145,8 +144,8 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
     """
     assert floor.height is not None
     robot = collision.robot
-    lower, upper = _range(robot)
-    q = np.random.default_rng(_SEED).uniform(lower, upper, (_POSES, robot.n_joints))
+    size = (_POSES, robot.n_joints)
+    q = np.random.default_rng(_SEED).uniform(*robot.position_range(), size)
     highest: dict[str, FloatArray] = {}
     for link, lowest, _ in link_heights(collision, floor.up, q):
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
@@ -157,12 +156,6 @@ def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tu
             'height above the origin of the base [m]'
         )
     return touching
-
-
-def _range(robot: Robot) -> tuple[FloatArray, FloatArray]:
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -UNLIMITED_HALF_RANGE)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, UNLIMITED_HALF_RANGE)
-    return lower, upper
 
 
 def _height(text: str) -> float | None:
@@ -179,25 +172,21 @@ def _height(text: str) -> float | None:
     return height
 
 
-def _carrier(robot: Robot, up: FloatArray) -> tuple[str, float]:
-    """Return the fixed link that carries the first joint, and how far it leans [rad]."""
-    model = robot.model
-    frame = model.frames[model.frames[model.getFrameId(model.names[1])].parentFrame]
-    return str(frame.name), float(np.arccos(np.clip(frame.placement.rotation[:, 2] @ up, -1, 1)))
-
-
 def _why_not_standing(collision: CollisionModel, up: FloatArray) -> str:
     """Say why the floor of an arm is not its base plane; empty when it is."""
     normal = np.array([0.0, 0.0, 1.0])
     if up[2] < np.cos(np.pi / 4.0):
         return 'gravity does not pull it onto its base plane'
-    carrier, lean = _carrier(collision.robot, up)
+    model = collision.robot.model
+    # the fixed link that carries the first joint
+    carrier = model.frames[model.frames[model.getFrameId(model.names[1])].parentFrame]
+    lean = float(np.arccos(np.clip(carrier.placement.rotation[:, 2] @ up, -1, 1)))
     if lean > np.pi / 4.0:
         return (
-            f'{carrier} is mounted turned by {np.rad2deg(lean):.0f} degrees, as on a wall or a '
-            'ceiling that the description does not have (give it with --environment)'
+            f'{carrier.name} is mounted turned by {np.rad2deg(lean):.0f} degrees, as on a wall or '
+            'a ceiling that the description does not have (give it with --environment)'
         )
-    q = zero_pose(collision.robot)[np.newaxis]
+    q = collision.robot.zero_pose[np.newaxis]
     heights = [
         (link, float(low[0]), float(high[0]))
         for link, low, high in link_heights(collision, normal, q, fixed=True)

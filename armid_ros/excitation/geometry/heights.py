@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from armid_ros.excitation.geometry.capsules import outline
-from armid_ros.excitation.geometry.chain import Chain
+from armid_ros.excitation.geometry.pose import Pose
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import CollisionModel, Robot
+from armid_ros.robots import CollisionModel
 import coal
 import numpy as np
 
@@ -81,7 +81,7 @@ def link_heights(
 
     """
     robot = collision.robot
-    pose = Chain.of(robot).pose(q)
+    pose = Pose.of(robot, q)
     seen: set[int] = set()
     for body in collision.geometry.geometryObjects:
         joint = int(body.parentJoint) - 1
@@ -123,8 +123,3 @@ def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray
     if not len(points):
         return np.full(len(direction), np.inf)
     return np.asarray((direction @ points.T).max(axis=1) + skin)
-
-
-def zero_pose(robot: Robot) -> FloatArray:
-    """Return where all joints are at zero, or at the limits nearest to it, shape (n,)."""
-    return np.clip(np.zeros(robot.n_joints), robot.lower, robot.upper)

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
-from armid_ros.excitation.random_trajectory import UNLIMITED_HALF_RANGE
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
 import numpy as np
 
 #: Longest straight line of a tree, and the interval with which the proof of one begins
@@ -76,9 +76,9 @@ def find_path(
     start, goal = ends
 
     def free(first: FloatArray, second: FloatArray) -> bool:
-        return (
-            held(_samples(first, second)) and clear_line(clearance, margin, first, second) is None
-        )
+        count = int(np.ceil(np.abs(second - first).max() / _INTERVAL)) + 1
+        poses = np.linspace(first, second, count + 1)
+        return held(poses) and clear_line(clearance, margin, first, second) is None
 
     if free(start, goal):
         return np.vstack([start, goal])
@@ -117,11 +117,6 @@ def clear_line(
 
     times = np.linspace(0.0, 1.0, count + 1)
     return clearance.first_fault(path, np.zeros(len(way)), times, margin)
-
-
-def _samples(first: FloatArray, second: FloatArray) -> FloatArray:
-    count = int(np.ceil(np.abs(second - first).max() / _INTERVAL)) + 1
-    return np.linspace(first, second, count + 1)
 
 
 @dataclass

@@ -35,7 +35,7 @@ def unwound(
     Parameters
     ----------
     excitation : Excitation
-        What is to be run; one with a start pose of its own is left as it is.
+        What is to be run.
     arm : ArmModel
         Prior model; where it tells whole turns apart, as springs do, nothing is changed.
     limits : Limits
@@ -44,8 +44,6 @@ def unwound(
         Where the arm stands [rad or m].
 
     """
-    if excitation.start is not None:
-        return excitation
     trajectory = excitation.trajectory
     turns = _turns(trajectory, limits, start)
     if not turns.any():

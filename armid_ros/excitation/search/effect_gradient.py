@@ -1,20 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Columns of effects that do not know their own gradient.
+Columns of effects, with what works out a gradient by the motion.
 
-Those of what adds to the rigid body are the body's. Others are differentiated by finite
-differences of the state, where they depend on nothing else.
+Columns of what adds to the rigid body are those of the body. All others are differentiated by
+central differences of the state, of all samples at once.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
-from armid_ros.effects.smooth import Gradient, SmoothColumns
 from armid_ros.excitation.search.rigid_gradient import RigidRegressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -22,8 +22,30 @@ import numpy as np
 #: Step of finite differences, of a state of size 1.
 STEP = 1e-6
 
+#: Derivative of a number by the samples q, dq and ddq, each of shape (N, n).
+Gradient = tuple[FloatArray, FloatArray, FloatArray]
 
-def rigid_columns(rows: Sequence[int], motion: Motion, rigid: RigidRegressor) -> SmoothColumns:
+
+@dataclass(frozen=True)
+class EffectColumns:
+    """
+    Columns of one effect with their gradient.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (N, n, P)
+        Sensitivities.
+    pullback : callable
+        From derivatives of a number by the columns, shape (N, n, P), to those by the samples, or
+        to those by the Fourier coefficients, shape (n, 1 + 2 H).
+
+    """
+
+    columns: FloatArray
+    pullback: Callable[[FloatArray], Gradient | FloatArray]
+
+
+def rigid_columns(rows: Sequence[int], motion: Motion, rigid: RigidRegressor) -> EffectColumns:
     """Return the columns of what adds to rigid parameters: those of the parameters."""
     pick = list(rows)
 
@@ -32,22 +54,31 @@ def rigid_columns(rows: Sequence[int], motion: Motion, rigid: RigidRegressor) ->
         spread[:, :, pick] = weights
         return rigid.pullback(spread)
 
-    return SmoothColumns(rigid.matrix()[:, :, pick], pullback)
+    return EffectColumns(rigid.matrix()[:, :, pick], pullback)
 
 
-def columns_by_state(effect: Effect, motion: Motion, arm: ArmModel) -> SmoothColumns:
+def columns_by_state(effect: Effect, motion: Motion, arm: ArmModel) -> EffectColumns:
     """Return columns that depend on nothing but the state, with finite differences behind them."""
+    n = motion.n_joints
+    state = np.array([motion.q, motion.dq, motion.ddq])
+    joints = np.arange(n)
+
+    def along(argument: int, step: float, weights: FloatArray) -> FloatArray:
+        """Return the weighted sum of the columns with each joint moved alone, (N, n)."""
+        moved = np.repeat(
+            state[:, np.newaxis], n, axis=1
+        )  # [argument, moved joint, sample, joint]
+        moved[argument, joints, :, joints] += step
+        q, dq, ddq = moved.reshape(3, -1, n)
+        samples = replace(motion, t=np.tile(motion.t, n), q=q, dq=dq, ddq=ddq)
+        columns = arm.columns_of(effect, samples).reshape(n, *weights.shape)
+        return np.asarray(np.einsum('jkrp,krp->kj', columns, weights))
 
     def pullback(weights: FloatArray) -> Gradient:
-        gradient = np.empty((3, *motion.q.shape))
-        for argument, joint in np.ndindex(3, motion.n_joints):
-            ends = []
-            for sign in (1.0, -1.0):
-                state = np.array([motion.q, motion.dq, motion.ddq])
-                state[argument, :, joint] += sign * STEP
-                ends.append(arm.columns_of(effect, Motion(motion.joints, motion.t, *state)))
-            difference = np.sum(weights * (ends[0] - ends[1]), axis=(1, 2))
-            gradient[argument, :, joint] = difference / (2.0 * STEP)
-        return gradient[0], gradient[1], gradient[2]
+        by_q, by_dq, by_ddq = (
+            (along(argument, STEP, weights) - along(argument, -STEP, weights)) / (2.0 * STEP)
+            for argument in range(3)
+        )
+        return by_q, by_dq, by_ddq
 
-    return SmoothColumns(arm.columns_of(effect, motion), pullback)
+    return EffectColumns(arm.columns_of(effect, motion), pullback)

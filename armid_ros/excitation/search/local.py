@@ -51,9 +51,6 @@ _CANDIDATE_JOINTS = 10
 #: Factor by which a trajectory that is not quite feasible is made smaller, and how often.
 _SHRINK, _SHRINKS = 0.99, 12
 
-#: Report: share of the iterations done, cost of the best so far, and that trajectory.
-Report = Callable[[float, float, FourierTrajectory], None]
-
 
 @dataclass(frozen=True)
 class Found:
@@ -73,13 +70,17 @@ class Found:
     cost: float
 
 
+#: Receives the share of the work that is done, and the best so far.
+Watch = Callable[[float, Found], None]
+
+
 @dataclass
 class _Best:
     """The best feasible trajectory so far, and who wants to know."""
 
     problem: DesignProblem
     prior: FloatArray | None
-    report: Report
+    watch: Watch
     found: Found | None = None
     done: float = 0.0
 
@@ -95,11 +96,11 @@ class _Best:
     def tell(self, done: float) -> None:
         self.done = done
         if self.found is not None:
-            self.report(done, self.found.cost, self.found.trajectory)
+            self.watch(done, self.found)
 
 
 class Stopped(Exception):
-    """Raised by a report to end a search."""
+    """Raised by what watches a search to end it."""
 
 
 def search(
@@ -107,7 +108,7 @@ def search(
     clearance: ClearanceModel | None,
     prior: FloatArray | None,
     rng: np.random.Generator,
-    report: Report,
+    watch: Watch,
 ) -> Found:
     """
     Search once.
@@ -122,9 +123,8 @@ def search(
         Information that is there already.
     rng : Generator
         Source of randomness.
-    report : callable
-        Told the share done, the cost and the trajectory of the best so far; may raise Stopped to
-        end the search with that.
+    watch : callable
+        Receives the share done and the best so far; may raise Stopped to end the search with that.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def search(
         If nothing is feasible.
 
     """
-    best = _Best(problem, prior, report)
+    best = _Best(problem, prior, watch)
     objective = Objective.of(problem, prior)
     try:
         start = _best_of_random(problem, clearance, rng, best)

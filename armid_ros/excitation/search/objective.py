@@ -8,11 +8,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from armid_ros.effects import Effect
-from armid_ros.effects.smooth import Gradient, SmoothColumns
+from armid_ros.effects.direction import BlurredMotion
 from armid_ros.excitation.fourier import fourier_basis
-from armid_ros.excitation.geometry.chain import Chain
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.search.effect_gradient import columns_by_state, rigid_columns, STEP
+from armid_ros.excitation.search.effect_gradient import (
+    columns_by_state,
+    EffectColumns,
+    Gradient,
+    rigid_columns,
+    STEP,
+)
 from armid_ros.excitation.search.rigid_gradient import RigidRegressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -35,8 +40,6 @@ class Objective:
         What is wanted.
     prior : ndarray, shape (r, r), or None
         Information that is there already.
-    chain : Chain
-        The arm.
     t : ndarray, shape (N,)
         Sample times [s].
     basis : tuple of ndarray, each of shape (N, 1 + 2 H)
@@ -50,7 +53,6 @@ class Objective:
 
     problem: DesignProblem
     prior: FloatArray | None
-    chain: Chain
     t: FloatArray
     basis: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
     wide: tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]] = field(repr=False)
@@ -65,12 +67,12 @@ class Objective:
         width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
         wide: FloatArray = np.arange(-_MARGIN, settings.samples + _MARGIN) * t[1]
         bases = [fourier_basis(u, settings.period, settings.harmonics) for u in (t, wide)]
-        chain = Chain.of(problem.arm.body)
-        return cls(problem, prior, chain, t, bases[0], (wide, bases[1]), width)
+        return cls(problem, prior, t, bases[0], (wide, bases[1]), width)
 
     def motion(self, x: FloatArray) -> Motion:
         """Return the samples of coefficients X."""
-        return Motion(self.problem.limits.joints, self.t, *(basis @ x.T for basis in self.basis))
+        states = (basis @ x.T for basis in self.basis)
+        return BlurredMotion(self.problem.limits.joints, self.t, *states, width=self.width)
 
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
         """
@@ -92,7 +94,7 @@ class Objective:
         problem, motion = self.problem, self.motion(x)
         still = problem.settings.target == 'gravity' or problem.arm.quasi_static
         felt = motion.at_rest() if still else motion
-        rigid = RigidRegressor.of(self.chain, felt.q, felt.dq, felt.ddq)
+        rigid = RigidRegressor.of(problem.arm.body, felt)
         body = rigid.matrix()
         if problem.settings.target == 'effects':
             body = np.zeros_like(body)
@@ -119,11 +121,11 @@ class Objective:
         self,
         weights: FloatArray,
         rigid: RigidRegressor,
-        effects: list[SmoothColumns],
+        effects: list[EffectColumns],
         still: bool,
     ) -> FloatArray:
-        """Chain derivatives by the columns, shape (N, n, P), to those by the coefficients."""
-        size = 10 * self.chain.n_joints
+        """Turn derivatives by the columns, shape (N, n, P), into those by the coefficients."""
+        size = 10 * weights.shape[1]
         total = np.zeros((weights.shape[1], self.basis[0].shape[1]))
         if self.problem.settings.target != 'effects':
             by_q, by_dq, by_ddq = rigid.pullback(weights[:, :, :size])
@@ -142,22 +144,17 @@ class Objective:
         parts = [by.T @ basis for by, basis in zip(by_state, self.basis, strict=True)]
         return np.asarray(sum(parts))
 
-    def _effect(self, effect: Effect, motion: Motion, x: FloatArray) -> SmoothColumns:
+    def _effect(self, effect: Effect, motion: Motion, x: FloatArray) -> EffectColumns:
         arm = self.problem.arm
         rows = effect.adds_to(arm.robot)
         if rows:
             felt = arm.felt(motion)
-            return rigid_columns(
-                rows, motion, RigidRegressor.of(self.chain, felt.q, felt.dq, felt.ddq)
-            )
-        known = effect.smooth_columns(motion, self.width)
-        if known is not None:
-            return known
+            return rigid_columns(rows, motion, RigidRegressor.of(arm.body, felt))
         if effect.instantaneous:
             return columns_by_state(effect, motion, arm)
         return self._columns_by_coefficient(effect, x)
 
-    def _columns_by_coefficient(self, effect: Effect, x: FloatArray) -> SmoothColumns:
+    def _columns_by_coefficient(self, effect: Effect, x: FloatArray) -> EffectColumns:
         """Return columns that depend on the motion's past, with finite differences behind them."""
         joints, (times, basis) = self.problem.limits.joints, self.wide
 
@@ -176,4 +173,4 @@ class Objective:
                 gradient[index] = np.sum(weights * (columns(moved) - here)) / step
             return gradient
 
-        return SmoothColumns(here, pullback)
+        return EffectColumns(here, pullback)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import multiprocessing
@@ -17,10 +17,9 @@ import threading
 import time
 from types import ModuleType
 
-from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.search.local import Found, search, Stopped
+from armid_ros.excitation.search.local import Found, search, Stopped, Watch
 from armid_ros.motion import FloatArray
 import numpy as np
 
@@ -46,29 +45,7 @@ class Task:
     prior: FloatArray | None
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """
-    The best of several searches.
-
-    Attributes
-    ----------
-    found : Found
-        The trajectory.
-    stopped : str
-        Why the searches did not end by themselves: 'time budget', 'interrupted', or ''.
-
-    """
-
-    found: Found
-    stopped: str
-
-
-#: Told the share of the work done and the best so far.
-Watch = Callable[[float, Found], None]
-
-
-def search_all(task: Task, rngs: Sequence[np.random.Generator], watch: Watch) -> Outcome:
+def search_all(task: Task, rngs: Sequence[np.random.Generator], watch: Watch) -> tuple[Found, str]:
     """
     Run one search per generator and return the best trajectory of all.
 
@@ -83,7 +60,14 @@ def search_all(task: Task, rngs: Sequence[np.random.Generator], watch: Watch) ->
     rngs : sequence of Generator
         One per search.
     watch : callable
-        Told how far they are.
+        Receives the share of the work that is done, and the best so far.
+
+    Returns
+    -------
+    found : Found
+        The best of all.
+    stopped : str
+        Why the searches did not end by themselves: 'time budget', 'interrupted', or ''.
 
     Raises
     ------
@@ -107,7 +91,7 @@ def search_all(task: Task, rngs: Sequence[np.random.Generator], watch: Watch) ->
             raise
         stopped = INTERRUPTED
     assert board.best is not None
-    return Outcome(board.best, stopped)
+    return board.best, stopped
 
 
 class _Board:
@@ -139,14 +123,8 @@ def _here(task: Task, rngs: Sequence[np.random.Generator], board: _Board) -> str
     for number, rng in enumerate(rngs):
         begun = time.process_time()
 
-        def report(
-            done: float,
-            cost: float,
-            trajectory: FourierTrajectory,
-            n: int = number,
-            begun: float = begun,
-        ) -> None:
-            board.note(n, done, Found(trajectory, cost), time.process_time() - begun)
+        def report(done: float, found: Found, n: int = number, begun: float = begun) -> None:
+            board.note(n, done, found, time.process_time() - begun)
             if board.out_of_time:
                 raise Stopped
 
@@ -208,8 +186,8 @@ def _work(task: Task, rng: np.random.Generator, connection: Connection) -> None:
 
     begun = time.process_time()
 
-    def report(done: float, cost: float, trajectory: FourierTrajectory) -> None:
-        connection.send((done, Found(trajectory, cost), time.process_time() - begun))
+    def report(done: float, found: Found) -> None:
+        connection.send((done, found, time.process_time() - begun))
 
     try:
         search(task.problem, task.clearance, task.prior, rng, report)

@@ -13,8 +13,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.excitation.geometry.chain import Chain, cross, force_cross, hat, motion_cross, Pose
-from armid_ros.motion import FloatArray
+from armid_ros.excitation.geometry.pose import (
+    carried_by,
+    cross,
+    force_cross,
+    hat,
+    motion_cross,
+    Pose,
+)
+from armid_ros.motion import FloatArray, Motion
+from armid_ros.robots import Robot
 import numpy as np
 
 #: Index pairs of Ixx, Ixy, Iyy, Ixz, Iyz, Izz in the inertia matrix, Pinocchio's order.
@@ -31,8 +39,8 @@ class RigidRegressor:
 
     Attributes
     ----------
-    chain : Chain
-        The arm.
+    carries : ndarray, shape (n, n)
+        See `carried_by`.
     pose : Pose
         Where its joints are.
     velocity, acceleration : ndarray, shape (N, n, 6)
@@ -46,7 +54,7 @@ class RigidRegressor:
 
     """
 
-    chain: Chain
+    carries: FloatArray
     pose: Pose
     velocity: FloatArray
     acceleration: FloatArray
@@ -56,22 +64,22 @@ class RigidRegressor:
     bodies: FloatArray
 
     @classmethod
-    def of(cls, chain: Chain, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> RigidRegressor:
-        """Evaluate at samples of shape (N, n)."""
-        pose = chain.pose(q)
-        axes, carries = pose.axes, chain.carries
+    def of(cls, robot: Robot, motion: Motion) -> RigidRegressor:
+        """Evaluate along a motion of N samples."""
+        pose, dq, ddq = Pose.of(robot, motion.q), motion.dq, motion.ddq
+        axes, carries = pose.axes, carried_by(robot)
         velocity = np.einsum('mi,kmc->kic', carries, axes * dq[..., np.newaxis])
         drive = axes * ddq[..., np.newaxis]
         drive += motion_cross(velocity, axes) * dq[..., np.newaxis]
         acceleration = np.einsum('mi,kmc->kic', carries, drive)
-        acceleration[..., :3] -= chain.gravity
-        count, n = q.shape
+        acceleration[..., :3] -= robot.gravity
+        count, n = dq.shape
         spread = np.broadcast_to(axes[:, np.newaxis], (count, n, n, 6))
         local_axes = pose.to_body(spread) * carries.T[:, :, np.newaxis]
         local_velocity, local_acceleration = pose.to_body(velocity), pose.to_body(acceleration)
         bodies = _body_regressor(local_velocity, local_acceleration)
         return cls(
-            chain,
+            carries,
             pose,
             velocity,
             acceleration,
@@ -102,10 +110,10 @@ class RigidRegressor:
             Derivative of that number by the samples.
 
         """
-        chain, axes, velocity = self.chain, self.pose.axes, self.velocity
+        carries, axes, velocity = self.carries, self.pose.axes, self.velocity
         count, n = velocity.shape[:2]
         by_body = weights.reshape(count, n, n, 10).transpose(0, 2, 1, 3)  # [k, i, j, c]
-        by_body = by_body * chain.carries.T[:, :, np.newaxis]
+        by_body = by_body * carries.T[:, :, np.newaxis]
         # [k, i, c]: combination of joint axes that each parameter's force is projected on
         projection = np.swapaxes(by_body, -1, -2) @ self.local_axes
         by_velocity, by_acceleration = _body_pullback(
@@ -117,7 +125,7 @@ class RigidRegressor:
 
         def beyond(values: FloatArray) -> FloatArray:
             """Sum over the bodies that each joint carries."""
-            return np.asarray(np.einsum('mi,kic->kmc', chain.carries, values))
+            return np.asarray(np.einsum('mi,kic->kmc', carries, values))
 
         total_v, total_a = beyond(by_velocity), beyond(by_acceleration)
         bent = beyond(force_cross(velocity, by_acceleration))
@@ -126,8 +134,8 @@ class RigidRegressor:
         by_q = -_dot(total_v, turned_v) - _dot(bent, turned_v)
         by_q += _dot(total_a, motion_cross(turned_v, velocity) - turned_a)
         # [k, m, j]: derivative by the axis of j as body m and those beyond it see it
-        seen = np.einsum('mi,kijc->kmjc', chain.carries, by_axes)
-        before = (chain.carries - np.eye(n)).T[:, :, np.newaxis]  # j carries m, j is not m
+        seen = np.einsum('mi,kijc->kmjc', carries, by_axes)
+        before = (carries - np.eye(n)).T[:, :, np.newaxis]  # j carries m, j is not m
         across = motion_cross(axes[:, :, np.newaxis], axes[:, np.newaxis])  # S_m x S_j
         by_q -= np.einsum('kmjc,kmjc->km', seen * before, across)
         by_dq = _dot(total_v, axes) + _dot(bent, axes) - 2.0 * _dot(total_a, turned_v)

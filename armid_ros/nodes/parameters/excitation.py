@@ -372,7 +372,7 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     )
     rules = (planner.clearance, planner.margin)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
-    faults = faults or excitation_faults(planner.arm, limits, excitation, *rules)
+    faults = faults or excitation_faults(planner.arm, limits, excitation)
     if faults:
         raise TrajectoryError(f'{source}: {faults}')
     return excitation

@@ -17,6 +17,7 @@ from armid_ros.files import json_text, settled, write_file
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.exercises import exercise
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle, GaitCycle, weight
@@ -34,7 +35,6 @@ from armid_ros.papers.exo.report.page import exo_report, ShownMotion, SimulatedW
 from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, Driven
 from armid_ros.recording import read_recording, Recording, write_joint_states
 from armid_ros.recording.writer import require_new, whole_bag
-from armid_ros.robots.assumptions import read_assumptions
 import click
 import numpy as np
 from numpy.random import Generator

@@ -3,7 +3,7 @@
 """An effect that the catalogue does not have, as a package of its own."""
 
 import armid_ros as ar
-from armid_ros.effects import Action, joint_columns, scatter
+from armid_ros.effects import joint_columns
 
 
 class Hose(ar.Effect):
@@ -20,10 +20,5 @@ class Hose(ar.Effect):
     smooth = True
 
     def columns(self, motion, arm):
-        """Return dtau/dk = q^3, which the identification needs."""
+        """Return dtau/dk = q^3; the torque is k times that."""
         return joint_columns(self, motion, motion.q**3)
-
-    def action(self, values, arm):
-        """Return the torque, which the simulation needs."""
-        (stiffness,) = scatter(self, values, arm.robot)
-        return Action(link_torque=lambda t, q, dq: stiffness * q**3)

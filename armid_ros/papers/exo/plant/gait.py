@@ -17,7 +17,7 @@ from typing import NamedTuple
 from armid_ros.errors import TrajectoryError
 from armid_ros.files import read_text
 from armid_ros.motion import FloatArray, Motion, read_only
-from armid_ros.robots.assumptions import leg_pair_file
+from armid_ros.papers.exo.assumptions import leg_pair_file
 import numpy as np
 
 #: Harmonics of the series through a gait; walking has nothing beyond.

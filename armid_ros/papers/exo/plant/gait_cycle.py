@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.model.kinematics import points_motion
 from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.contact import Ground
 from armid_ros.papers.exo.plant.gait import Gait
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, PairTorques, TiedPair
@@ -30,7 +31,6 @@ from armid_ros.papers.exo.plant.torque_driven import (
 from armid_ros.papers.exo.plant.walkable import walkable, WalkableGait
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
 from armid_ros.robots import Robot
-from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin

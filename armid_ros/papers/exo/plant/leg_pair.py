@@ -25,6 +25,7 @@ from armid_ros.model.spring_ties import (
     TieGeometry,
 )
 from armid_ros.motion import FloatArray, Motion, read_only
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import (
     Gait,
     Phase,
@@ -33,7 +34,6 @@ from armid_ros.papers.exo.plant.gait import (
     stepping_phase,
 )
 from armid_ros.robots import load_robot, Robot
-from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 import numpy.typing as npt
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray, Motion
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
 from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
@@ -17,7 +18,6 @@ from armid_ros.papers.exo.plant.leg_pair import (
     TiedPair,
 )
 from armid_ros.papers.exo.plant.torque_driven import drive_by_torque
-from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 

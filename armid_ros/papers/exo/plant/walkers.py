@@ -16,10 +16,10 @@ from xml.etree import ElementTree
 
 from armid_ros.model.spring_ties import centroid_ties
 from armid_ros.motion import FloatArray
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import TiedPair
 from armid_ros.papers.exo.plant.walkable import LegLength
 from armid_ros.robots import load_robot, Robot
-from armid_ros.robots.assumptions import read_assumptions
 from armid_ros.robots.load import robot_from_urdf
 import numpy as np
 import numpy.typing as npt

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
+from armid_ros.papers.exo.assumptions import Assumption
 from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.report.poses import draw_poses
@@ -17,7 +18,6 @@ from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, FootForces
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
-from armid_ros.robots.assumptions import Assumption
 import numpy as np
 
 _POSES = 6

@@ -11,11 +11,11 @@ from typing import ClassVar
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
+from armid_ros.papers.exo.assumptions import Assumption
 from armid_ros.papers.exo.report.poses import Drawing
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import measured
 from armid_ros.report.page import Section
-from armid_ros.robots.assumptions import Assumption
 import numpy as np
 
 _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from armid_ros.errors import RobotError
+from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.robots import load_robot, Robot
-from armid_ros.robots.assumptions import read_assumptions
 import numpy as np
 import pytest
 
