@@ -45,12 +45,7 @@ from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import (
-    DiagnosedRecordings,
-    diagnosis_report,
-    Extras,
-    tone_of,
-)
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
 from armid_ros.report.notation import value_of
 from armid_ros.residual import (
     learn_residual,
@@ -192,9 +187,13 @@ class DiagnosisResult(Shown):
         """Return report.html with the verdict and the evidence, and the text of model.yaml."""
         return diagnosis_report(
             self.core,
-            DiagnosedRecordings(self.recordings, self.held_out, self.baseline),
+            {
+                'training': self.recordings,
+                'held-out': self.held_out,
+                'baseline': self.baseline,
+            },
             robot=origin.of(self.description.robot).robot,
-            settings=self.settings,
+            everything=self.settings.everything,
             extras=self.extras,
             patch=patch,
             provenance=origin.provenance,
@@ -275,12 +274,12 @@ class DiagnosisResult(Shown):
 
     def sections(self) -> list[Section]:
         """Return the gap of every joint, before and after."""
-        from armid_ros.report.sections.gap import GapBars
+        from armid_ros.report.sections.gap import gap_section
 
         gap, robot = self.core.gap, self.description.robot
         if gap is None:
             return []
-        return [GapBars(robot, gap, self.core.baseline, bool(self.core.findings))]
+        return [gap_section(robot, gap, self.core.baseline, bool(self.core.findings))]
 
 
 def diagnose(

@@ -270,18 +270,20 @@ class IdentificationResult(Shown):
 
     def sections(self) -> list[Section]:
         """Return the errors of the joints, and all parameters."""
-        from armid_ros.report.sections.fit import JointErrors
-        from armid_ros.report.sections.parameters import ParameterSection
+        from armid_ros.report.blocks import ContentSection, Paragraph
+        from armid_ros.report.sections.fit import error_bars
+        from armid_ros.report.sections.parameters import parameter_section
 
         training: dict[str, list[Fit]] = {}
         for fit in self.core.training:
             training.setdefault(fit.source, []).append(fit)
-        described = self.core.base.values(self.description.theta)
+        described, robot = self.core.base.values(self.description.theta), self.arm.robot
+        said = Paragraph(
+            'Relative error of each joint: rms of the residual over rms of the torque.'
+        )
         return [
-            JointErrors(self.arm.robot, training, self.validation),
-            ParameterSection(
-                self.estimate, described, self.core.unidentified, self.arm.robot.links
-            ),
+            ContentSection('Errors', [said, error_bars(robot, training, self.validation)]),
+            parameter_section(self.estimate, described, self.core.unidentified, robot.links),
         ]
 
     def _value(self, name: str, joint: str) -> str:

@@ -138,11 +138,16 @@ class Shown(ABC):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
-        from armid_ros.report.fragment import fragment, InShort
+        from armid_ros.report.blocks import ContentSection, DataTable, PageBlock, Paragraph
+        from armid_ros.report.fragment import fragment
+        from armid_ros.report.sections.frame import VerdictSection
 
         said = self.summary()
-        top = InShort(said.badge, self.tone(), said.title, said.heads, said.rows, said.lines)
-        return fragment([top, *self.sections()])
+        blocks: list[PageBlock] = [VerdictSection(said.badge, self.tone(), [said.title])]
+        if said.rows:
+            blocks.append(DataTable(said.heads, said.rows))
+        blocks += [Paragraph(line, 'hint') for line in said.lines]
+        return fragment([ContentSection('', blocks), *self.sections()])
 
 
 def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

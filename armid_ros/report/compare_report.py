@@ -11,13 +11,14 @@ from armid_ros.identification.assess.comparison import Comparison, GroupChange, 
 from armid_ros.identification.assess.load_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.identification.parameters_file import ParameterFile
+from armid_ros.report.blocks import ContentSection, FactList
 from armid_ros.report.families import full_label
 from armid_ros.report.not_compared import tell_not_compared
 from armid_ros.report.notation import counted, measured, pretty, robot_label
-from armid_ros.report.page import Page
+from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.changes import Changes
-from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
+from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.report.sections.parameters import changes_section
 
 #: Changes that get a sentence each; the table has all.
 _TOLD = 8
@@ -40,10 +41,15 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
         One HTML file that loads nothing.
 
     """
-    sections = [
+    facts = []
+    for heading, side in (('First', comparison.before), ('Second', comparison.after)):
+        error = side.error_percent
+        said = '' if error is None else f'; relative torque error {error:.2f} %'
+        facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
+    sections: list[Section] = [
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
-        Changes(comparison),
-        Asked(_asked(comparison)),
+        changes_section(comparison),
+        ContentSection('What was asked', [FactList(facts)]),
         Origin(provenance or Provenance()),
     ]
     robot = robot_label(comparison.after.robot)
@@ -246,12 +252,3 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
             f'{comparison.after.robot}; they may not be the same.'
         )
     return tuple(lines)
-
-
-def _asked(comparison: Comparison) -> list[tuple[str, str]]:
-    facts = []
-    for title, side in (('First', comparison.before), ('Second', comparison.after)):
-        error = side.error_percent
-        said = '' if error is None else f'; relative torque error {error:.2f} %'
-        facts.append((title, f'{side.source}: {robot_label(side.robot)}{said}'))
-    return facts

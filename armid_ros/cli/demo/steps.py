@@ -22,7 +22,7 @@ from armid_ros.nodes.lockstep import Progress, run_lockstep
 from armid_ros.recording import Recording
 from armid_ros.report import identification_report
 from armid_ros.report.identification_report import Assessment
-from armid_ros.report.sections.convergence import Convergence
+from armid_ros.report.sections.convergence import convergence_section
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -102,7 +102,7 @@ def page(
     recording: Recording,
 ) -> str:
     """Return report.html, with the truth and the convergence of the online estimate."""
-    convergence = Convergence(
+    convergence = convergence_section(
         np.array([now.t for now in history]),
         np.array([now.estimate.values for now in history]),
         np.array([now.estimate.std for now in history]),

@@ -272,21 +272,6 @@
     }
   });
 
-  function matrix(figure) {
-    const {labels, percent} = JSON.parse(figure.querySelector('script').textContent);
-    const image = figure.querySelector('img');
-    const output = figure.querySelector('output');
-    const read = (event) => {
-      const box = image.getBoundingClientRect();
-      const entry = (part) => Math.min(labels.length - 1, Math.max(0, Math.floor(part * labels.length)));
-      const row = entry((event.clientY - box.top) / box.height);
-      const column = entry((event.clientX - box.left) / box.width);
-      output.textContent = `${labels[row]} and ${labels[column]}: ${(percent[row][column] / 100).toFixed(2)}`;
-    };
-    image.addEventListener('pointermove', read);
-    image.addEventListener('pointerdown', read);
-  }
-
   function drawAll() {
     const started = performance.now();
     document.querySelectorAll('figure.chart').forEach(draw);
@@ -315,7 +300,6 @@
   });
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
   document.querySelectorAll('details').forEach((details) => details.addEventListener('toggle', drawAll));
-  document.querySelectorAll('figure.matrix').forEach(matrix);
   readColours();
   drawAll();
 })();
