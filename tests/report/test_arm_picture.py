@@ -29,23 +29,6 @@ def test_a_joint_without_end_is_drawn_at_zero_and_others_in_the_middle_of_their_
     assert {name for *_, name in drawn.dots} == {'turn', 'lift'}
 
 
-def test_a_joint_that_slides_leaves_no_hole():
-    """Every joint but the first lies at the end of a line that begins further in."""
-    slide = ENDLESS.replace('type="continuous"', 'type="prismatic"').replace(
-        '<axis xyz="0 0 1"/>', '<axis xyz="0 0 1"/><limit lower="0" upper="1" velocity="1"/>'
-    )
-    drawn = draw_arm(robot_from_urdf(slide), ['turn'], np.array([[0.8, 0.5]]))
-    outlines = [
-        np.array([point.split(',') for point in points.split()], dtype=float)
-        for points, _ in drawn.bodies
-    ]
-    for x, y, *_ in drawn.dots:
-        around = [np.all((o.min(axis=0) <= (x, y)) & ((x, y) <= o.max(axis=0))) for o in outlines]
-        assert any(around)
-    tall = [np.ptp(outline[:, 1]) > 2.0 * np.ptp(outline[:, 0]) for outline in outlines]
-    assert any(tall)
-
-
 def test_names_are_not_printed_over_one_another_or_over_the_arm():
     """Joints at one place have a line of text each, at the right of the drawing and within it."""
     chain = ''.join(
