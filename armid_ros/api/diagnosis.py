@@ -23,9 +23,8 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
-from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
     Diagnosis,
@@ -34,6 +33,7 @@ from armid_ros.diagnosis import (
     EXPERIMENT_FILE,
     next_run,
 )
+from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
@@ -46,7 +46,7 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
-from armid_ros.report.notation import value_of
+from armid_ros.report.notation import percent, probability
 from armid_ros.residual import (
     learn_residual,
     lookup_table,
@@ -67,7 +67,7 @@ _Made = TypeVar('_Made')
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class DiagnosisResult(Shown):
+class DiagnosisResult(ShownModel):
     """
     What a model lacks.
 
@@ -156,13 +156,6 @@ class DiagnosisResult(Shown):
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
-    def urdf(self, path: str | Path | None = None) -> str:
-        """Return the description with what was found; write it where a path is given."""
-        text = arm_urdf(self.arm).text
-        if path is not None:
-            write_file(path, text)
-        return text
-
     def to_dataframe(self) -> pandas.DataFrame:
         """Return what was named as a pandas table, a row a parameter."""
         from pandas import DataFrame
@@ -213,6 +206,15 @@ class DiagnosisResult(Shown):
         write_file(folder / 'report.html', page)
         return document
 
+    @property
+    def files(self) -> list[str]:
+        """Return the names of the files of the result."""
+        return [
+            *('diagnosis.json', 'model.yaml', 'report.html'),
+            *([] if self.extras.residual is None else [TABLE_FILE]),
+            *([] if self.extras.next_run is None else [EXPERIMENT_FILE]),
+        ]
+
     def with_residual(self, seed: int) -> DiagnosisResult:
         """Learn what has no name as a map of the state, or note why nothing is learned."""
         if self.verdict not in WORTH_A_MAP:
@@ -250,22 +252,34 @@ class DiagnosisResult(Shown):
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
     def summary(self) -> Summary:
-        """Return what was named, with values."""
-        rows = []
-        for finding in self.core.findings:
-            for parameter, value, std in zip(
-                finding.parameters, finding.values, finding.std, strict=True
-            ):
-                said = value_of(finding, parameter, value, std)
-                where = finding.place_of(parameter.joint) or 'whole arm'
-                rows.append((finding.name, where, parameter.name, said))
-        below = [] if self.residual is None else list(self.residual.sentences())
+        """Return the verdict, named values that are not zero, minor effects, and what to do."""
+        from armid_ros.report.sections.diagnosed import named_rows
+
+        core, extras = self.core, self.extras
+        rows = named_rows(core.findings, certain=True)
+        lines = [
+            f'{names_and_places(group)}: {share_in_words(group[0], interval=True)}'
+            + (', together' if len(group) > 1 else '')
+            for group in by_cause(core.findings)
+        ]
+        share = 'the gap' if core.findings else 'the remaining error'
+        lines += [
+            f'minor (significant, but negligible or not confirmed): '
+            f'{one.name.replace("_", " ")} in {", ".join(one.joints) or "the whole arm"}, '
+            f'{percent(one.share)} of {share}, p {probability(one.p)}'
+            for one in core.minor
+        ]
+        lines += [] if extras.residual is None else extras.residual.sentences()
+        lines += [pair.sentence() for pair in extras.forward]
+        if core.verdict == 'consistent':
+            lines.append('note: how large each effect has to be to be seen is in report.html')
+        lines += [f'note: {note}' for note in (*core.notes, *extras.notes)]
         return Summary(
-            self.core.summary.replace('+-', '±'),
-            self.core.verdict.replace('_', ' '),
-            ('effect', 'joint', 'parameter', 'value, 95 %') if rows else (),
+            core.summary.replace('+-', '±'),
+            core.verdict.replace('_', ' '),
+            ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            lines=below,
+            lines,
         )
 
     def tone(self) -> str:

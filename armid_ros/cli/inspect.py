@@ -54,8 +54,8 @@ def inspect(
     a robot whether identify takes it. Without --out it is printed only.
 
     """
+    from armid_ros.api.arguments import read_all_joints, topics_of
     from armid_ros.api.inspection import inspect as run
-    from armid_ros.api.inspection import read_all_joints, topics_of
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance

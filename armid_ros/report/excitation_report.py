@@ -12,7 +12,6 @@ from armid_ros.excitation import (
     CollisionScene,
     CRITERIA,
     Design,
-    DesignSettings,
     Fitness,
     Limits,
     Obstacle,
@@ -217,6 +216,13 @@ def _asked(
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
     start = f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
+    name = settings.speed
+    share = SPEED_CLASSES[name] if isinstance(name, str) else name
+    speed = f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'
+    noise = ', '.join(
+        f'{value:.3g} {unit}'
+        for value, unit in zip(design.noise, arm.robot.torque_units, strict=True)
+    )
     facts = [
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),
@@ -224,14 +230,14 @@ def _asked(
         ('Effects', effects_in_words(arm.effects)),
         ('Target', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
-        ('Speed', _speed(settings)),
+        ('Speed', speed if settings.limits is None else 'limits of your own'),
         (
             'Run',
             f'{run.n_periods} periods of {run.trajectory.period:.4g} s, '
             f'{counted(run.trajectory.harmonics, "harmonic")}, {run.run_in:.3g} s of '
             f'fade-in and of fade-out; from {start}',
         ),
-        ('Torque noise', f'{_noise(design, arm)} at {settings.rate:g} Hz'),
+        ('Torque noise', f'{noise} at {settings.rate:g} Hz'),
         ('Clearance', f'{100.0 * settings.clearance:g} cm'),
         ('Around the arm', ', '.join(o.name for o in obstacles) or 'nothing'),
         (
@@ -240,21 +246,6 @@ def _asked(
         ),
     ]
     return ContentSection('What was asked', [FactList(facts)])
-
-
-def _speed(settings: DesignSettings) -> str:
-    if settings.limits is not None:
-        return 'limits of your own'
-    name = settings.speed
-    share = SPEED_CLASSES[name] if isinstance(name, str) else name
-    return f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'
-
-
-def _noise(design: Design, arm: ArmModel) -> str:
-    return ', '.join(
-        f'{value:.3g} {unit}'
-        for value, unit in zip(design.noise, arm.robot.torque_units, strict=True)
-    )
 
 
 def _numbers(values: FloatArray) -> str:

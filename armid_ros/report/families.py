@@ -89,22 +89,14 @@ def effects_in_words(effects: Sequence[Effect]) -> str:
     return ', '.join(effect.name.replace('_', ' ') for effect in effects) or 'none'
 
 
-def _count(members: list[int]) -> str:
-    return str(len(members))
-
-
-def _always(members: list[int]) -> bool:
-    return True
-
-
 def parameter_folds(
     names: tuple[ParameterName, ...],
     heads: Sequence[str],
     cells: Callable[[int], Cells],
     links: Sequence[str] = (),
     *,
-    suffix: Callable[[list[int]], str] = _count,
-    opened: Callable[[list[int]], bool] = _always,
+    suffix: Callable[[list[int]], str] | None = None,
+    opened: Callable[[list[int]], bool] | None = None,
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
@@ -122,7 +114,7 @@ def parameter_folds(
         Names of the links, in the order of their numbers.
     suffix, opened : callable
         Return what stands behind the heading of a kind, and whether it is open, for the numbers of
-        its parameters.
+        its parameters; by default how many there are, and True.
     order : callable
         Returns what the rows of a kind are sorted by, for the number of a parameter.
 
@@ -138,7 +130,9 @@ def parameter_folds(
             rows.append((first, *([names[k].joint] if rigid else []), *cells(k)))
         lead = ('Parameter', 'Joint') if rigid else ('Joint',)
         table = DataTable((*lead, *heads), rows, tuple(range(len(lead))), 'parameters')
-        folds.append(Fold(f'{title} [{unit}]: {suffix(members)}', [table], opened(members)))
+        count = suffix(members) if suffix else str(len(members))
+        shown = opened is None or opened(members)
+        folds.append(Fold(f'{title} [{unit}]: {count}', [table], shown))
     return folds
 
 

@@ -12,19 +12,19 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 152,
-    'said': 296,
-    'says': 160,
-    'tells': 75,
+    'told': 129,
+    'said': 294,
+    'says': 157,
+    'tells': 69,
     'asks': 21,
-    'asked': 242,
+    'asked': 224,
     'believes': 3,
-    'believed': 75,
-    'denies': 5,
+    'believed': 74,
+    'denies': 1,
     'denied': 11,
-    'beside': 191,
-    'knows': 29,
-    'heard': 15,
+    'beside': 181,
+    'knows': 28,
+    'heard': 14,
 }
 #: Count in the pages: one quotes a message of the package.
 IN_PAGES = {'beside': 1}

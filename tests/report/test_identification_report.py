@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report is one file that is safe to open, complete, and works in a real browser."""
 
+from base64 import b64decode
 from dataclasses import fields, replace
 from html.parser import HTMLParser
 import re
 
+from armid_ros.api.identification import IdentificationResult
 from armid_ros.identification import (
     Fit,
-    Grade,
     IdentificationSettings,
     identify,
     PhysicalSettings,
@@ -20,7 +21,6 @@ from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.report import hash_files, identification_report, Provenance, versions
 from armid_ros.report.identification_report import Assessment
-from armid_ros.report.identification_summary import headline
 from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sections.assessment import noise_section
 from armid_ros.report.sections.data_quality import data_quality_section
@@ -387,29 +387,42 @@ def test_two_fingers_zoom_and_a_double_tap_undoes_it(browser, first_plot):
     assert browser.complaints == []
 
 
-def test_print_shows_what_is_folded_and_folds_it_again(browser, first_plot):
+def test_a_print_of_six_joints_has_at_most_two_pages(browser, first_plot):
     first_plot(1280)
-    count = 'document.querySelectorAll("details[open]").length'
-    browser.run(
-        'addEventListener("beforeprint", () => {'
-        f' window.printed = [{count}, document.querySelectorAll("details").length]; }})'
-    )
-    before = browser.run(count)
-    sheet = browser.call('Page.printToPDF', preferCSSPageSize=True)['data']
-    shown, folds = browser.run('window.printed')
-    assert shown == folds > before == browser.run(count)
-    assert len(sheet) > 100_000
+    sheet = b64decode(browser.call('Page.printToPDF', preferCSSPageSize=True)['data'])
+    pages = re.findall(rb'/Type\s*/Page\b(?!s)', sheet)
+    assert 1 <= len(pages) <= 2
+    assert len(sheet) > 75_000
     assert browser.complaints == []
 
 
-def test_the_terminal_says_below_the_grade_that_the_model_cannot_be_simulated(case):
-    reasons = ('It predicts.', 'But not that.')
+def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
+    first_plot(1280)
+    rows = '[...document.querySelectorAll("#parameters tbody tr")].filter(row => !row.hidden)'
+    everything = browser.run(f'{rows}.length')
+    browser.run(
+        'const field = document.querySelector("#parameters input"); field.value = "ELBOW";'
+        'field.dispatchEvent(new Event("input"))'
+    )
+    shown = browser.run(f'{rows}.map(row => row.innerText)')
+    assert 0 < len(shown) < everything
+    assert all('elbow' in text for text in shown)
+    tables = browser.run('document.querySelectorAll(".scroll > table").length')
+    assert browser.run('document.querySelectorAll("button.tool").length') == tables
+    browser.run(
+        'Object.defineProperty(navigator, "clipboard", '
+        '{value: {writeText: text => { window.copied = text; }}});'
+        'document.querySelector("#data-quality button.tool").click()'
+    )
+    assert browser.run('window.copied').startswith('"Recording","Used for"')
+
+
+def test_the_terminal_has_that_the_model_cannot_be_simulated(case):
     failed = Verification(None, (), ('a.mcap: not simulated: no body',), 'no body')
-    lines = headline(Grade('good', reasons), case.result, {}, failed)
-    assert lines[:3] == [
-        'good: It predicts.',
-        'The model cannot be simulated: no body.',
-        'But not that.',
-    ]
     unasked = Verification(None, (), ('not simulated: no recording was held out',))
-    assert headline(Grade('good', reasons), case.result, {}, unasked)[1] == 'But not that.'
+    said = 'The model cannot be simulated: no body.'
+    for verification, expected in ((failed, True), (unasked, False)):
+        found = IdentificationResult(
+            case.result, case.description, case.recordings[:1], (), {}, verification
+        )
+        assert (said in found.summary().full_text()) == expected

@@ -284,22 +284,45 @@
     charts.forEach(({plot}) => plot.redraw(false, true));
   };
 
-  let closed = [];
   window.addEventListener('beforeprint', () => {
-    closed = [...document.querySelectorAll('details:not([open])')];
-    closed.forEach((details) => { details.open = true; });
     root.classList.add('paper');
-    readColours();
-    drawAll();
     repaint();
   });
   window.addEventListener('afterprint', () => {
-    closed.forEach((details) => { details.open = false; });
     root.classList.remove('paper');
     repaint();
   });
+
+  // A button below each table copies it as CSV; a field above those of parameters filters rows.
+  const csv = (table) => [...table.rows].map((row) => [...row.cells].map(
+    (cell) => `"${cell.innerText.trim().replace(/"/g, '""')}"`).join(',')).join('\n');
+
+  function addCopy(table) {
+    const button = document.createElement('button');
+    Object.assign(button, {type: 'button', className: 'tool', textContent: 'copy as CSV'});
+    button.addEventListener('click', async () => {
+      await navigator.clipboard.writeText(csv(table));
+      button.textContent = 'copied';
+    });
+    table.parentElement.after(button);
+  }
+
+  function addFilter(section) {
+    const field = document.createElement('input');
+    Object.assign(field, {type: 'search', className: 'tool', placeholder: 'filter parameters'});
+    field.setAttribute('aria-label', 'Filter parameters');
+    field.addEventListener('input', () => {
+      for (const row of section.querySelectorAll('table.parameters tbody tr')) {
+        row.hidden = !row.innerText.toLowerCase().includes(field.value.toLowerCase());
+      }
+    });
+    section.querySelector('details').before(field);
+  }
+
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
   document.querySelectorAll('details').forEach((details) => details.addEventListener('toggle', drawAll));
+  document.querySelectorAll('.scroll > table').forEach(addCopy);
+  document.querySelectorAll('section:has(table.parameters)').forEach(addFilter);
   readColours();
   drawAll();
 })();

@@ -14,6 +14,7 @@ from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.blocks import (
     BulletList,
@@ -75,20 +76,43 @@ def shares_section(diagnosis: Diagnosis) -> ContentSection:
     )
 
 
+def named_rows(
+    findings: Sequence[Finding], certain: bool = False
+) -> list[tuple[str, str, str, str]]:
+    """
+    Return effect, parameter, joint and value with its 95 % interval of what was named.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        The effects.
+    certain : bool
+        Whether values whose interval includes zero are left out, where an effect has others.
+
+    """
+    rows = []
+    for finding in findings:
+        values = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+        if certain:
+            values = [row for row in values if excludes_zero(row[1], row[2])] or values
+        rows += [
+            (
+                finding.name.replace('_', ' '),
+                name.words,
+                finding.place_of(name.joint) or 'whole arm',
+                value_of(finding, name, value, std),
+            )
+            for name, value, std in values
+        ]
+    return rows
+
+
 def named_section(findings: Sequence[Finding]) -> ContentSection:
     """Return the values of what was named, with 95 % intervals."""
-    rows = [
-        (
-            finding.name.replace('_', ' '),
-            name.words,
-            finding.place_of(name.joint) or 'whole arm',
-            value_of(finding, name, value, std),
-        )
-        for finding in findings
-        for name, value, std in zip(finding.parameters, finding.values, finding.std, strict=True)
-    ]
     heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
-    return ContentSection('Parameters', [DataTable(heads, rows, (0, 1, 2), 'both')])
+    return ContentSection(
+        'Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2), 'both')]
+    )
 
 
 def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> ContentSection:
