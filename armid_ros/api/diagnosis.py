@@ -33,7 +33,6 @@ from armid_ros.diagnosis import (
     EXPERIMENT_FILE,
     next_run,
 )
-from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
@@ -46,7 +45,7 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
-from armid_ros.report.notation import percent, probability
+from armid_ros.report.sections.diagnosed import named_rows
 from armid_ros.residual import (
     learn_residual,
     lookup_table,
@@ -116,11 +115,6 @@ class DiagnosisResult(ShownModel):
     def verdict(self) -> str:
         """One word: consistent, named, ambiguous, partial, unknown, not_repeatable, bad_data."""
         return self.core.verdict
-
-    @property
-    def summary_text(self) -> str:
-        """Return the verdict in a sentence or two."""
-        return self.core.summary
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -252,34 +246,14 @@ class DiagnosisResult(ShownModel):
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
     def summary(self) -> Summary:
-        """Return the verdict, named values that are not zero, minor effects, and what to do."""
-        from armid_ros.report.sections.diagnosed import named_rows
-
-        core, extras = self.core, self.extras
-        rows = named_rows(core.findings, certain=True)
-        lines = [
-            f'{names_and_places(group)}: {share_in_words(group[0], interval=True)}'
-            + (', together' if len(group) > 1 else '')
-            for group in by_cause(core.findings)
-        ]
-        share = 'the gap' if core.findings else 'the remaining error'
-        lines += [
-            f'minor (significant, but negligible or not confirmed): '
-            f'{one.name.replace("_", " ")} in {", ".join(one.joints) or "the whole arm"}, '
-            f'{percent(one.share)} of {share}, p {probability(one.p)}'
-            for one in core.minor
-        ]
-        lines += [] if extras.residual is None else extras.residual.sentences()
-        lines += [pair.sentence() for pair in extras.forward]
-        if core.verdict == 'consistent':
-            lines.append('note: how large each effect has to be to be seen is in report.html')
-        lines += [f'note: {note}' for note in (*core.notes, *extras.notes)]
+        """Return the verdict, named values that are not zero, minor effects and notes."""
+        rows = named_rows(self.core.findings, certain=True)
         return Summary(
-            core.summary.replace('+-', '±'),
-            core.verdict.replace('_', ' '),
+            self.core.summary.replace('+-', '±'),
+            self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            lines,
+            self.extras.sentences(self.core),
         )
 
     def tone(self) -> str:
@@ -382,7 +356,10 @@ def diagnose(
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
-    misfit = _misfit(arm, model) if misfit is None else misfit
+    if misfit is None and isinstance(arm, IdentificationResult):
+        misfit = arm.misfit
+    elif misfit is None and _is_written(arm):
+        misfit = read_misfit(arm, model)
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
         material=material,
@@ -411,13 +388,6 @@ def diagnose(
     if residual is None:
         return found
     return found.with_residual(rng if isinstance(rng, int) else 0)
-
-
-def _misfit(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return what a model left when it was identified, where that is known."""
-    if isinstance(arm, IdentificationResult):
-        return arm.misfit
-    return read_misfit(arm, model) if _is_written(arm) else None
 
 
 def _since(

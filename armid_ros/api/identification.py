@@ -44,7 +44,7 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
@@ -58,9 +58,6 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
     import pandas
-
-#: Heads of the columns of friction, and the parameters in them.
-_FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -236,6 +233,7 @@ class IdentificationResult(ShownModel):
 
     def summary(self) -> Summary:
         """Return errors and friction of each joint, doubts, and the next step."""
+        from armid_ros.report.joint_table import joint_columns
         from armid_ros.report.judgement import judge, residual_trends
         from armid_ros.report.notation import counted
 
@@ -252,7 +250,7 @@ class IdentificationResult(ShownModel):
         read = [*self.recordings, *self.held_out]
         damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
         steps = judge(core, self.validation, read, self.verification).next_steps
-        columns = self._joint_columns()
+        columns = joint_columns(core, self.description, self.held_out_score)
         return Summary(
             self.graded.reasons[0],
             self.grade,
@@ -267,40 +265,6 @@ class IdentificationResult(ShownModel):
                 *(f'next: {step}' for step in steps[:1]),
             ),
         )
-
-    def _joint_columns(self) -> dict[str, list[str]]:
-        """Return torque error, friction and difference from the URDF of each joint, by heads."""
-        from armid_ros.report.families import estimate_text
-        from armid_ros.report.notation import digits, pretty
-
-        estimate, joints = self.estimate, self.arm.robot.joints
-        score = self.held_out_score or self.training
-        columns = {
-            'joint': list(joints),
-            'error (fit)' if self.held_out_score is None else 'error': [
-                f'{digits(error)} %' for error in score.joint_relative_error_percent
-            ],
-        }
-        for head, parameter in _FRICTION.items():
-            own = [k for k, one in enumerate(estimate.parameters) if one.name == parameter]
-            units = {estimate.parameters[k].unit for k in own}
-            cells = dict.fromkeys(joints, '-')
-            for k in own:
-                number, reach = estimate_text(float(estimate.values[k]), float(estimate.std[k]))
-                name = estimate.parameters[k]
-                unit = '' if len(units) == 1 else f' {pretty(name.unit)}'
-                cells[name.joint] = f'{number.replace("includes 0", "0")} ± {reach}{unit}'
-            if own:
-                unit = f' [{pretty(units.pop())}]' if len(units) == 1 else ''
-                columns[f'{head}{unit}'] = [cells[joint] for joint in joints]
-        described = self.core.base.values(self.description.theta)
-        differs = np.abs(estimate.values - described) > HALF_WIDTH * estimate.std
-        rigid = [
-            [k for k, one in enumerate(estimate.parameters) if one.rigid and one.joint == joint]
-            for joint in joints
-        ]
-        columns['not as URDF'] = [f'{differs[own].sum()} of {len(own)}' for own in rigid]
-        return columns
 
     def tone(self) -> str:
         """Return the colour of the grade."""

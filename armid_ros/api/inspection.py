@@ -101,19 +101,14 @@ class InspectionResult(Shown):
         from armid_ros.report.notation import plain
         from armid_ros.report.sections.inspection import joint_heads, joint_rows
 
-        sampling = self.core.sampling
+        sampling, heads = self.core.sampling, joint_heads(self.core)
         return Summary(
             f'{self.core.recording.source}: {sampling.duration:.1f} s at '
             f'{plain(sampling.rate_hz, 4)} Hz. {self.core.verdict}',
-            heads=_without_detail(joint_heads(self.core)),
-            rows=[_without_detail(row) for row in joint_rows(self.core)],
+            heads=heads[:3] + heads[6:],
+            rows=[row[:3] + row[6:] for row in joint_rows(self.core)],
             lines=self.remarks,
         )
-
-
-def _without_detail(row: tuple[str, ...]) -> tuple[str, ...]:
-    """Leave out speed, share of motion and steps of the encoder."""
-    return row[:3] + row[6:]
 
 
 def inspect(

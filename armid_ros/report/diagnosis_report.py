@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 from armid_ros.diagnosis import Diagnosis, NextRun
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
+from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
-from armid_ros.report.notation import counted, robot_label
+from armid_ros.report.notation import counted, percent, probability, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.data_quality import data_quality_section
@@ -79,6 +80,27 @@ class Extras:
     def steps(self, diagnosis: Diagnosis, model: str = MODEL) -> list[str]:
         """Return what to do next, for the page and the terminal, and where the model is."""
         return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse)
+
+    def sentences(self, diagnosis: Diagnosis) -> list[str]:
+        """Return shares of what was named, minor effects, what was made of it, and notes."""
+        lines = [
+            f'{names_and_places(group)}: {share_in_words(group[0], interval=True)}'
+            + (', together' if len(group) > 1 else '')
+            for group in by_cause(diagnosis.findings)
+        ]
+        share = 'the gap' if diagnosis.findings else 'the remaining error'
+        lines += [
+            f'minor (significant, but negligible or not confirmed): '
+            f'{one.name.replace("_", " ")} in {", ".join(one.joints) or "the whole arm"}, '
+            f'{percent(one.share)} of {share}, p {probability(one.p)}'
+            for one in diagnosis.minor
+        ]
+        lines += [] if self.residual is None else self.residual.sentences()
+        lines += [pair.sentence() for pair in self.forward]
+        if diagnosis.verdict == 'consistent':
+            lines.append('note: how large each effect has to be to be seen is in report.html')
+        lines += [f'note: {note}' for note in (*diagnosis.notes, *self.notes)]
+        return lines
 
     @property
     def worse(self) -> tuple[str, ...]:

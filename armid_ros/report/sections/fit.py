@@ -48,7 +48,14 @@ def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
             error = float(score.joint_relative_error_percent[joint])
             bars.append(Bar(error, role, f'{digits(error)} % ({digits(score.rms[joint])} {unit})'))
         rows.append((robot.joints[joint], bars))
-    return BarChart(rows, '%', [(role, f'{label} error, rms') for role, label, _ in scores])
+    return BarChart(
+        rows,
+        '%',
+        [
+            (role, f'{label} error: rms of residual over rms of torque')
+            for role, label, _ in scores
+        ],
+    )
 
 
 def fit_section(

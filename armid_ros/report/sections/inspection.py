@@ -23,9 +23,12 @@ _MOST = 2000
 _FINEST = 1e-7
 
 
-def contents_section(found: Inspection) -> ContentSection:
-    """Return the topics of a bag, and how it is sampled."""
+def recording_facts(found: Inspection) -> list[tuple[str, str]]:
+    """Return how a recording is sampled, whether it repeats, and what reading it met."""
     sampling, recording, trial = found.sampling, found.recording, found.trial
+    motion = 'does not repeat'
+    if sampling.period is not None:
+        motion = f'repeats after {sampling.period:.2f} s, {sampling.periods:.1f} times'
     facts = [
         ('Duration', f'{sampling.duration:.2f} s, {len(recording)} samples'),
         (
@@ -34,17 +37,22 @@ def contents_section(found: Inspection) -> ContentSection:
         ),
         ('Longest step', f'{plain(1000 * sampling.longest_step)} ms'),
         ('Gaps', str(sampling.gaps) if sampling.gaps else 'none'),
-        ('Motion', repetition(found)),
+        ('Motion', motion),
         ('Clock', recording.clock),
         ('Reading', recording.report.describe()),
     ]
     if trial is not None and trial.cutoff_hz is not None:
         facts.append(('Cut-off', f'{trial.cutoff_hz:.3g} Hz would be chosen by identify'))
-    blocks: list[PageBlock] = [FactList(facts)]
+    return facts
+
+
+def contents_section(found: Inspection) -> ContentSection:
+    """Return the topics of a bag, and how it is sampled."""
+    blocks: list[PageBlock] = [FactList(recording_facts(found))]
     if found.topics:
         rows = [
             (
-                topic.name + ' (read)' * (topic.name == recording.topic),
+                topic.name + ' (read)' * (topic.name == found.recording.topic),
                 str(topic.count),
                 topic.type_name,
                 ', '.join(topic.joints),
@@ -124,14 +132,6 @@ def curves_section(found: Inspection) -> ContentSection:
         legend=False,
     )
     return ContentSection('Curves', [*blocks, Panels([('Time between samples', '', [chart])])])
-
-
-def repetition(found: Inspection) -> str:
-    """Return whether the motion repeats, in words."""
-    sampling = found.sampling
-    if sampling.period is None:
-        return 'does not repeat'
-    return f'repeats after {sampling.period:.2f} s, {sampling.periods:.1f} times'
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:

@@ -104,7 +104,9 @@ def changes_section(comparison: Comparison) -> ContentSection:
     def cells(k: int) -> Cells:
         one = changes[k]
         before, after = (
-            ' ± '.join(estimate_text(value, std)).replace('includes 0 ', 'includes 0, ')
+            ' ±\N{NO-BREAK SPACE}'.join(estimate_text(value, std)).replace(
+                'includes 0 ', 'includes 0, '
+            )
             for value, std in ((one.before, one.before_std), (one.after, one.after_std))
         )
         return (
