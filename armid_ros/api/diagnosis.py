@@ -408,7 +408,7 @@ def _since(
     return found
 
 
-def _is_written(arm: RobotLike) -> TypeGuard[str | Path]:
+def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:
     return isinstance(arm, (str, Path)) and is_model(arm)
 
 
