@@ -360,11 +360,9 @@ def diagnose(
         misfit = arm.misfit
     elif misfit is None and _is_written(arm):
         misfit = read_misfit(arm, model)
+    signals = SignalSettings(cutoff, decimation)
     settings = DiagnosisSettings(
-        signals=SignalSettings(cutoff, decimation),
-        material=material,
-        everything=everything,
-        partner=partner,
+        signals=signals, material=material, everything=everything, partner=partner
     )
     result = run(
         model,

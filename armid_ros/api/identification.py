@@ -275,18 +275,18 @@ class IdentificationResult(ShownModel):
     def sections(self) -> list[Section]:
         """Return the errors of the joints, and all parameters."""
         from armid_ros.report.blocks import ContentSection, Paragraph
-        from armid_ros.report.sections.fit import error_bars
+        from armid_ros.report.sections.fit import by_recording, error_bars
         from armid_ros.report.sections.parameters import parameter_section
 
-        training: dict[str, list[Fit]] = {}
-        for fit in self.core.training:
-            training.setdefault(fit.source, []).append(fit)
         described, robot = self.core.base.values(self.description.theta), self.arm.robot
         said = Paragraph(
             'Relative error of each joint: rms of the residual over rms of the torque.'
         )
         return [
-            ContentSection('Errors', [said, error_bars(robot, training, self.validation)]),
+            ContentSection(
+                'Errors',
+                [said, error_bars(robot, by_recording(self.core.training), self.validation)],
+            ),
             parameter_section(self.estimate, described, self.core.unidentified, robot.links),
         ]
 

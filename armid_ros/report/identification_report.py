@@ -24,7 +24,7 @@ from armid_ros.report.sections.assessment import (
     physical_section,
 )
 from armid_ros.report.sections.data_quality import data_quality_section
-from armid_ros.report.sections.fit import error_bars, fit_section, forward_section
+from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
 from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.sections.parameters import parameter_section
 from armid_ros.report.sections.residuals import residual_section, whiteness_section
@@ -102,9 +102,7 @@ def identification_report(
     """
     described, assessment = result.arm.robot, assessment or Assessment()
     verification, grade = assessment.verification, assessment.grade
-    training: dict[str, list[Fit]] = {}
-    for fit in result.training:
-        training.setdefault(fit.source, []).append(fit)
+    training = by_recording(result.training)
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)

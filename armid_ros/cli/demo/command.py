@@ -15,6 +15,7 @@ import click
 if TYPE_CHECKING:
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.arm import ArmModel
+    from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.motion import FloatArray
     from armid_ros.nodes.lockstep import Progress
     import numpy as np
@@ -59,7 +60,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     nominal = ArmModel(robot, truth.effects)
     hidden = steps.hidden_change(robot, np.random.default_rng([seed, 1]), hide)
     staged = options.stage(out, SCHEMA, steps.ROBOT, [*OUTPUTS, '*.png'])
-    new = staged.folder
+    new, bag = staged.folder, staged.folder / 'bag'
     settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
     with progress('designing the excitation') as tick:
         excitation = design(
@@ -80,19 +81,16 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
             history.append(now)
             tick(now.t / now.duration)
 
-        end = run_lockstep(
-            plant, excitation, identifier, new / 'bag', rate=rate, on_progress=watch
-        )
+        end = run_lockstep(plant, excitation, identifier, bag, rate=rate, on_progress=watch)
         tick(0.0, 'playing the bag back')
         replay = replay_lockstep(
-            new / 'bag',
+            bag,
             OnlineIdentifier(nominal, rng=np.random.default_rng(seed)),
             duration=end.duration,
             on_progress=lambda now: tick(now.t / now.duration),
         )
         tick(0.0, 'identifying offline')
-        recording = read_recording(new / 'bag', joints=robot.joints)
-        recording = replace(recording, source=str(settled(new / 'bag')))
+        recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
         found = identify(nominal, recording, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
     online = Agreement.of(end.estimate, target)
@@ -116,6 +114,15 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     if as_json:
         click.echo(json_text(document))
         return
+    _tell(document, found, online, offline)
+    steps.show_hidden(hidden, diagnosed)
+    say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
+
+
+def _tell(
+    document: dict[str, Any], found: IdentificationResult, online: Agreement, offline: Agreement
+) -> None:
+    """Print the grade, and how far both estimates are from the truth."""
     say(f'{found.grade.upper()}: {found.graded.reasons[0]}')
     say(f'online:  {online.sentence()}')
     say(f'offline: {offline.sentence()}')
@@ -125,8 +132,6 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     )
     difference = f'largest difference {document["replay_difference"]:.1g}'
     say(f'playing the bag back repeats the online estimate ({difference})')
-    steps.show_hidden(hidden, diagnosed)
-    say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
 
 
 def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> float:

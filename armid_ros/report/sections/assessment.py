@@ -163,14 +163,6 @@ def physical_section(
         for weight, ratio in certificate.tried
     ]
     head = 'Cross-validation error relative to the unconstrained fit'
-    homeless = []
-    for file, lines in exports.items():
-        kinds = Counter(line.split(':')[0] for line in lines)
-        if kinds:
-            said = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
-            homeless.append(
-                Paragraph(f'{file} has no place for {said}: a comment in it lists them.')
-            )
     return ContentSection(
         'Physical consistency',
         [
@@ -189,6 +181,19 @@ def physical_section(
                     DataTable(('Weight', head), tried, ()),
                 ],
             ),
-            *homeless,
+            *_without_place(exports),
         ],
     )
+
+
+def _without_place(exports: Mapping[str, Sequence[str]]) -> list[Paragraph]:
+    """Return what each file for other programs has no place for."""
+    homeless = []
+    for file, lines in exports.items():
+        kinds = Counter(line.split(':')[0] for line in lines)
+        if kinds:
+            said = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
+            homeless.append(
+                Paragraph(f'{file} has no place for {said}: a comment in it lists them.')
+            )
+    return homeless

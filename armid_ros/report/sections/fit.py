@@ -29,6 +29,14 @@ Fits = Mapping[str, Sequence[Fit]]
 ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
 
 
+def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
+    """Return fits by the recording that they are of."""
+    found: dict[str, list[Fit]] = {}
+    for fit in fits:
+        found.setdefault(fit.source, []).append(fit)
+    return found
+
+
 def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
     """Return the relative error of each joint, held-out and training, the worst joint first."""
     groups: list[tuple[Role, Fits, str]] = [
@@ -235,27 +243,33 @@ def forward_section(
             for joint, name in enumerate(robot.joints)
         ]
         own.append(BarChart(rows, 'mrad', [(role, label) for role, label, _ in models], True))
-        farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
-        worst, motion = int(farthest.position_error.argmax()), pair.after.motion
-        curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
-        kept = thinned(*curves)
-        joint = robot.joints[worst]
-        own += [
-            Paragraph(f'Position error of {joint}, the worst joint, over time:', 'hint'),
-            Chart(
-                motion.t[kept],
-                [
-                    Series(label, curve[kept], role)
-                    for (role, label, _), curve in zip(models, curves, strict=True)
-                ],
-                'time [s]',
-                f'{joint}: error [m{pair.after.units[worst]}]',
-                height=190,
-                symmetric=True,
-            ),
-        ]
+        own += _worst_joint(robot, pair, models)
         said = pair.after.worst
         if pair.before is not None:
             said = f'{pair.before.worst} before, {said} after'
         blocks.append(Fold(f'{pair.after.source}: at most {said}', own, opened=number == 0))
     return ContentSection('Forward validation', blocks)
+
+
+def _worst_joint(
+    robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
+) -> list[PageBlock]:
+    """Return the position error over time of the joint that one of the models is off most."""
+    farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
+    worst, motion = int(farthest.position_error.argmax()), pair.after.motion
+    curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
+    kept, joint = thinned(*curves), robot.joints[worst]
+    return [
+        Paragraph(f'Position error of {joint}, the worst joint, over time:', 'hint'),
+        Chart(
+            motion.t[kept],
+            [
+                Series(label, curve[kept], role)
+                for (role, label, _), curve in zip(models, curves, strict=True)
+            ],
+            'time [s]',
+            f'{joint}: error [m{pair.after.units[worst]}]',
+            height=190,
+            symmetric=True,
+        ),
+    ]

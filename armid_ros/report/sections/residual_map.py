@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import ContentSection, DataTable, Paragraph, TableCell, Templated
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
@@ -27,23 +26,21 @@ class HeatMaps(Templated):
 
     Attributes
     ----------
-    pictures : sequence of (str, str, str)
-        Caption, image as data, and the same in words.
-    ends : sequence of tuple of str
-        Of each picture: left, right, low and high end of the axes, with units.
+    pictures : sequence of (str, str, str, tuple of str)
+        Caption, image as data, the same in words, and the left, right, low and high end of the
+        axes with units.
 
     """
 
     template: ClassVar[str] = 'heat_maps.html'
 
-    pictures: Sequence[tuple[str, str, str]]
-    ends: Sequence[tuple[str, str, str, str]]
+    pictures: Sequence[tuple[str, str, str, Sequence[str]]]
 
 
 def residual_map_section(residual: Residual) -> ContentSection:
     """Return maps of what no effect explains, at the middle load of each joint."""
     robot = residual.base.robot
-    rows, pictures, ends = [], [], []
+    rows, pictures = [], []
     for one in residual.joints:
         j = robot.joints.index(one.joint)
         unit, length = robot.torque_units[j], robot.position_units[j]
@@ -61,32 +58,7 @@ def residual_map_section(residual: Residual) -> ContentSection:
                 '' if one.law is None else percent(one.law.share),
             )
         )
-        q, dq, torque, std = _maps(one)
-        peak = max(float(np.abs(torque).max()), 1e-12)
-        row, column = np.unravel_index(np.argmax(np.abs(torque)), torque.shape)
-        most = f'most at {digits(q[column])} {length} and {digits(dq[::-1][row])} {length}/s'
-        colours = np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE)
-        unsure = f'{digits(one.learned.amplitude)} {unit}'
-        pictures += [
-            (
-                f'{one.joint}: torque, blue up to {digits(peak)} {unit}, orange down to '
-                f'-{digits(peak)} {unit}',
-                image_data(colours, torque / peak),
-                f'Learned torque of {one.joint} over position and velocity, {most}',
-            ),
-            (
-                f'{one.joint}: standard deviation (dark: large; {unsure} far from data)',
-                image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
-                'Standard deviation of that torque',
-            ),
-        ]
-        corners = (
-            f'{digits(q[0])} {length}',
-            f'{digits(q[-1])} {length}',
-            f'{digits(dq[0])} {length}/s',
-            f'{digits(dq[-1])} {length}/s',
-        )
-        ends += [corners, corners]
+        pictures += _pictures(one, unit, length)
     heads = (
         'Joint',
         'Residual, rms',
@@ -112,14 +84,40 @@ def residual_map_section(residual: Residual) -> ContentSection:
                 'an effect of your own if it is plausible, and diagnose again.',
                 'hint',
             ),
-            HeatMaps(pictures, ends),
+            HeatMaps(pictures),
         ],
     )
 
 
-def _maps(one: JointResidual) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return position, velocity, torque and its deviation, the largest velocity on top."""
+def _pictures(
+    one: JointResidual, unit: str, length: str
+) -> list[tuple[str, str, str, Sequence[str]]]:
+    """Return pictures of torque and deviation at the middle load, the largest velocity on top."""
     q, dq = (one.axis(number, count) for number, count in enumerate(_CELLS))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())
     inputs = np.stack([*np.meshgrid(q, dq[::-1]), load], axis=-1)
-    return q, dq, one.learned.torque(inputs), one.learned.std(inputs)
+    torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+    peak = max(float(np.abs(torque).max()), 1e-12)
+    row, column = np.unravel_index(np.argmax(np.abs(torque)), torque.shape)
+    most = f'most at {digits(q[column])} {length} and {digits(dq[::-1][row])} {length}/s'
+    colours = np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE)
+    unsure = f'{digits(one.learned.amplitude)} {unit}'
+    ends = (
+        *(f'{digits(value)} {length}' for value in (q[0], q[-1])),
+        *(f'{digits(value)} {length}/s' for value in (dq[0], dq[-1])),
+    )
+    return [
+        (
+            f'{one.joint}: torque, blue up to {digits(peak)} {unit}, orange down to '
+            f'-{digits(peak)} {unit}',
+            image_data(colours, torque / peak),
+            f'Learned torque of {one.joint} over position and velocity, {most}',
+            ends,
+        ),
+        (
+            f'{one.joint}: standard deviation (dark: large; {unsure} far from data)',
+            image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
+            'Standard deviation of that torque',
+            ends,
+        ),
+    ]
