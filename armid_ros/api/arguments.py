@@ -12,11 +12,20 @@ from typing import Any
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import RecordingError
-from armid_ros.recording import Recording
+from armid_ros.recording import ReadSettings, Recording, Topic
 from armid_ros.recording.anything import read_anything
+from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import bag_contents
 from armid_ros.recording.ros1 import is_ros1
-from armid_ros.recording.tables import ColumnSettings, is_table
+from armid_ros.recording.settings import DEFAULT
+from armid_ros.recording.tables import (
+    ColumnSettings,
+    is_table,
+    measured,
+    open_table,
+    plan,
+    TablePlan,
+)
 from armid_ros.recording.tables.settings import numbers
 from armid_ros.robots import load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
@@ -135,8 +144,8 @@ def read_recording(
         A rosbag2 directory, .mcap, .db3, .bag, .csv, .npz, .mat, .parquet, or the folder of a
         LeRobot dataset.
     robot : robot, model, name, path, or sequence of str
-        Whose joints; a sequence of names does too. By default all joints of a bag with one topic
-        of JointState, or of ``topic``.
+        Whose joints; a sequence of names does too. By default all joints of a table, or of a bag
+        with one topic of JointState, or of ``topic``.
     topic : str, optional
         JointState topic, where a bag has several.
     **columns
@@ -162,30 +171,88 @@ def read_recording(
     True
 
     """
-    joints: Sequence[str]
-    slides: Sequence[bool] | None
+    said = _settings(columns)
     if robot is None:
-        joints, slides = _joints_in(Path(path), topic), None
-    elif isinstance(robot, (Robot, ArmModel, str, Path)):
+        topics = topics_of(Path(path))
+        named = [one.name for one in topics if one.joints]
+        if topic is None and len(named) > 1:
+            raise RecordingError(
+                f'{path}: topics of JointState: {", ".join(named)}; give one as topic'
+            )
+        return read_all_joints(Path(path), topics, topic=topic, columns=said)
+    if isinstance(robot, (Robot, ArmModel, str, Path)):
         described = robot_of(robot)
-        joints, slides = described.joints, [bool(one) for one in described.prismatic]
-    else:
-        joints, slides = tuple(robot), None
-    return read_anything(
-        path, joints=joints, slides=slides, topic=topic, columns=_settings(columns)
-    )
+        slides = [bool(one) for one in described.prismatic]
+        return read_anything(
+            path, joints=described.joints, slides=slides, topic=topic, columns=said
+        )
+    return read_anything(path, joints=tuple(robot), topic=topic, columns=said)
 
 
-def _joints_in(path: Path, topic: str | None) -> tuple[str, ...]:
-    """Return the joints of the topic of a bag, or of its only one of JointState."""
-    if is_table(path) or is_ros1(path):
-        raise RecordingError(f'{path}: name the robot, or its joints as a list, to read it')
-    there = {one.name: one.joints for one in bag_contents(path) if one.joints}
-    found = [joints for name, joints in there.items() if topic in (None, name)]
-    if len(found) != 1:
-        names = ', '.join(there) or 'none'
-        raise RecordingError(f'{path}: topics of JointState: {names}; give one as topic')
-    return found[0]
+def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
+    """Return the topics of a bag of ROS 2; of other recordings none."""
+    return () if is_table(path) or is_ros1(path) else bag_contents(path, settings)
+
+
+def read_all_joints(
+    path: Path,
+    topics: tuple[Topic, ...],
+    *,
+    joints: Sequence[str] | None = None,
+    topic: str | None = None,
+    columns: ColumnSettings | None = None,
+    show: Callable[[TablePlan], None] | None = None,
+    settings: ReadSettings = DEFAULT,
+) -> Recording:
+    """
+    Read a recording without a robot.
+
+    Parameters
+    ----------
+    path : Path
+        A bag or a table.
+    topics : tuple of Topic
+        Topics of the bag.
+    joints : sequence of str, optional
+        Which joints; by default all of the topic, or of the table.
+    topic : str, optional
+        JointState topic; by default the one with the most messages.
+    columns : ColumnSettings, optional
+        What is known of a table and of units.
+    show : callable, optional
+        Is given how a table is read.
+    settings : ReadSettings
+        How a bag is read.
+
+    Raises
+    ------
+    RecordingError
+        There is no such topic, or joints have to be named.
+
+    """
+    said = columns or ColumnSettings()
+    if is_table(path):
+        settled = plan(open_table(path, episode=said.episode), said, joints)
+        if show is not None:
+            show(settled)
+        return measured(settled)
+    if joints is None:
+        if is_ros1(path):
+            raise RecordingError(
+                f'{path}: of a bag of ROS 1 say which joints: --robot or --joints'
+            )
+        there = [one for one in topics if one.joints]
+        if topic is not None:
+            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
+        if not there:
+            known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
+            named = f'{topic} of ' if topic else 'topic of '
+            raise RecordingError(
+                f'{path}: no {named}{JOINT_STATE}; there are {known or "no topics"}'
+            )
+        chosen = max(there, key=lambda one: one.count)
+        topic, joints = chosen.name, chosen.joints
+    return read_anything(path, joints=list(joints), topic=topic, columns=said, settings=settings)
 
 
 def _settings(columns: dict[str, Any]) -> ColumnSettings:

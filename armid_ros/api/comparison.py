@@ -100,9 +100,9 @@ class ComparisonResult(Shown):
 
     def sections(self) -> list[Section]:
         """Return the parameters, those that changed first to be seen."""
-        from armid_ros.report.sections.changes import Changes
+        from armid_ros.report.sections.parameters import changes_section
 
-        return [Changes(self.core)]
+        return [changes_section(self.core)]
 
 
 def compare(

@@ -23,9 +23,8 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
-from armid_ros.arm.export import arm_urdf
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
     Diagnosis,
@@ -45,13 +44,8 @@ from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import (
-    DiagnosedRecordings,
-    diagnosis_report,
-    Extras,
-    tone_of,
-)
-from armid_ros.report.notation import value_of
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
+from armid_ros.report.sections.diagnosed import named_rows
 from armid_ros.residual import (
     learn_residual,
     lookup_table,
@@ -72,7 +66,7 @@ _Made = TypeVar('_Made')
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class DiagnosisResult(Shown):
+class DiagnosisResult(ShownModel):
     """
     What a model lacks.
 
@@ -123,11 +117,6 @@ class DiagnosisResult(Shown):
         return self.core.verdict
 
     @property
-    def summary_text(self) -> str:
-        """Return the verdict in a sentence or two."""
-        return self.core.summary
-
-    @property
     def names(self) -> tuple[str, ...]:
         """Effects that are named, the largest first."""
         return tuple(finding.name for finding in self.core.findings)
@@ -161,13 +150,6 @@ class DiagnosisResult(Shown):
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
-    def urdf(self, path: str | Path | None = None) -> str:
-        """Return the description with what was found; write it where a path is given."""
-        text = arm_urdf(self.arm).text
-        if path is not None:
-            write_file(path, text)
-        return text
-
     def to_dataframe(self) -> pandas.DataFrame:
         """Return what was named as a pandas table, a row a parameter."""
         from pandas import DataFrame
@@ -192,9 +174,13 @@ class DiagnosisResult(Shown):
         """Return report.html with the verdict and the evidence, and the text of model.yaml."""
         return diagnosis_report(
             self.core,
-            DiagnosedRecordings(self.recordings, self.held_out, self.baseline),
+            {
+                'training': self.recordings,
+                'held-out': self.held_out,
+                'baseline': self.baseline,
+            },
             robot=origin.of(self.description.robot).robot,
-            settings=self.settings,
+            everything=self.settings.everything,
             extras=self.extras,
             patch=patch,
             provenance=origin.provenance,
@@ -213,6 +199,15 @@ class DiagnosisResult(Shown):
         page = self.page(origin, model.read_text(encoding='utf-8'))
         write_file(folder / 'report.html', page)
         return document
+
+    @property
+    def files(self) -> list[str]:
+        """Return the names of the files of the result."""
+        return [
+            *('diagnosis.json', 'model.yaml', 'report.html'),
+            *([] if self.extras.residual is None else [TABLE_FILE]),
+            *([] if self.extras.next_run is None else [EXPERIMENT_FILE]),
+        ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
         """Learn what has no name as a map of the state, or note why nothing is learned."""
@@ -251,22 +246,14 @@ class DiagnosisResult(Shown):
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
     def summary(self) -> Summary:
-        """Return what was named, with values."""
-        rows = []
-        for finding in self.core.findings:
-            for parameter, value, std in zip(
-                finding.parameters, finding.values, finding.std, strict=True
-            ):
-                said = value_of(finding, parameter, value, std)
-                where = finding.place_of(parameter.joint) or 'whole arm'
-                rows.append((finding.name, where, parameter.name, said))
-        below = [] if self.residual is None else list(self.residual.sentences())
+        """Return the verdict, named values that are not zero, minor effects and notes."""
+        rows = named_rows(self.core.findings, certain=True)
         return Summary(
             self.core.summary.replace('+-', '±'),
             self.core.verdict.replace('_', ' '),
-            ('effect', 'joint', 'parameter', 'value, 95 %') if rows else (),
+            ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            lines=below,
+            self.extras.sentences(self.core),
         )
 
     def tone(self) -> str:
@@ -275,12 +262,12 @@ class DiagnosisResult(Shown):
 
     def sections(self) -> list[Section]:
         """Return the gap of every joint, before and after."""
-        from armid_ros.report.sections.gap import GapBars
+        from armid_ros.report.sections.gap import gap_section
 
         gap, robot = self.core.gap, self.description.robot
         if gap is None:
             return []
-        return [GapBars(robot, gap, self.core.baseline, bool(self.core.findings))]
+        return [gap_section(robot, gap, self.core.baseline, bool(self.core.findings))]
 
 
 def diagnose(
@@ -372,9 +359,13 @@ def diagnose(
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
-    misfit = _misfit(arm, model) if misfit is None else misfit
+    if misfit is None and isinstance(arm, IdentificationResult):
+        misfit = arm.misfit
+    elif misfit is None and _is_written(arm):
+        misfit = read_misfit(arm, model)
+    signals = SignalSettings(cutoff, decimation)
     settings = DiagnosisSettings(
-        signals=SignalSettings(cutoff, decimation),
+        signals=signals,
         material=material,
         everything=everything,
         partner=partner,
@@ -404,13 +395,6 @@ def diagnose(
     return found.with_residual(rng if isinstance(rng, int) else 0)
 
 
-def _misfit(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return what a model left when it was identified, where that is known."""
-    if isinstance(arm, IdentificationResult):
-        return arm.misfit
-    return read_misfit(arm, model) if _is_written(arm) else None
-
-
 def _since(
     arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
 ) -> list[Recording]:
@@ -429,7 +413,7 @@ def _since(
     return found
 
 
-def _is_written(arm: RobotLike) -> TypeGuard[str | Path]:
+def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:
     return isinstance(arm, (str, Path)) and is_model(arm)
 
 

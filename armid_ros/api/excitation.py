@@ -191,16 +191,17 @@ class ExcitationResult(Shown):
 
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html on the quality of the run."""
-        from armid_ros.report.excitation_report import CheckedRun, excitation_report
+        from armid_ros.report.excitation_report import excitation_report
 
         return excitation_report(
             replace(self.core, excitation=self.run.excitation),
             self.arm,
+            self.run,
+            self.fitness,
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
             after=self.after,
             provenance=origin.provenance,
-            planned=CheckedRun(self.run, self.fitness),
         )
 
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:

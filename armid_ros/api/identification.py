@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
 from armid_ros.arm.export_check import torque_check
@@ -44,7 +44,7 @@ from armid_ros.identification import (
     write_document,
 )
 from armid_ros.identification import identify as run
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
 from armid_ros.identification.known_payload import corrected, drive_gains, DriveGains, payloads_of
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class IdentificationResult(Shown):
+class IdentificationResult(ShownModel):
     """
     An identified model, and what it was made from.
 
@@ -198,13 +198,6 @@ class IdentificationResult(Shown):
             document['drive_gains'] = self.gains.document()
         return document
 
-    def urdf(self, path: str | Path | None = None) -> str:
-        """Return the description with the identified values; write it where a path is given."""
-        text = arm_urdf(self.arm).text
-        if path is not None:
-            write_file(Path(path), text)
-        return text
-
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return report.html with all curves, numbers and doubts."""
         from armid_ros.report.identification_report import Assessment, identification_report
@@ -239,27 +232,38 @@ class IdentificationResult(Shown):
         return document
 
     def summary(self) -> Summary:
-        """Return errors joint by joint, with the friction."""
-        score = self.held_out_score or self.training
-        robot = self.arm.robot
-        rows = [
-            (
-                joint,
-                f'{score.rms[k]:.3g} {robot.torque_units[k]}',
-                f'{score.joint_relative_error_percent[k]:.2g} %',
-                self._value('viscous_coefficient', joint),
-                self._value('coulomb_torque', joint),
-            )
-            for k, joint in enumerate(robot.joints)
-        ]
-        count = len(self.estimate.parameters)
-        below = f'{count} parameters, condition number {self.core.condition_number:.3g}; ± is 95 %'
+        """Return errors and friction of each joint, doubts, and the next step."""
+        from armid_ros.report.joint_table import joint_columns
+        from armid_ros.report.judgement import judge, residual_trends
+        from armid_ros.report.notation import counted
+
+        core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
+        others = self.graded.reasons[1:]
+        if self.verification is not None and self.verification.unfit:
+            others = (f'The model cannot be simulated: {self.verification.unfit}.', *others)
+        shown = [fit for fits in self.validation.values() for fit in fits] or core.training
+        known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
+        count = f'{known} of {counted(len(estimate.parameters), "parameter")} differ from zero'
+        unseen = sum(one.parameter not in estimate.parameters for one in core.unidentified)
+        if unseen:
+            count += f'; {unseen} more cannot be identified from this motion'
+        read = [*self.recordings, *self.held_out]
+        damaged = [one for one in read if one.report.unwrapped or not one.report.unharmed]
+        steps = judge(core, self.validation, read, self.verification).next_steps
+        columns = joint_columns(core, self.description, self.held_out_score)
         return Summary(
             self.graded.reasons[0],
             self.grade,
-            ('joint', 'residual', 'relative', 'viscous', 'Coulomb'),
-            rows,
-            (below, *self.notes),
+            tuple(columns),
+            list(zip(*columns.values(), strict=True)),
+            (
+                *others,
+                *residual_trends(joints, shown).values(),
+                *(self.gains.sentences() if self.gains else ()),
+                *(f'{one.source}: {one.report.describe()}' for one in damaged),
+                f'{count}; condition number {core.condition_number:.3g}',
+                *(f'next: {step}' for step in steps[:1]),
+            ),
         )
 
     def tone(self) -> str:
@@ -270,26 +274,21 @@ class IdentificationResult(Shown):
 
     def sections(self) -> list[Section]:
         """Return the errors of the joints, and all parameters."""
-        from armid_ros.report.sections.fit import JointErrors
-        from armid_ros.report.sections.parameters import ParameterSection
+        from armid_ros.report.blocks import ContentSection, Paragraph
+        from armid_ros.report.sections.fit import by_recording, error_bars
+        from armid_ros.report.sections.parameters import parameter_section
 
-        training: dict[str, list[Fit]] = {}
-        for fit in self.core.training:
-            training.setdefault(fit.source, []).append(fit)
-        described = self.core.base.values(self.description.theta)
+        described, robot = self.core.base.values(self.description.theta), self.arm.robot
+        said = Paragraph(
+            'Relative error of each joint: rms of the residual over rms of the torque.'
+        )
         return [
-            JointErrors(self.arm.robot, training, self.validation),
-            ParameterSection(
-                self.estimate, described, self.core.unidentified, self.arm.robot.links
+            ContentSection(
+                'Errors',
+                [said, error_bars(robot, by_recording(self.core.training), self.validation)],
             ),
+            parameter_section(self.estimate, described, self.core.unidentified, robot.links),
         ]
-
-    def _value(self, name: str, joint: str) -> str:
-        for k, parameter in enumerate(self.estimate.parameters):
-            if (parameter.name, parameter.joint) == (name, joint):
-                value, reach = self.estimate.values[k], HALF_WIDTH * self.estimate.std[k]
-                return f'{value:.3g} ± {reach:.1g}' if abs(value) > reach else '~ 0'
-        return '-'
 
 
 def identify(

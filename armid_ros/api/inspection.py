@@ -4,22 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
     generator,
+    read_all_joints,
     RecordingLike,
     recordings_of,
     Rng,
     robot_of,
     RobotLike,
+    topics_of,
 )
 from armid_ros.api.identification import identify
 from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
-from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
 from armid_ros.inspection import (
     check_links,
@@ -30,20 +31,7 @@ from armid_ros.inspection import (
     Remark,
 )
 from armid_ros.inspection import inspect as look
-from armid_ros.recording import ReadSettings, Recording, Topic
-from armid_ros.recording.anything import read_anything
-from armid_ros.recording.message_types import JOINT_STATE
-from armid_ros.recording.reader import bag_contents
-from armid_ros.recording.ros1 import is_ros1
-from armid_ros.recording.settings import DEFAULT
-from armid_ros.recording.tables import (
-    ColumnSettings,
-    is_table,
-    measured,
-    open_table,
-    plan,
-    TablePlan,
-)
+from armid_ros.recording import Recording, Topic
 from armid_ros.robots import Robot
 
 if TYPE_CHECKING:
@@ -112,19 +100,14 @@ class InspectionResult(Shown):
         from armid_ros.report.notation import plain
         from armid_ros.report.sections.inspection import joint_heads, joint_rows
 
-        sampling = self.core.sampling
+        sampling, heads = self.core.sampling, joint_heads(self.core)
         return Summary(
             f'{self.core.recording.source}: {sampling.duration:.1f} s at '
             f'{plain(sampling.rate_hz, 4)} Hz. {self.core.verdict}',
-            heads=_without_detail(joint_heads(self.core)),
-            rows=[_without_detail(row) for row in joint_rows(self.core)],
+            heads=heads[:3] + heads[6:],
+            rows=[row[:3] + row[6:] for row in joint_rows(self.core)],
             lines=self.remarks,
         )
-
-
-def _without_detail(row: tuple[str, ...]) -> tuple[str, ...]:
-    """Leave out speed, share of motion and steps of the encoder."""
-    return row[:3] + row[6:]
 
 
 def inspect(
@@ -175,72 +158,6 @@ def inspect(
         read = read_all_joints(Path(recording), topics)
     found = look(read, described, topics=topics or (), rng=generator(rng))
     return InspectionResult(found)
-
-
-def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
-    """Return the topics of a bag of ROS 2; of other recordings none."""
-    return () if is_table(path) or is_ros1(path) else bag_contents(path, settings)
-
-
-def read_all_joints(
-    path: Path,
-    topics: tuple[Topic, ...],
-    *,
-    joints: Sequence[str] | None = None,
-    topic: str | None = None,
-    columns: ColumnSettings | None = None,
-    show: Callable[[TablePlan], None] | None = None,
-    settings: ReadSettings = DEFAULT,
-) -> Recording:
-    """
-    Read a recording without a robot.
-
-    Parameters
-    ----------
-    path : Path
-        A bag or a table.
-    topics : tuple of Topic
-        Topics of the bag.
-    joints : sequence of str, optional
-        Which joints; by default all of the topic, or of the table.
-    topic : str, optional
-        JointState topic; by default the one with the most messages.
-    columns : ColumnSettings, optional
-        What is known of a table and of units.
-    show : callable, optional
-        Is given how a table is read.
-    settings : ReadSettings
-        How a bag is read.
-
-    Raises
-    ------
-    RecordingError
-        There is no such topic, or joints have to be named.
-
-    """
-    said = columns or ColumnSettings()
-    if is_table(path):
-        settled = plan(open_table(path, episode=said.episode), said, joints)
-        if show is not None:
-            show(settled)
-        return measured(settled)
-    if joints is None:
-        if is_ros1(path):
-            raise RecordingError(
-                f'{path}: of a bag of ROS 1 say which joints: --robot or --joints'
-            )
-        there = [one for one in topics if one.joints]
-        if topic is not None:
-            there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]
-        if not there:
-            known = ', '.join(f'{t.name} ({t.type_name}, {t.count} messages)' for t in topics)
-            named = f'{topic} of ' if topic else 'topic of '
-            raise RecordingError(
-                f'{path}: no {named}{JOINT_STATE}; there are {known or "no topics"}'
-            )
-        chosen = max(there, key=lambda one: one.count)
-        topic, joints = chosen.name, chosen.joints
-    return read_anything(path, joints=list(joints), topic=topic, columns=said, settings=settings)
 
 
 @dataclass(frozen=True, repr=False, eq=False)

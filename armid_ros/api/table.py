@@ -12,6 +12,8 @@ import textwrap
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import source_of
+from armid_ros.arm import ArmModel
+from armid_ros.arm.export import arm_urdf
 from armid_ros.files import staged, write_file
 from armid_ros.robots import Robot
 
@@ -52,15 +54,22 @@ class Summary:
 
     def text(self) -> str:
         """Return at most ten lines of 80 columns."""
-        badge = f'{self.badge.upper()}: ' if self.badge else ''
-        title = textwrap.wrap(badge + self.title, WIDTH, max_lines=3)
+        title = textwrap.wrap(self._headline, WIDTH, max_lines=3)
         below = [piece for line in self.lines for piece in textwrap.wrap(line, WIDTH)][:2]
         room = LINES - len(title) - len(below) - (1 if self.heads else 0)
         rows = list(self.rows)
         if len(rows) > room:
-            left = len(rows) - room + 1
-            rows = [*rows[: room - 1], (f'... and {left} more',)]
-        return '\n'.join([*title, *_aligned(self.heads, rows), *below])
+            hidden = len(rows) - room + 1
+            rows = [*rows[: room - 1], (f'... and {hidden} more',)]
+        return '\n'.join([*title, *_aligned(self.heads, rows, WIDTH), *below])
+
+    def full_text(self) -> list[str]:
+        """Return all of it, as the commands print it."""
+        return [self._headline, *_aligned(self.heads, self.rows), *filter(None, self.lines)]
+
+    @property
+    def _headline(self) -> str:
+        return f'{self.badge.upper()}: {self.title}' if self.badge else self.title
 
 
 @dataclass(frozen=True)
@@ -138,27 +147,50 @@ class Shown(ABC):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
-        from armid_ros.report.fragment import fragment, InShort
+        from armid_ros.report.blocks import ContentSection, DataTable, PageBlock, Paragraph
+        from armid_ros.report.fragment import fragment
+        from armid_ros.report.sections.frame import VerdictSection
 
         said = self.summary()
-        top = InShort(said.badge, self.tone(), said.title, said.heads, said.rows, said.lines)
-        return fragment([top, *self.sections()])
+        blocks: list[PageBlock] = [VerdictSection(said.badge, self.tone(), [said.title])]
+        if said.rows:
+            blocks.append(DataTable(said.heads, said.rows))
+        blocks += [Paragraph(line, 'hint') for line in said.lines]
+        return fragment([ContentSection('', blocks), *self.sections()])
 
 
-def _aligned(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+class ShownModel(Shown):
+    """A result with a model of an arm."""
+
+    @property
+    @abstractmethod
+    def arm(self) -> ArmModel:
+        """Return the model."""
+
+    def urdf(self, path: str | Path | None = None) -> str:
+        """Return the description with the values found; write it where a path is given."""
+        text = arm_urdf(self.arm).text
+        if path is not None:
+            write_file(path, text)
+        return text
+
+
+def _aligned(
+    heads: Sequence[str], rows: Sequence[Sequence[str]], width: int | None = None
+) -> list[str]:
     """Return lines with columns below each other, names to the left and the rest to the right."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]
     full = [row for row in table if len(row) == len(heads)]
     widths = [max(len(row[k]) for row in full) for k in range(len(heads))]
-    spare = WIDTH - sum(widths) - 2 * len(widths)
+    spare = 0 if width is None else width - sum(widths) - 2 * len(widths)
     widths[0] = max(8, widths[0] + min(0, spare))
     lines = []
     for row in table:
-        name, width = row[0], widths[0]
-        fitted = name.ljust(width) if len(name) <= width else name[: width - 1] + '…'
+        name, own = row[0], widths[0]
+        fitted = name.ljust(own) if len(name) <= own else name[: own - 1] + '…'
         first = name if len(row) == 1 else fitted
         rest = (cell.rjust(one) for cell, one in zip(row[1:], widths[1:], strict=False))
-        lines.append('  '.join(['', first, *rest]).rstrip()[:WIDTH])
+        lines.append('  '.join(['', first, *rest]).rstrip()[:width])
     return lines

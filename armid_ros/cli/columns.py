@@ -50,6 +50,20 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     return _kept(ctx, parameter, tuple(rules))
 
 
+def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
+    """Keep one number, or one a joint."""
+    if value is not None:
+        from armid_ros.recording.tables import numbers
+
+        return _kept(ctx, parameter, numbers(value))
+    return _kept(ctx, parameter, ())
+
+
+def _couplings(ctx: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> Any:
+    """Keep motor, joint and ratio of each coupling."""
+    return _kept(ctx, parameter, tuple(_coupling(text) for text in value))
+
+
 _OPTIONS = (
     _option('--time', metavar='C', help='Column of time of a table; guessed by default.'),
     _option(
@@ -65,6 +79,7 @@ _OPTIONS = (
     ),
     _option(
         '--rate',
+        'rate_hz',
         type=float,
         metavar='HZ',
         help='Sample rate [Hz] of a table without a time column.',
@@ -74,23 +89,27 @@ _OPTIONS = (
     ),
     _option(
         '--position-scale',
+        callback=_numbers,
         metavar='X,...',
         help='Makes positions and velocities rad (or m): one number, or one a joint; of bags too.',
     ),
     _option(
         '--effort-scale',
         '--current-gain',
+        callback=_numbers,
         metavar='X,...',
         help='Makes efforts N m: torque constants [N m/A], gear ratios as 1798/7, signs; of bags '
         'too.',
     ),
     _option(
         '--zero',
+        callback=_numbers,
         metavar='X,...',
         help="Added to the positions [rad or m], as '-pi/2'; of bags too.",
     ),
     _option(
         '--gear',
+        callback=_numbers,
         metavar='X,...',
         help='Values are those of the motors, which turn X times for a turn of the joint; of bags '
         'too.',
@@ -98,6 +117,7 @@ _OPTIONS = (
     _option(
         '--coupling',
         multiple=True,
+        callback=_couplings,
         metavar='I,J=X',
         help='With --gear: motor I turns X times for a turn of joint J, too.',
     ),
@@ -121,28 +141,10 @@ def options(command: Any) -> Any:
 
 def settings() -> ColumnSettings:
     """Return what the options of the running command say."""
-    from armid_ros.recording.tables import ColumnSettings, numbers
+    from armid_ros.recording.tables import ColumnSettings
 
     context = click.get_current_context(silent=True)
-    said = context.meta.get(META, {}) if context is not None else {}
-    if not said:
-        return ColumnSettings()
-    return ColumnSettings(
-        time=said['time'],
-        position=said['position'],
-        velocity=said['velocity'],
-        effort=said['effort'],
-        time_unit=said['time_unit'],
-        rate_hz=said['rate'],
-        degrees=said['degrees'],
-        position_scale=numbers(said['position_scale']),
-        effort_scale=numbers(said['effort_scale']),
-        zero=numbers(said['zero']),
-        gear=numbers(said['gear']),
-        coupling=tuple(_coupling(text) for text in said['coupling']),
-        rename=said['rename'],
-        episode=said['episode'],
-    )
+    return ColumnSettings(**(context.meta.get(META, {}) if context is not None else {}))
 
 
 def read(

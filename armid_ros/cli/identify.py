@@ -14,7 +14,6 @@ import click
 
 if TYPE_CHECKING:
     from armid_ros.api.identification import IdentificationResult
-    from armid_ros.arm import ArmModel
 
 
 @click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
@@ -139,39 +138,16 @@ def identify(
     if as_json:
         click.echo(json_text(document))
     else:
-        _print(document, result, arm, verbose)
+        for line in result.summary().full_text():
+            say(line)
+        if verbose:
+            _print_all(document, result)
+        for name, check in document.get('exports', {}).items():
+            say(f'{name}: {_checked(check)}')
         files = ['report.html', 'model.yaml', 'identification.json', *result.exports]
         say(f'{out}: {", ".join(files)}')
     if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)
-
-
-def _print(
-    document: dict[str, Any], found: IdentificationResult, description: ArmModel, verbose: bool
-) -> None:
-    """Print grade, a row for each joint and the next step; with verbose, everything."""
-    from armid_ros.report.identification_summary import headline, joint_table, summary
-
-    for line in headline(found.graded, found.core, found.validation, found.verification):
-        say(line)
-    for line in found.gains.sentences() if found.gains else ():
-        say(line)
-    for line in joint_table(found.core, description, found.validation):
-        say(line)
-    if verbose:
-        _print_all(document, found)
-    for name, check in document.get('exports', {}).items():
-        left_out = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
-        torque = check.get('not_checked') and f'torque not checked: {check["not_checked"]}'
-        torque = torque or (
-            f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
-            f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
-        )
-        shapes = f'; shapes {check["shapes"]}' if 'shapes' in check else ''
-        say(f'{name}: {torque}{left_out}{shapes}')
-    recordings = [*found.recordings, *found.held_out]
-    for line in summary(found.core, found.validation, recordings, found.verification):
-        say(line)
 
 
 def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
@@ -208,3 +184,16 @@ def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
     say(f'torque error {fitted:.2f} % on the data it was fitted to')
     for entry in document['validation']:
         say(f'torque error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
+
+
+def _checked(check: dict[str, Any]) -> str:
+    """Return in words how an exported file compares with the model."""
+    torque = (
+        f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
+        f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
+        if not check.get('not_checked')
+        else f'torque not checked: {check["not_checked"]}'
+    )
+    missing = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
+    shapes = f'; shapes {check["shapes"]}' if 'shapes' in check else ''
+    return f'{torque}{missing}{shapes}'

@@ -54,8 +54,8 @@ def inspect(
     a robot whether identify takes it. Without --out it is printed only.
 
     """
+    from armid_ros.api.arguments import read_all_joints, topics_of
     from armid_ros.api.inspection import inspect as run
-    from armid_ros.api.inspection import read_all_joints, topics_of
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
@@ -98,23 +98,14 @@ def inspect(
 
 def _print(found: Inspection) -> None:
     """Print within 80 columns."""
-    from armid_ros.report.notation import counted, plain
-    from armid_ros.report.sections.inspection import joint_heads, joint_rows, repetition
+    from armid_ros.report.sections.inspection import joint_heads, joint_rows, recording_facts
 
-    recording, sampling = found.recording, found.sampling
-    say(f'{recording.source}')
+    say(found.recording.source)
     for topic in found.topics:
-        read = ' <- read' if topic.name == recording.topic else ''
+        read = ' <- read' if topic.name == found.recording.topic else ''
         say(f'  {topic.name}  {topic.count} x {topic.type_name}{read}')
-    say(
-        f'  {sampling.duration:.2f} s, {len(recording)} samples, {plain(sampling.rate_hz, 4)} Hz, '
-        f'steps vary by {100 * sampling.jitter:.1f} %'
-    )
-    gaps = counted(sampling.gaps, 'gap') if sampling.gaps else 'no gaps'
-    say(
-        f'  {gaps}, longest step {plain(1000 * sampling.longest_step)} ms; motion '
-        f'{repetition(found)}'
-    )
+    for name, value in recording_facts(found):
+        say(wrapped(f'{name}: {value}', '  ', '    '))
     heads = joint_heads(found)
     rows = [dict(zip(heads, row, strict=True)) for row in joint_rows(found)]
     for row in rows:

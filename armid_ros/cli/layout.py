@@ -20,8 +20,12 @@ def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> 
     """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""
     from armid_ros.cli import options
     from armid_ros.files import write_file
-    from armid_ros.report.layouts import foxglove_layout, plotjuggler_layout, SCHEMA
-    from armid_ros.report.rviz import rviz_config
+    from armid_ros.report.layouts import (
+        foxglove_layout,
+        plotjuggler_layout,
+        rviz_config,
+        SCHEMA,
+    )
 
     staged = options.stage(out, SCHEMA)
     robot = options.open_robot(robot_source, 'earth', joints)

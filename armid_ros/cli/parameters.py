@@ -29,6 +29,28 @@ class OutPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+def _robots() -> list[str]:
+    from armid_ros.robots import shipped_robots
+
+    return list(shipped_robots())
+
+
+def _effects() -> list[str]:
+    from armid_ros.effects import CATALOGUE
+
+    return list(CATALOGUE)
+
+
+def _completed(names: Callable[[], list[str]]) -> Callable[..., list[str]]:
+    """Return what completes the last name of a list with commas."""
+
+    def complete(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(',')
+        return [f'{before}{comma}{name}' for name in names() if name.startswith(last)]
+
+    return complete
+
+
 gravity = click.option(
     '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
 )
@@ -43,6 +65,7 @@ effects = click.option(
     default=','.join(USUAL_EFFECTS),
     show_default=True,
     metavar='E,...',
+    shell_complete=_completed(_effects),
     help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
@@ -103,6 +126,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         '--robot',
         'robot_source',
         metavar='R',
+        shell_complete=_completed(_robots),
         callback=lambda context, _, value: _with_packages(value, context.meta.get(PACKAGES, [])),
         **values,
     )

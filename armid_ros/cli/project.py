@@ -26,7 +26,7 @@ def project_options(name: str, command: click.Command, typed: Sequence[str]) -> 
     Parameters
     ----------
     name : str
-        Of the command.
+        Of the command; of one in a group with that before it, and its table below the group's.
     command : click.Command
         The command.
     typed : sequence of str
@@ -38,13 +38,19 @@ def project_options(name: str, command: click.Command, typed: Sequence[str]) -> 
         If the file is no TOML, or the table of the command has a key that is none of its options.
 
     """
+    if isinstance(command, click.Group):
+        below = next((word for word in typed if word in command.commands), '')
+        inner = command.commands.get(below)
+        return {below: project_options(f'{name} {below}', inner, typed)} if inner else {}
     if not Path(FILE).is_file():
         return {}
     try:
         project = tomllib.loads(read_text(Path(FILE), ArmidError))
     except tomllib.TOMLDecodeError as error:
         raise ArmidError(f'{FILE}: {error}') from None
-    own = project[name] if isinstance(project.get(name), dict) else {}
+    own: dict[str, Any] = project
+    for part in name.split():
+        own = own[part] if isinstance(own.get(part), dict) else {}
     given = {key: value for key, value in project.items() if not isinstance(value, dict)} | own
     options = {
         text.lstrip('-'): one

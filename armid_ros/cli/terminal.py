@@ -100,7 +100,11 @@ class ProgressLines:
         now = self._clock()
         if now - self._last >= self.EVERY:
             self._last = now
-            self._write(f'{self._what}: {100.0 * self._share:.0f} %, {now - self._start:.0f} s')
+            spent, share = now - self._start, self._share
+            rest = (
+                f', about {spent * (1.0 / share - 1.0):.0f} s to go' if 0.0 < share < 1.0 else ''
+            )
+            self._write(f'{self._what}: {100.0 * share:.0f} %, {spent:.0f} s{rest}')
 
     @contextmanager
     def watched(self) -> Iterator[None]:

@@ -176,7 +176,7 @@ def one_arm(
     return _row(
         case,
         result.verdict,
-        result.summary_text,
+        result.core.summary,
         list(dict.fromkeys(result.names)),
         None if gap is None else float(gap.closed),
         f'{report}/report.html',

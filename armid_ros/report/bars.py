@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from armid_ros.report.blocks import Legend
 from armid_ros.report.charts import Role
 from armid_ros.report.notation import digits
 from armid_ros.report.page import render
@@ -71,6 +72,11 @@ class BarChart:
         bars = self.rows[row][1] if self.scale_by_row else [b for _, bs in self.rows for b in bs]
         longest = self.full or max(other.value for other in bars)
         return round(100.0 * bar.value / longest, 2) if longest > 0.0 else 0.0
+
+    @property
+    def legend(self) -> Legend:
+        """Return what the colours stand for."""
+        return Legend(self.roles)
 
     def html(self) -> Markup:
         """Return the bars as HTML."""

@@ -7,18 +7,30 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 
-from armid_ros.identification.assess.comparison import Comparison, GroupChange, ParameterChange
+from armid_ros.identification.assess.comparison import (
+    Comparison,
+    GroupChange,
+    ParameterChange,
+)
 from armid_ros.identification.assess.load_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.identification.parameters_file import ParameterFile
+from armid_ros.report.blocks import ContentSection, FactList
 from armid_ros.report.families import full_label
-from armid_ros.report.not_compared import tell_not_compared
 from armid_ros.report.notation import counted, measured, pretty, robot_label
-from armid_ros.report.page import Page
+from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.changes import Changes
-from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
+from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.report.sections.parameters import changes_section
 
+#: Parameters that a line names.
+_NAMED = 6
+_WHY = {
+    'motion': 'the motion of the {other} does not show {them}',
+    'effect': 'the model of the {other} does not have {them}',
+    'deviation': 'the {other} has no standard deviations to make those of {them} from',
+    'grouping': 'the data of the {other} group parameters differently',
+}
 #: Changes that get a sentence each; the table has all.
 _TOLD = 8
 
@@ -40,10 +52,15 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
         One HTML file that loads nothing.
 
     """
-    sections = [
+    facts = []
+    for heading, side in (('First', comparison.before), ('Second', comparison.after)):
+        error = side.error_percent
+        said = '' if error is None else f'; relative torque error {error:.2f} %'
+        facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
+    sections: list[Section] = [
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
-        Changes(comparison),
-        Asked(_asked(comparison)),
+        changes_section(comparison),
+        ContentSection('What was asked', [FactList(facts)]),
         Origin(provenance or Provenance()),
     ]
     robot = robot_label(comparison.after.robot)
@@ -73,7 +90,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
         *([] if comparison.load is None else [_load(comparison)]),
         _sum(comparison),
         *(_residual(one, comparison) for one in comparison.changed_residuals),
-        *tell_not_compared(comparison),
+        *_tell_not_compared(comparison),
         *_details(comparison),
     )
 
@@ -224,6 +241,32 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
     )
 
 
+def _tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
+    """Say what is not compared, a sentence for each side and reason."""
+    lines = []
+    if comparison.left_out:
+        files = ' and '.join(
+            one.source for one in (comparison.before, comparison.after) if one.without_std
+        )
+        verb = 'has' if len(comparison.left_out) == 1 else 'have'
+        lines.append(
+            f'{counted(len(comparison.left_out), "parameter")} {verb} no standard deviation in '
+            f'{files}; '
+            'identification.json of that run has it.'
+        )
+    sides = ('first', 'second', comparison.only_before), ('second', 'first', comparison.only_after)
+    for side, other, found in sides:
+        for why, said in _WHY.items():
+            some = [one for one in found if one.why == why]
+            if some:
+                reason = said.format(other=other, them='it' if len(some) == 1 else 'them')
+                shown = ', '.join(full_label(one.parameter) for one in some[:_NAMED])
+                more = f' and {len(some) - _NAMED} more' * (len(some) > _NAMED)
+                count = counted(len(some), 'parameter')
+                lines.append(f'{count} of the {side} only: {reason} ({shown}{more}).')
+    return tuple(lines)
+
+
 def _beware(comparison: Comparison) -> tuple[str, ...]:
     lines = []
     for given in (comparison.before, comparison.after):
@@ -246,12 +289,3 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
             f'{comparison.after.robot}; they may not be the same.'
         )
     return tuple(lines)
-
-
-def _asked(comparison: Comparison) -> list[tuple[str, str]]:
-    facts = []
-    for title, side in (('First', comparison.before), ('Second', comparison.after)):
-        error = side.error_percent
-        said = '' if error is None else f'; relative torque error {error:.2f} %'
-        facts.append((title, f'{side.source}: {robot_label(side.robot)}{said}'))
-    return facts

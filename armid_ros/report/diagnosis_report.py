@@ -7,28 +7,29 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.diagnosis import Diagnosis, DiagnosisSettings, NextRun
+from armid_ros.diagnosis import Diagnosis, NextRun
 from armid_ros.diagnosis.next_run.steps import MODEL, next_steps
 from armid_ros.diagnosis.verdict.document import detectable
+from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
-from armid_ros.report.notation import counted, robot_label
+from armid_ros.report.notation import counted, percent, probability, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.candidates import CandidateTable
-from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
+from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.diagnosed import (
-    CouldBeSeen,
-    EvidenceSection,
-    NamedParameters,
-    PatchSection,
-    Shares,
-    SmallPrint,
+    candidates_section,
+    detectable_section,
+    evidence_section,
+    minor_section,
+    named_section,
+    patch_section,
+    shares_section,
 )
-from armid_ros.report.sections.forward import Forward
-from armid_ros.report.sections.frame import NextSteps, Origin, VerdictSection
-from armid_ros.report.sections.gap import GapBars, GapOverlay
-from armid_ros.report.sections.residual_map import ResidualMap
+from armid_ros.report.sections.fit import forward_section
+from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
+from armid_ros.report.sections.gap import gap_section, overlay_section
+from armid_ros.report.sections.residual_map import residual_map_section
 from armid_ros.report.sections.story import share_of, Story
 from armid_ros.report.sources import short_names, with_names
 from armid_ros.residual import Residual
@@ -48,27 +49,6 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     tone = _TONES.get(diagnosis.verdict, 'bad')
     open_ends = diagnosis.not_checked, diagnosis.doubt, diagnosis.suspected, diagnosis.harmful
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
-
-
-@dataclass(frozen=True)
-class DiagnosedRecordings:
-    """
-    Recordings of a diagnosis.
-
-    Attributes
-    ----------
-    recordings : sequence of Recording
-        Data that were looked at.
-    held_out : sequence of Recording
-        Data that were only predicted.
-    baseline : sequence of Recording
-        Data from before.
-
-    """
-
-    recordings: Sequence[Recording] = ()
-    held_out: Sequence[Recording] = ()
-    baseline: Sequence[Recording] = ()
 
 
 @dataclass(frozen=True)
@@ -101,6 +81,27 @@ class Extras:
         """Return what to do next, for the page and the terminal, and where the model is."""
         return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse)
 
+    def sentences(self, diagnosis: Diagnosis) -> list[str]:
+        """Return shares of what was named, minor effects, what was made of it, and notes."""
+        lines = [
+            f'{names_and_places(group)}: {share_in_words(group[0], interval=True)}'
+            + (', together' if len(group) > 1 else '')
+            for group in by_cause(diagnosis.findings)
+        ]
+        share = 'the gap' if diagnosis.findings else 'the remaining error'
+        lines += [
+            f'minor (significant, but negligible or not confirmed): '
+            f'{one.name.replace("_", " ")} in {", ".join(one.joints) or "the whole arm"}, '
+            f'{percent(one.share)} of {share}, p {probability(one.p)}'
+            for one in diagnosis.minor
+        ]
+        lines += [] if self.residual is None else self.residual.sentences()
+        lines += [pair.sentence() for pair in self.forward]
+        if diagnosis.verdict == 'consistent':
+            lines.append('note: how large each effect has to be to be seen is in report.html')
+        lines += [f'note: {note}' for note in (*diagnosis.notes, *self.notes)]
+        return lines
+
     @property
     def worse(self) -> tuple[str, ...]:
         """Joints that a simulation with the patched model is farther off in than before."""
@@ -109,10 +110,10 @@ class Extras:
 
 def diagnosis_report(
     diagnosis: Diagnosis,
-    data: DiagnosedRecordings,
+    read: Mapping[str, Sequence[Recording]],
     *,
     robot: str,
-    settings: DiagnosisSettings | None = None,
+    everything: bool = False,
     extras: Extras | None = None,
     patch: str = '',
     provenance: Provenance | None = None,
@@ -124,12 +125,12 @@ def diagnosis_report(
     ----------
     diagnosis : Diagnosis
         What was found.
-    data : DiagnosedRecordings
-        Where it was found.
+    read : mapping of str to sequence of Recording
+        Recordings by what they were used for: 'training', 'held-out', 'baseline'.
     robot : str
         Shipped name or path of the description.
-    settings : DiagnosisSettings, optional
-        What was asked.
+    everything : bool
+        Whether negligible effects were added to the model.
     extras : Extras, optional
         What was made of it.
     patch : str
@@ -143,43 +144,65 @@ def diagnosis_report(
         One HTML file that loads nothing.
 
     """
-    settings, extras = settings or DiagnosisSettings(), extras or Extras()
-    read = {'training': data.recordings, 'held-out': data.held_out, 'baseline': data.baseline}
-    names = short_names([one.source for every in read.values() for one in every])
-    sections: list[Section] = [
-        _verdict(diagnosis, names, extras.worse),
-        *_story(diagnosis, names, extras.residual),
-        *([] if extras.residual is None else [ResidualMap(extras.residual)]),
-        NextSteps([*map(_printed, extras.steps(diagnosis)), *_of_maps(extras.residual)]),
-        *_small_print(diagnosis, settings),
-    ]
-    if extras.forward:
-        pairs = [_renamed(pair, names) for pair in extras.forward]
-        sections.append(Forward(diagnosis.arm.robot, pairs, ('as it was', 'patched')))
-    quality = [_quality(r, role, names) for role, every in read.items() for r in every]
-    sections.append(DataQuality(quality, at_fault=_at_fault(diagnosis, data, names)))
-    if diagnosis.findings and not diagnosis.harmful:
-        sections.append(PatchSection(diagnosis.findings, patch))
-    sections.append(Origin(provenance or Provenance()))
-    subtitle = (
-        f'{robot_label(robot)} · {counted(len(data.recordings), "recording")} · '
-        f'{counted(len(data.held_out), "held-out recording")}'
+    extras, arm = extras or Extras(), diagnosis.arm
+    recordings = [(one, role) for role, several in read.items() for one in several]
+    names = short_names([one.source for one, _ in recordings])
+    residual, patched = extras.residual, bool(diagnosis.findings)
+    sections: list[Section] = [_verdict(diagnosis, names, extras.worse)]
+    if diagnosis.gap is not None:
+        sections += [
+            Story(diagnosis, residual),
+            *([shares_section(diagnosis)] if patched else []),
+            overlay_section(arm.robot, diagnosis.gap, patched, names),
+            gap_section(arm.robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
+            *([named_section(diagnosis.findings)] if patched else []),
+        ]
+        if diagnosis.where:
+            sections.append(evidence_section(diagnosis.where, share_of(diagnosis)))
+    if residual is not None:
+        sections.append(residual_map_section(residual))
+    sections.append(
+        next_steps_section([*map(_printed, extras.steps(diagnosis)), *_of_maps(residual)])
     )
-    if data.baseline:
-        subtitle += f' · {counted(len(data.baseline), "recording")} from before'
-    return Page(f'Diagnosis of {diagnosis.arm.robot.name}', subtitle, sections).html()
+    if diagnosis.minor:
+        sections.append(minor_section(diagnosis.minor, everything, patched))
+    if diagnosis.gap is not None:
+        sizes = detectable(diagnosis.explanation)
+        sections += [candidates_section(diagnosis), detectable_section(sizes)]
+    if extras.forward:
+        pairs = [
+            replace(pair, after=replace(pair.after, source=names[pair.after.source]))
+            if pair.after.source in names
+            else pair
+            for pair in extras.forward
+        ]
+        sections.append(forward_section(arm.robot, pairs, ('as it was', 'patched')))
+    quality = [(one, role, ()) for one, role in recordings]
+    at_fault = _at_fault(diagnosis, read, names)
+    sections.append(data_quality_section(quality, at_fault=at_fault, names=names))
+    if patched and not diagnosis.harmful:
+        sections.append(patch_section(diagnosis.findings, patch))
+    sections.append(Origin(provenance or Provenance()))
+    counts = [len(read.get(role, ())) for role in ('training', 'held-out', 'baseline')]
+    subtitle = (
+        f'{robot_label(robot)} · {counted(counts[0], "recording")} · '
+        f'{counted(counts[1], "held-out recording")}'
+    )
+    if counts[2]:
+        subtitle += f' · {counted(counts[2], "recording")} from before'
+    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections).html()
 
 
 def _at_fault(
-    diagnosis: Diagnosis, data: DiagnosedRecordings, names: Mapping[str, str]
+    diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]], names: Mapping[str, str]
 ) -> list[str]:
-    """Return the recordings that a verdict of bad data names, or all that were asked about."""
+    """Return the recordings that a verdict of bad data names, or all that were diagnosed."""
     if diagnosis.verdict != 'bad_data':
         return []
-    read = [*data.recordings, *data.held_out, *data.baseline]
-    said = [one.source for one in read if one.source and one.source in diagnosis.summary]
-    sources = said or [one.source for one in data.recordings]
-    return [names.get(source, source) or 'in memory' for source in sources]
+    sources = [one.source for several in read.values() for one in several if one.source]
+    named = [source for source in sources if source in diagnosis.summary]
+    found = named or [one.source for one in read['training']]
+    return [names.get(source, source) or 'in memory' for source in found]
 
 
 def _verdict(
@@ -200,52 +223,6 @@ def _verdict(
 def _printed(text: str) -> str:
     """Return a sentence of the terminal as it is printed."""
     return text.replace('+-', '±')
-
-
-def _story(
-    diagnosis: Diagnosis, names: Mapping[str, str], residual: Residual | None
-) -> list[Section]:
-    """Return what a person wants to know: where, which, how much, and the curves that show it."""
-    if diagnosis.gap is None:
-        return []
-    robot, patched = diagnosis.arm.robot, bool(diagnosis.findings)
-    sections: list[Section] = [Story(diagnosis, residual)]
-    if patched:
-        sections.append(Shares(diagnosis))
-    sections += [
-        GapOverlay(robot, diagnosis.gap, patched, names),
-        GapBars(robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
-    ]
-    if patched:
-        sections.append(NamedParameters(diagnosis.findings))
-    if diagnosis.where:
-        sections.append(EvidenceSection(diagnosis.where, share_of(diagnosis)))
-    return sections
-
-
-def _small_print(diagnosis: Diagnosis, settings: DiagnosisSettings) -> list[Section]:
-    """Return what else was looked at."""
-    sections: list[Section] = []
-    if diagnosis.minor:
-        sections.append(SmallPrint(diagnosis.minor, settings.everything, bool(diagnosis.findings)))
-    if diagnosis.gap is not None:
-        sizes = detectable(diagnosis.explanation)
-        sections += [CandidateTable(diagnosis), CouldBeSeen(sizes)]
-    return sections
-
-
-def _quality(recording: Recording, role: str, names: Mapping[str, str]) -> RecordingQuality:
-    found = RecordingQuality.of(recording, role)
-    return replace(
-        found,
-        source=names.get(found.source, found.source),
-        description=with_names(found.description, names),
-    )
-
-
-def _renamed(pair: ForwardValidation, names: Mapping[str, str]) -> ForwardValidation:
-    after = replace(pair.after, source=names.get(pair.after.source, pair.after.source))
-    return replace(pair, after=after)
 
 
 def _of_maps(residual: Residual | None) -> list[str]:

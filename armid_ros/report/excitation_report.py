@@ -5,16 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
     CollisionScene,
     CRITERIA,
     Design,
-    DesignSettings,
     Fitness,
-    fitness,
     Limits,
     Obstacle,
     obstacles_alone,
@@ -25,52 +23,31 @@ from armid_ros.excitation import (
 )
 from armid_ros.excitation.fitness import FIT, UNFIT
 from armid_ros.motion import FloatArray
+from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
+from armid_ros.report.blocks import ContentSection, FactList, Legend
 from armid_ros.report.families import effects_in_words, full_label
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
-from armid_ros.report.notation import counted, digits, pretty, robot_label, torque_unit
+from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.frame import Asked, Origin, VerdictSection
-from armid_ros.report.sections.plan import (
-    ArmPoses,
-    Foreseen,
-    Harmonics,
-    PlannedClearance,
-    PlannedMotion,
-)
-from armid_ros.report.silhouettes import draw_silhouettes
+from armid_ros.report.sections.frame import Origin, VerdictSection
+from armid_ros.report.sections.parameters import foreseen_section
+from armid_ros.report.sections.plan import clearance_section, harmonics_section, motion_section
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
 
 
-@dataclass(frozen=True)
-class CheckedRun:
-    """
-    A design with the way there and back, and what was checked of it.
-
-    Attributes
-    ----------
-    run : Run
-        The motion.
-    fitness : Fitness
-        What was checked.
-
-    """
-
-    run: Run
-    fitness: Fitness
-
-
 def excitation_report(
     design: Design,
     arm: ArmModel,
+    run: Run,
+    checked: Fitness,
     *,
     robot: str,
     scene: CollisionScene,
     after: Sequence[str] = (),
     provenance: Provenance | None = None,
-    planned: CheckedRun | None = None,
 ) -> str:
     """
     Return report.html of a design.
@@ -81,6 +58,10 @@ def excitation_report(
         What was found.
     arm : ArmModel
         Prior model, for the torque.
+    run : Run
+        The design with the way there and back.
+    checked : Fitness
+        What was checked of it.
     robot : str
         Shipped name or path of the description.
     scene : CollisionScene
@@ -89,9 +70,6 @@ def excitation_report(
         Recordings that the design adds to.
     provenance : Provenance, optional
         Files, versions, settings, seed.
-    planned : CheckedRun, optional
-        The design with the way there and back; by default the excitation alone, which is checked
-        here.
 
     Returns
     -------
@@ -100,14 +78,8 @@ def excitation_report(
 
     """
     excitation, limits = design.excitation, design.limits
-    run = None if planned is None else planned.run
-    whole_run = run or excitation
-    motion = whole_run.at(np.linspace(0.0, whole_run.duration, _SAMPLES))
+    motion = run.at(np.linspace(0.0, run.duration, _SAMPLES))
     collision, obstacles = scene.collision, scene.obstacles
-    if planned is None:
-        checked = fitness(motion, limits, collision, scene.floor, obstacles)
-    else:
-        checked = planned.fitness
     motion = replace(motion, tau=arm.joint_torque(motion))
     shares = design.limits_used(arm)
     bodies = {'links from each other': collision}
@@ -121,26 +93,30 @@ def excitation_report(
     whole = with_obstacles(collision, obstacles)
     said = (*collision.notes, *filter(None, [collision.excluded]))
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
+    poses = draw_poses(
+        whole,
+        excitation.at(instants).q,
+        [f'{t:.1f} s' for t in instants],
+        excitation.trajectory.one_period(_WAY).q,
+    )
+    colours = [
+        ('residual', 'the arm, bluer towards its end'),
+        ('predicted', 'way of its last body in a period'),
+    ]
+    if any(colour == OBSTACLE for _, colour in poses.bodies):
+        colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))
     sections: list[Section] = [
         _verdict(design, arm.robot.links, shares, checked, collision.notes),
-        ArmPoses(
-            draw_silhouettes(
-                whole,
-                excitation.at(instants).q,
-                [f'{t:.1f} s' for t in instants],
-                excitation.trajectory.one_period(_WAY).q,
-            ),
-            ', '.join(obstacle.name for obstacle in obstacles),
-        ),
-        Foreseen(design, arm.robot.links),
-        PlannedMotion(limits, motion, shares),
-        PlannedClearance(motion.t, curves, design.settings.clearance, said),
-        Harmonics(excitation.trajectory),
-        Asked(_asked(design, arm, robot, obstacles, after, run)),
+        ContentSection('Poses', [poses, Legend(colours)]),
+        foreseen_section(design, arm.robot.links),
+        motion_section(limits, motion, shares),
+        clearance_section(motion.t, curves, design.settings.clearance, said),
+        harmonics_section(excitation.trajectory),
+        _asked(design, arm, robot, obstacles, after, run),
         Origin(provenance or Provenance()),
     ]
     subtitle = (
-        f'{robot_label(robot)} · {whole_run.duration:.4g} s · {excitation.n_periods} periods · '
+        f'{robot_label(robot)} · {run.duration:.4g} s · {excitation.n_periods} periods · '
         f'{design.settings.speed}'
     )
     return Page(f'Excitation of {arm.robot.name}', subtitle, sections).html()
@@ -234,31 +210,34 @@ def _asked(
     robot: str,
     obstacles: Sequence[Obstacle],
     after: Sequence[str],
-    whole: Run | None,
-) -> list[tuple[str, str]]:
+    whole: Run,
+) -> ContentSection:
     settings, run = design.settings, design.excitation
     criterion = f'{settings.criterion}: {CRITERIA[settings.criterion]}'
     focus = f'; focus on {", ".join(settings.focus)}' if settings.focus else ''
-    start = 'the trajectory itself'
-    if whole is not None:
-        start = (
-            f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
-        )
-    return [
+    start = f'{_numbers(whole.approach.q[0])}, with an approach of {whole.approach.duration:.1f} s'
+    name = settings.speed
+    share = SPEED_CLASSES[name] if isinstance(name, str) else name
+    speed = f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'
+    noise = ', '.join(
+        f'{value:.3g} {unit}'
+        for value, unit in zip(design.noise, arm.robot.torque_units, strict=True)
+    )
+    facts = [
         ('Robot', robot),
         ('Joints', ', '.join(run.joints)),
         ('Gravity', f'({_numbers(arm.robot.gravity)}) m/s²'),
         ('Effects', effects_in_words(arm.effects)),
         ('Target', f'{TARGETS[settings.target]}{focus}'),
         ('Criterion', criterion),
-        ('Speed', _speed(settings)),
+        ('Speed', speed),
         (
             'Run',
             f'{run.n_periods} periods of {run.trajectory.period:.4g} s, '
             f'{counted(run.trajectory.harmonics, "harmonic")}, {run.run_in:.3g} s of '
             f'fade-in and of fade-out; from {start}',
         ),
-        ('Torque noise', f'{_noise(design, arm)} at {settings.rate:g} Hz'),
+        ('Torque noise', f'{noise} at {settings.rate:g} Hz'),
         ('Clearance', f'{100.0 * settings.clearance:g} cm'),
         ('Around the arm', ', '.join(o.name for o in obstacles) or 'nothing'),
         (
@@ -266,18 +245,7 @@ def _asked(
             f'{counted(settings.starts, "start")}, at most {settings.iterations} iterations each',
         ),
     ]
-
-
-def _speed(settings: DesignSettings) -> str:
-    name = settings.speed
-    share = SPEED_CLASSES[name] if isinstance(name, str) else name
-    return f'{name}: {100.0 * share:.0f} % of the velocity and acceleration limits'
-
-
-def _noise(design: Design, arm: ArmModel) -> str:
-    return ', '.join(
-        f'{value:.3g} {torque_unit(arm.robot, j)}' for j, value in enumerate(design.noise)
-    )
+    return ContentSection('What was asked', [FactList(facts)])
 
 
 def _numbers(values: FloatArray) -> str:

@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import re
 
 from armid_ros.effects import Effect
 from armid_ros.estimate import ParameterName, symbol_in_words
-from armid_ros.report.notation import pretty
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.report.blocks import Cells, DataTable, Fold, TableCell
+from armid_ros.report.notation import measured, pretty
 
 #: A parameter of a rigid body, and the number of its link.
 _SYMBOL = re.compile(r'\b(m[xyz]?|I[xyz]{2})(\d+)\b')
@@ -85,3 +87,56 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 def effects_in_words(effects: Sequence[Effect]) -> str:
     """Return what effects are called, or that there are none."""
     return ', '.join(effect.name.replace('_', ' ') for effect in effects) or 'none'
+
+
+def parameter_folds(
+    names: tuple[ParameterName, ...],
+    heads: Sequence[str],
+    cells: Callable[[int], Cells],
+    links: Sequence[str] = (),
+    *,
+    suffix: Callable[[list[int]], str] | None = None,
+    opened: Callable[[list[int]], bool] | None = None,
+    order: Callable[[int], float] = float,
+) -> list[Fold]:
+    """
+    Return a table for each kind of parameters, below a line that opens it.
+
+    Parameters
+    ----------
+    names : tuple of ParameterName
+        The parameters.
+    heads : sequence of str
+        Of the columns after those that name the parameter.
+    cells : callable
+        Returns the cells of these columns for the number of a parameter.
+    links : sequence of str
+        Names of the links, in the order of their numbers.
+    suffix, opened : callable
+        Return what stands behind the heading of a kind, and whether it is open, for the numbers of
+        its parameters; by default how many there are, and True.
+    order : callable
+        Returns what the rows of a kind are sorted by, for the number of a parameter.
+
+    """
+    folds = []
+    for (title, unit), members in parameter_families(names).items():
+        rigid = names[members[0]].rigid
+        rows: list[Cells] = []
+        for k in sorted(members, key=order):
+            label = rigid_label(names[k], links) if rigid else names[k].joint or names[k].name
+            note = grouping(names[k], links) if rigid else ''
+            first = TableCell(label, 'words' if rigid else '', note)
+            rows.append((first, *([names[k].joint] if rigid else []), *cells(k)))
+        lead = ('Parameter', 'Joint') if rigid else ('Joint',)
+        table = DataTable((*lead, *heads), rows, tuple(range(len(lead))), 'parameters')
+        count = suffix(members) if suffix else str(len(members))
+        shown = opened is None or opened(members)
+        folds.append(Fold(f'{title} [{unit}]: {count}', [table], shown))
+    return folds
+
+
+def estimate_text(value: float, std: float) -> tuple[str, str]:
+    """Return a value and the half width of its 95 % interval; no number where that has zero."""
+    number, reach = measured(value, HALF_WIDTH * std)
+    return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach

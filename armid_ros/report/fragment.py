@@ -11,47 +11,12 @@ that need the script of a report have no place here.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 import re
-from typing import ClassVar
 
 from armid_ros.report.page import asset, render, Section
 
 CLASS = 'armid-result'
-
-
-@dataclass(frozen=True)
-class InShort(Section):
-    """
-    A result as it is printed: a sentence, a table, and what stands below it.
-
-    Attributes
-    ----------
-    badge : str
-        One word; empty for none.
-    tone : {'good', 'fair', 'bad', ''}
-        Colour of the badge.
-    sentence : str
-        What it is, with the number that matters most.
-    heads : sequence of str
-        Of the columns.
-    rows : sequence of sequence of str
-        Cells.
-    lines : sequence of str
-        What stands below.
-
-    """
-
-    title: ClassVar[str] = ''
-    template: ClassVar[str] = 'in_short.html'
-
-    badge: str
-    tone: str
-    sentence: str
-    heads: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    lines: Sequence[str]
 
 
 def fragment(sections: Sequence[Section], n_open: int = 2) -> str:

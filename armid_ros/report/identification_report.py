@@ -12,19 +12,22 @@ from armid_ros.identification import Fit, Grade, Identification, Verification
 from armid_ros.identification import grade as graded
 from armid_ros.identification.fitting.least_squares import IN_WORDS
 from armid_ros.recording import Recording
+from armid_ros.report.blocks import ContentSection, FactList
 from armid_ros.report.families import effects_in_words
 from armid_ros.report.judgement import judge
 from armid_ros.report.notation import counted, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.assessment import EncoderNoise, PhysicalSection, WhitenessSection
-from armid_ros.report.sections.data_quality import DataQuality, RecordingQuality
-from armid_ros.report.sections.excitation import ExcitationSection
-from armid_ros.report.sections.fit import FitSection
-from armid_ros.report.sections.forward import Forward
-from armid_ros.report.sections.frame import Asked, NextSteps, Origin, VerdictSection
-from armid_ros.report.sections.parameters import ParameterSection
-from armid_ros.report.sections.residuals import Residuals
+from armid_ros.report.sections.assessment import (
+    excitation_section,
+    noise_section,
+    physical_section,
+)
+from armid_ros.report.sections.data_quality import data_quality_section
+from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
+from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
+from armid_ros.report.sections.parameters import parameter_section
+from armid_ros.report.sections.residuals import residual_section, whiteness_section
 from armid_ros.report.statistics import directions, torque_reach, torque_scale
 
 #: Colour of each grade.
@@ -97,11 +100,9 @@ def identification_report(
         One HTML file that loads nothing.
 
     """
-    arm, assessment = result.arm, assessment or Assessment()
+    described, assessment = result.arm.robot, assessment or Assessment()
     verification, grade = assessment.verification, assessment.grade
-    training: dict[str, list[Fit]] = {}
-    for fit in result.training:
-        training.setdefault(fit.source, []).append(fit)
+    training = by_recording(result.training)
     held_out = [fit for fits in validation.values() for fit in fits]
     role = 'held-out' if held_out else 'training'
     shown = held_out or list(result.training)
@@ -109,51 +110,54 @@ def identification_report(
         grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
     sentences = (*grade.reasons, *judgement.sentences)
-    read = {'training': (recordings, training), 'held-out': (validation_recordings, validation)}
-    quality = [
-        RecordingQuality.of(one, name, fits.get(one.source, ()))
-        for name, (own, fits) in read.items()
-        for one in own
+    read = [
+        *((one, 'training', training.get(one.source, ())) for one in recordings),
+        *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
     ]
     worst = directions(result.estimate, torque_scale(result))
-    physical = [PhysicalSection(result.physical, assessment.exports)] if result.physical else []
     forward, noise = (verification.forward, verification.noise) if verification else ((), None)
     sections: list[Section] = [
-        VerdictSection(grade.word, TONES[grade.word], sentences, judgement.beware),
-        NextSteps(judgement.next_steps),
-        FitSection(arm.robot, training, validation, torque_reach(result, shown)),
-        *([Forward(arm.robot, forward)] if forward else []),
-        Residuals(arm.robot, shown, role),
-        ParameterSection(
+        VerdictSection(
+            grade.word,
+            TONES[grade.word],
+            sentences,
+            judgement.beware,
+            error_bars(described, training, validation),
+        ),
+        next_steps_section(judgement.next_steps),
+        fit_section(described, training, validation, torque_reach(result, shown)),
+        *([forward_section(described, forward)] if forward else []),
+        residual_section(described, shown, role),
+        parameter_section(
             result.estimate,
             result.base.values(description.theta),
             result.unidentified,
-            arm.robot.links,
+            described.links,
             assessment.reference,
         ),
-        *physical,
-        ExcitationSection(result.condition_number, result.base.rank, worst, arm.robot.links),
-        WhitenessSection(arm.robot, shown, role),
-        *([] if noise is None else [EncoderNoise(arm.robot, noise)]),
+        *([physical_section(result.physical, assessment.exports)] if result.physical else []),
+        excitation_section(result.condition_number, result.base.rank, worst, described.links),
+        whiteness_section(described, shown, role),
+        *([] if noise is None else [noise_section(described, noise)]),
         *assessment.sections,
-        DataQuality(quality, arm.robot),
-        Asked(_asked(result, robot, list(training), list(validation))),
+        data_quality_section(read, described),
+        _asked(result, robot, list(training), list(validation)),
         Origin(provenance or Provenance()),
     ]
     subtitle = (
         f'{robot_label(robot)} · {counted(len(training), "training recording")} · '
         f'{counted(len(validation), "held-out recording")}'
     )
-    return Page(f'Identification of {arm.robot.name}', subtitle, sections).html()
+    return Page(f'Identification of {described.name}', subtitle, sections).html()
 
 
 def _asked(
     result: Identification, robot: str, training: Sequence[str], validation: Sequence[str]
-) -> list[tuple[str, str]]:
+) -> ContentSection:
     gravity = ', '.join(f'{g:.4g}' for g in result.arm.robot.gravity)
     used = result.used
     kept = used.rate_hz / used.decimation
-    return [
+    facts = [
         ('Robot', robot),
         ('Joints', ', '.join(result.arm.robot.joints)),
         ('Gravity', f'({gravity}) m/s²'),
@@ -167,3 +171,4 @@ def _asked(
         ('Fitted to', ', '.join(training)),
         ('Held out', ', '.join(validation) or 'nothing'),
     ]
+    return ContentSection('What was asked', [FactList(facts)])

@@ -5,17 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.inspection import Inspection, LinkCheck, Remark
 from armid_ros.motion import FloatArray
-from armid_ros.report.notation import counted, digits, measured, NORMAL, robot_label
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
+from armid_ros.report.notation import counted, digits, measured, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
-from armid_ros.report.sections.inspection import ContentsSection, JointTable, RecordingCurves
+from armid_ros.report.sections.inspection import (
+    contents_section,
+    curves_section,
+    joints_section,
+)
 import numpy as np
 
 #: Links that explain less than this share of the difference are not named as the cause.
@@ -59,11 +63,11 @@ def inspection_report(
     texts = [remark.text for remark in found.remarks]
     texts.insert(first - 1, found.verdict)  # below the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
-    sections = [
+    sections: list[Section] = [
         VerdictSection(grade, tone, sentences[:first], sentences[first:]),
-        ContentsSection(found),
-        JointTable(found),
-        RecordingCurves(found),
+        contents_section(found),
+        joints_section(found),
+        curves_section(found),
         Origin(provenance or Provenance()),
     ]
     name = Path(recording.source).name or 'recording'
@@ -71,22 +75,6 @@ def inspection_report(
         filter(None, (Path(robot).name, recording.topic, counted(recording.n_joints, 'joint')))
     )
     return Page(f'Inspection of {name}', subtitle, sections).html()
-
-
-@dataclass(frozen=True)
-class LinkTable(Section):
-    """Mass and centre of every link, as described and as measured."""
-
-    title: ClassVar[str] = 'Links'
-    template: ClassVar[str] = 'table.html'
-    hint: ClassVar[str] = (
-        'Centres are in the frame of the joint that moves the link. Intervals are 95 %. A dash: '
-        'as described, or not determined by this motion. Explains: share of the difference '
-        'between URDF and recording that this link explains if all others are right.'
-    )
-    heads: ClassVar[Sequence[str]] = HEADS
-
-    rows: Sequence[Sequence[str]]
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
@@ -118,7 +106,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
     """Return by how much the mass of a link is wrong; empty where that is not determined."""
-    change, reach = found.measured_mass[k] - found.mass[k], NORMAL * found.mass_std[k]
+    change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
     size, interval = measured(abs(float(change)), float(reach))
@@ -146,7 +134,7 @@ def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
 def _interval(values: FloatArray, std: FloatArray) -> str:
     if np.isnan(values).any():
         return '-'
-    reach = float(NORMAL * std.max())
+    reach = float(HALF_WIDTH * std.max())
     return f'{", ".join(measured(float(v), reach)[0] for v in values)} ± {measured(0.0, reach)[1]}'
 
 
@@ -165,6 +153,12 @@ def description_check_report(
         VerdictSection(grade, tone, [first, ' '.join(others)], [one.text for one in remarks])
     ]
     if links is not None:
-        sections.append(LinkTable(link_rows(links)))
+        said = (
+            'Centres are in the frame of the joint that moves the link. Intervals are 95 %. A '
+            'dash: as described, or not determined by this motion. Explains: share of the '
+            'difference between URDF and recording that this link explains if others are right.'
+        )
+        table = DataTable(HEADS, link_rows(links), kind='tight')
+        sections.append(ContentSection('Links', [table, Paragraph(said, 'hint')]))
     sections.append(Origin(provenance or Provenance()))
     return Page(f'Check of {robot_label(robot)}', '', sections, charts=False).html()

@@ -86,6 +86,24 @@ def foxglove_layout(joints: Sequence[str], namespace: str = '', base: str = 'bas
     return json.dumps(json.loads(text), indent=2) + '\n'
 
 
+def rviz_config(base: str, namespace: str = '') -> str:
+    """
+    Return a configuration of RViz, with the model of the arm and the residual on its joints.
+
+    The model moves with the transforms of robot_state_publisher; the markers need none.
+
+    Parameters
+    ----------
+    base : str
+        Base link, which is the fixed frame.
+    namespace : str
+        Of the nodes; empty for none.
+
+    """
+    at = topic_prefix(namespace)
+    return f'{render("arm.rviz", {"schema": SCHEMA, "base": base, "at": at})}\n'
+
+
 def _path(value: str, label: str) -> dict[str, Any]:
     return {'value': value, 'enabled': True, 'timestampMethod': 'headerStamp', 'label': label}
 

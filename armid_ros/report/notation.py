@@ -10,7 +10,7 @@ from pathlib import PurePath
 from armid_ros.diagnosis.verdict import words
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.estimate import ParameterName
-from armid_ros.robots import Robot
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 
 
 def pretty(unit: str) -> str:
@@ -22,8 +22,6 @@ def pretty(unit: str) -> str:
 DASH = '\N{EN DASH}'
 #: No quantity of an arm in SI units is as large.
 _NO_NUMBER = 1e12
-#: Standard deviations to either side of a 95 % interval.
-NORMAL = 1.96
 
 
 def digits(value: float, count: int = 2) -> str:
@@ -70,7 +68,7 @@ def value_of(finding: Finding, parameter: ParameterName, value: float, std: floa
 def _plus_minus(value: float, std: float, unit: str) -> str:
     if not abs(value) < _NO_NUMBER:
         return DASH
-    wide = NORMAL * std
+    wide = HALF_WIDTH * std
     if not 0.0 < wide < _NO_NUMBER:
         return f'{value:.4g}{unit}'
     centre, half = measured(value, wide)
@@ -94,16 +92,6 @@ def probability(p: float) -> str:
 def counted(number: int, what: str, plural: str = '') -> str:
     """Return a number with its noun: '1 joint', '2 joints'."""
     return f'{number} {what if number == 1 else plural or what + "s"}'
-
-
-def torque_unit(robot: Robot, joint: int) -> str:
-    """Return the unit of a joint's actuator torque: N for one that slides."""
-    return 'N' if robot.prismatic[joint] else 'N m'
-
-
-def position_unit(robot: Robot, joint: int) -> str:
-    """Return the unit of a joint's position."""
-    return 'm' if robot.prismatic[joint] else 'rad'
 
 
 def robot_label(source: str) -> str:

@@ -10,7 +10,9 @@ import sys
 
 import armid_ros as ar
 from armid_ros.api.table import LINES, Summary, WIDTH
-from armid_ros.report.fragment import fragment, InShort
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
+from armid_ros.report.fragment import fragment
+from armid_ros.report.sections.frame import VerdictSection
 import numpy as np
 import pytest
 
@@ -193,7 +195,12 @@ def test_a_summary_of_many_joints_stays_short_and_says_so():
 
 
 def test_names_are_escaped_in_a_notebook():
-    html = fragment([InShort('<em>', '', '<q>', ('<i>',), [('<u>',)], ['<s>'])])
+    blocks = [
+        VerdictSection('<em>', '', ['<q>']),
+        DataTable(('<i>',), [('<u>',)]),
+        Paragraph('<s>'),
+    ]
+    html = fragment([ContentSection('', blocks)])
     assert all(tag not in html for tag in ('<em>', '<q>', '<i>', '<u>', '<s>'))
 
 

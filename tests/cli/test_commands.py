@@ -48,6 +48,13 @@ def test_options_of_a_project_are_taken_and_printed_where_none_is_typed(
     assert 'gravity' in armid('inspect', bags[0], code=2).stderr
 
 
+def test_a_command_of_a_group_takes_options_of_a_project(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'armid.toml').write_text('alpha = 0.1\n[fleet.watch]\nout = "results"\n')
+    said = armid('fleet', 'watch', code=2).stderr
+    assert '--alpha 0.1' in said and '--out results' in said
+
+
 #: What takes long to import, and the packages of armid_ros that import it.
 HEAVY = (
     *('numpy', 'scipy', 'pinocchio', 'coal', 'matplotlib', 'rich', 'rosbags', 'rclpy', 'dask'),

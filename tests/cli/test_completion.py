@@ -27,6 +27,13 @@ def test_commands_and_options_are_completed():
     assert '--version' in completed('--v')
 
 
+def test_values_are_completed():
+    assert 'humanoid_arm' in completed('identify', '--robot', 'hum')
+    assert completed('identify', '--effects', 'viscous_friction,stribeck') == [
+        'viscous_friction,stribeck_friction'
+    ]
+
+
 @pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])
 def test_a_script_is_printed_for_each_shell(shell):
     said = armid('completion', shell).output

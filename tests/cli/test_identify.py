@@ -189,11 +189,11 @@ def test_what_a_person_would_stop_at_is_said_first_and_ends_a_strict_run(tmp_pat
     assert '(0, 0, -1)' in lines[0] and '--gravity moon' in lines[0]
     document = json.loads((out / 'identification.json').read_text())
     assert document['grade'] == 'unusable'
-    assert lines[0] == f'unusable: {document["reasons"][0]}'
+    assert lines[0] == f'UNUSABLE: {document["reasons"][0]}'
     page = (out / 'report.html').read_text()
     assert '--gravity moon' in page[: page.index('</h2>')]
     armid(*arguments, '--strict', code=3)
-    assert armid(*arguments, '--strict', '--gravity', 'moon').stdout.startswith('good:')
+    assert armid(*arguments, '--strict', '--gravity', 'moon').stdout.startswith('GOOD:')
 
 
 def test_a_joint_without_effort_is_named(tmp_path):

@@ -45,9 +45,9 @@ def test_progress_without_a_terminal_is_a_line_every_ten_seconds():
         progress.tick(second / 40.0, 'identifying' if second > 5 else None)
         progress.look()
     assert lines == [
-        'identifying: 25 %, 10 s',
-        'identifying: 50 %, 20 s',
-        'identifying: 75 %, 30 s',
+        'identifying: 25 %, 10 s, about 30 s to go',
+        'identifying: 50 %, 20 s, about 20 s to go',
+        'identifying: 75 %, 30 s, about 10 s to go',
     ]
 
 

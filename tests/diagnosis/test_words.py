@@ -21,7 +21,7 @@ from armid_ros.diagnosis.verdict.words import (
 )
 from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import ParameterName
-from armid_ros.report.sections.diagnosed import NamedParameters
+from armid_ros.report.sections.diagnosed import named_section
 import numpy as np
 import pytest
 
@@ -216,6 +216,6 @@ def test_a_shape_that_the_data_do_not_determine_has_no_value(bench, time, std, t
     summary = verdict(bench, found).summary
     assert ('206' in summary) is told
     assert (effect.traits.shown_by in summary) is not told
-    rows = NamedParameters((found,)).rows
+    rows = named_section((found,)).blocks[0].rows
     assert ('not determined' in [row[-1] for row in rows]) is not told
     assert '0.4' in rows[0][-1]

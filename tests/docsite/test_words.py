@@ -12,12 +12,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 #: Largest count in the package; a commit that lowers a count lowers it here.
 CEILING = {
-    'told': 145,
+    'told': 129,
     'said': 288,
-    'says': 159,
-    'tells': 72,
+    'says': 157,
+    'tells': 69,
     'asks': 21,
-    'asked': 232,
+    'asked': 224,
     'believes': 3,
     'believed': 69,
     'denies': 1,

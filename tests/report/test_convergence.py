@@ -3,8 +3,9 @@
 """The convergence of an online estimate is drawn with its intervals and the true values."""
 
 from armid_ros.report import identification_report
+from armid_ros.report.families import full_label
 from armid_ros.report.identification_report import Assessment
-from armid_ros.report.sections.convergence import Convergence
+from armid_ros.report.sections.convergence import convergence_section
 import numpy as np
 
 
@@ -13,11 +14,14 @@ def test_parameters_are_drawn_with_interval_and_truth(case):
     t = np.linspace(0.5, 10.0, 50)
     std = estimate.std * np.sqrt(10.0 / t)[:, np.newaxis]
     values = estimate.values + std
-    section = Convergence(t, values, std, estimate.values, estimate.parameters)
-    assert len(section.charts) == 6
-    units = {estimate.parameters[k].unit for k in section.shown}
+    section = convergence_section(t, values, std, estimate.values, estimate.parameters)
+    _, panels = section.blocks
+    shown = {full_label(name): k for k, name in enumerate(estimate.parameters)}
+    assert len(panels.panels) == 6
+    units = {estimate.parameters[shown[label]].unit for label, *_ in panels.panels}
     assert {'kg m^2', 'N m'} <= units
-    for k, (_, chart) in zip(section.shown, section.charts, strict=True):
+    for label, _, (chart,) in panels.panels:
+        k = shown[label]
         band, curve = chart.series
         drawn = np.isfinite(curve.y)
         assert drawn[-1]
@@ -29,7 +33,7 @@ def test_parameters_are_drawn_with_interval_and_truth(case):
 def test_a_page_can_compare_with_the_truth_and_have_more_sections(case):
     estimate = case.result.estimate
     t, ones = np.array([1.0, 2.0]), np.ones((2, 1))
-    section = Convergence(
+    section = convergence_section(
         t, ones * estimate.values, ones * estimate.std, estimate.values, estimate.parameters
     )
     page = identification_report(

@@ -11,17 +11,16 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
-from armid_ros.report.diagnosis_report import (
-    DiagnosedRecordings,
-    diagnosis_report,
-    Extras,
-    tone_of,
-)
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
 from armid_ros.report.notation import DASH, digits, percent, plain, with_interval
-from armid_ros.report.sections.candidates import CandidateTable
-from armid_ros.report.sections.diagnosed import EvidenceSection, NamedParameters, Shares
-from armid_ros.report.sections.forward import Forward
-from armid_ros.report.sections.gap import GapBars, GapOverlay
+from armid_ros.report.sections.diagnosed import (
+    candidates_section,
+    evidence_section,
+    named_section,
+    shares_section,
+)
+from armid_ros.report.sections.fit import forward_section
+from armid_ros.report.sections.gap import gap_section, overlay_section
 from armid_ros.report.sections.story import Story
 from armid_ros.report.sources import short_names, with_names
 import numpy as np
@@ -59,7 +58,7 @@ def html(found, recordings):
     """Return the report."""
     return diagnosis_report(
         found,
-        DiagnosedRecordings(recordings),
+        {'training': recordings},
         robot='/home/me/two_links.urdf',
         patch='effects:\n- name: <b>x</b>\n',
     )
@@ -71,7 +70,7 @@ def quiet():
     bench = Bench()
     recordings = bench.recordings()
     found = diagnose(bench.arm, recordings, rng=np.random.default_rng(0))
-    return diagnosis_report(found, DiagnosedRecordings(recordings), robot='two_links')
+    return diagnosis_report(found, {'training': recordings}, robot='two_links')
 
 
 def test_the_story_comes_first_and_what_was_looked_at_last(html):
@@ -102,7 +101,8 @@ def test_the_joint_with_the_cause_is_the_one_that_is_drawn_in_colour(html, quiet
     drawing = html[html.index('<svg class="arm"') : html.index('</svg>')]
     assert re.findall('font-weight="600"[^>]*>([^<]*)<', drawing) == ['elbow']
     assert drawing.count('<circle') == 2
-    assert drawing.count('<line') == 4  # to the shoulder, two links, and one to the name
+    assert drawing.count('<line') == 1  # to the name
+    assert drawing.count('polygon') == 3  # to the shoulder, and two links
     plain = quiet[quiet.index('<svg class="arm"') : quiet.index('</svg>')]
     assert 'var(--predicted)' not in plain
 
@@ -121,7 +121,7 @@ def test_causes_that_are_one_have_one_bar(found):
     (finding,) = found.findings
     twin = replace(finding, name='base_tilt', joints=(), together=(finding.name,))
     both = replace(found, findings=(replace(finding, together=('base_tilt',)), twin))
-    rows = Shares(both).bars.rows
+    rows = shares_section(both).blocks[1].rows
     assert len(rows) == 2
     assert 'quadratic friction' in rows[0][0] and 'base tilt' in rows[0][0]
     assert sum(bar.value for _, bars in rows for bar in bars) == pytest.approx(1.0)
@@ -144,7 +144,7 @@ def test_a_gap_of_the_fitted_data_alone_is_said_to_be_one(found):
 
 def test_what_was_added_to_the_model_is_said(found, recordings, html):
     worse = replace(found, harmful=True)
-    page = diagnosis_report(worse, DiagnosedRecordings(recordings), robot='two_links')
+    page = diagnosis_report(worse, {'training': recordings}, robot='two_links')
     assert '>Patch</h2>' in html and '>Patch</h2>' not in page
 
 
@@ -161,7 +161,7 @@ def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found
     values = tuple(0.5 if name.unit == 'kg m^2' else 0.0 for name in names)
     numbers = {'values': values, 'std': (0.01,) * len(names), 'added_to': ()}
     link = replace(found.findings[0], name='link_inertia', parameters=names, **numbers)
-    rows = NamedParameters((link,)).rows
+    rows = named_section((link,)).blocks[0].rows
     assert rows[0][1].endswith('of mass') and rows[1][1].endswith('along x')
 
 
@@ -176,7 +176,7 @@ def test_a_model_that_simulates_worse_is_not_green(found, recordings, html):
     wrong = found.arm.with_effect(spring, np.array([30.0, 0.0]))
     pairs, *_ = simulate_held_out(found.arm, wrong, used, recordings[:1])
     extras = Extras(forward=pairs)
-    page = diagnosis_report(found, DiagnosedRecordings(recordings), robot='arm', extras=extras)
+    page = diagnosis_report(found, {'training': recordings}, robot='arm', extras=extras)
     assert 'elbow' in extras.worse
     assert (tone_of(found), tone_of(found, extras.worse)) == ('good', 'fair')
     assert 'class="verdict fair"' in page and 'class="verdict good"' in html
@@ -187,10 +187,10 @@ def test_bad_data_have_no_green_tick():
     turned = [replace(r, tau=-r.tau) for r in bench.recordings()]
     found = diagnose(bench.arm, turned, rng=np.random.default_rng(0))
     assert found.verdict == 'bad_data'
-    page = diagnosis_report(found, DiagnosedRecordings(turned), robot='two_links')
+    page = diagnosis_report(found, {'training': turned}, robot='two_links')
     assert 'class="fine"' not in page
     sound = [replace(one, source=f'before {k}') for k, one in enumerate(bench.recordings(seed=1))]
-    both = DiagnosedRecordings(turned, baseline=sound)
+    both = {'training': turned, 'baseline': sound}
     beside = diagnosis_report(found, both, robot='two_links')
     assert beside.count('class="fine"') == len(sound)
 
@@ -204,13 +204,13 @@ def test_recordings_have_names_and_paths_are_left_to_the_provenance(html):
 
 def test_no_candidate_has_a_value_that_it_cannot_have(found, html):
     ranking = found.explanation.survey.ranking
-    rows = CandidateTable(found).rows
-    assert rows[0].named
-    assert all(float(row.share.rstrip(' %')) <= 100.0 for row in rows)
+    rows = candidates_section(found).blocks[0].blocks[1].rows
+    assert rows[0][0].kind == 'changed'
+    assert all(float(row[2].rstrip(' %')) <= 100.0 for row in rows)
     negative = [
         row
         for row, trial in zip(rows, ranking, strict=False)
-        if np.all(trial.effect.bounds()[0] >= 0.0) and row.value.startswith('-')
+        if np.all(trial.effect.bounds()[0] >= 0.0) and row[4].startswith('-')
     ]
     assert not negative
     shown = re.sub('<[^>]*>', '', re.sub('<script.*?</script>', '', html[html.index('<main>') :]))
@@ -257,7 +257,7 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
         return replace(overlay, trajectory=replace(overlay.trajectory, unsure=unsure))
 
     gap = replace(found.gap, overlays=tuple(resting(one) for one in found.gap.overlays))
-    torque, _ = GapOverlay(found.arm.robot, gap, True, {}).charts
+    _, torque, _ = overlay_section(found.arm.robot, gap, True, {}).blocks
     shown = gap.overlays
     assert len(torque.x) > 10
     assert any(torque.x[-1] == pytest.approx(one.trajectory.t[-1], abs=0.1) for one in shown)
@@ -265,13 +265,13 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
 
 def test_curves_of_where_it_lives_are_without_the_mean_which_is_said(found):
     place = replace(found.where[0], mean=2.0, mean_share=0.9)
-    section = EvidenceSection([place])
-    assert '2.0 N m' in section.taken_off(place) and '90 %' in section.taken_off(place)
-    for axis, (caption, chart) in zip(place.axes, section.charts(place), strict=True):
+    said, panels = evidence_section([place]).blocks[0].blocks
+    assert '2.0 N m' in said.text and '90 %' in said.text
+    for axis, (caption, _, (chart,)) in zip(place.axes, panels.panels, strict=True):
         np.testing.assert_allclose(chart.series[0].y, axis.means - 2.0)
         share = 100.0 * max(axis.share - 0.9, 0.0) / 0.1
         assert f'{share:.0f} %' in caption or share < 2.0
-    assert section.taken_off(replace(place, mean_share=0.0)) == ''
+    assert len(evidence_section([replace(place, mean_share=0.0)]).blocks[0].blocks) == 1
 
 
 @pytest.mark.parametrize(
@@ -296,9 +296,10 @@ def test_the_curve_of_the_forward_validation_is_of_the_joint_that_is_said(
             worst='',
         )
 
-    pair = SimpleNamespace(before=score([before, 0.1]), after=score([0.1, after]))
-    ((_, _, joint, chart),) = Forward(found.arm.robot, [pair]).drawn
-    assert joint == worst
+    pair = SimpleNamespace(
+        before=score([before, 0.1]), after=score([0.1, after]), comment=lambda: ''
+    )
+    *_, chart = forward_section(found.arm.robot, [pair]).blocks[1].blocks
     assert chart.ylabel.startswith(f'{worst}: ')
 
 
@@ -308,7 +309,7 @@ def test_a_joint_of_which_no_row_counts_has_no_error_of_zero(found):
         name: np.where([True, False], 0.0, getattr(gap, name))
         for name in ('before', 'after', 'floor')
     }
-    bars = GapBars(found.arm.robot, replace(gap, **none), 'noise', True).bars.rows
+    bars = gap_section(found.arm.robot, replace(gap, **none), 'noise', True).blocks[1].rows
     assert [bar.text for bar in bars[0][1]] == ['not judged']
     assert len(bars[1][1]) == 3
 

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 import re
 
+from armid_ros.api.excitation import ExcitationResult
 from armid_ros.excitation import (
     CollisionScene,
     DesignProblem,
@@ -18,8 +19,7 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT
-from armid_ros.report.excitation_report import excitation_report
-from armid_ros.report.silhouettes import draw_silhouettes
+from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
 from armid_ros.robots import collision_model, load_robot, robot_from_urdf
 import numpy as np
 import pytest
@@ -49,13 +49,13 @@ def scene_of(robot, *obstacles):
 
 
 @pytest.fixture(scope='module')
-def html(case, planned):
-    return excitation_report(
-        planned,
-        case.truth,
-        robot='humanoid_arm',
-        scene=scene_of(case.truth.robot, TABLE),
-    )
+def plan(case, planned):
+    return ExcitationResult(planned, case.truth, scene_of(case.truth.robot, TABLE))
+
+
+@pytest.fixture(scope='module')
+def html(plan):
+    return plan.page()
 
 
 def charts(html):
@@ -82,11 +82,11 @@ def test_every_joint_is_shown_against_its_limits(case, planned, html):
             assert np.abs(chart['series'][0]['y']).max() <= limit[j] * (1.0 + 1e-4)
 
 
-def test_clearance_is_that_of_links_and_that_of_the_environment(case, html):
+def test_clearance_is_that_of_links_and_that_of_the_environment(case, plan, html):
     chart = charts(html)[-1]
     own, around = (np.array(series['y']) / 100.0 for series in chart['series'])
     robot = case.truth.robot
-    q = case.excitation.at(np.linspace(0.0, case.excitation.duration, 600)).q
+    q = plan.run.at(np.linspace(0.0, plan.run.duration, 600)).q
     np.testing.assert_allclose(own, collision_model(robot).path_clearance(q), atol=1e-4)
     assert around.min() > 0.0
 
@@ -102,17 +102,17 @@ def test_what_the_run_does_not_show_comes_first(case, planned):
     matrix = planned.information.matrix.copy()
     matrix[0], matrix[:, 0] = 0.0, 0.0
     blind = replace(planned, information=replace(planned.information, matrix=matrix))
-    page = excitation_report(blind, case.truth, robot='r', scene=scene_of(case.truth.robot))
+    page = ExcitationResult(blind, case.truth, scene_of(case.truth.robot)).page()
     assert '>blind<' in page
 
 
 def test_bodies_are_drawn_where_they_are():
     """A rod that hangs is below its hinge, one that stands above it."""
     robot = robot_from_urdf(BARE)
-    drawing = draw_silhouettes(
+    drawing = draw_poses(
         collision_model(robot), np.array([[0.0], [np.pi]]), ['up', 'down'], np.zeros((2, 1))
     )
-    up, down = (height for _, height in drawing.tips)
+    up, down = (height for _, height, *_ in drawing.dots)
     assert down - up > 0.35 * drawing.height
     assert [text for _, text in drawing.captions] == ['up', 'down']
 
@@ -132,5 +132,5 @@ def test_an_arm_without_bodies_is_drawn_though_its_links_are_points_for_the_floo
     floor = Floor(0.0, np.array([0.0, 0.0, 1.0]), 'given')
     whole = with_obstacles(collision, floor_obstacles(collision, floor, 0.01))
     poses = np.zeros((1, robot.n_joints))
-    drawn = draw_silhouettes(whole, poses, ['now'], poses)
-    assert sum(share >= 0 for _, share in drawn.bodies) == robot.n_joints + 1
+    drawn = draw_poses(whole, poses, ['now'], poses)
+    assert sum(colour != OBSTACLE for _, colour in drawn.bodies) == robot.n_joints + 1

@@ -4,7 +4,7 @@
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.report.families import full_label, grouping, parameter_families
-from armid_ros.report.sections.parameters import ParameterSection
+from armid_ros.report.sections.parameters import parameter_section
 import numpy as np
 import pytest
 
@@ -25,7 +25,7 @@ def test_joints_that_slide_and_that_turn_are_kept_apart():
 
 def test_a_heading_has_its_unit_once():
     estimate = Estimate(NAMES, np.ones(3), 0.01 * np.eye(3))
-    text = ParameterSection(estimate, np.ones(3)).html()
+    text = parameter_section(estimate, np.ones(3)).html()
     assert text.count('[N s/m]') == 1
 
 
@@ -56,5 +56,5 @@ def test_a_group_is_a_sum_over_named_links():
         assert f'{symbol} of {link}' in words
     assert grouping(ParameterName('m2', 'elbow', 'kg'), links) == ''
     estimate = Estimate((name,), np.ones(1), 0.01 * np.eye(1))
-    page = ParameterSection(estimate, np.ones(1), links=links).html()
+    page = parameter_section(estimate, np.ones(1), links=links).html()
     assert f'<small>{words}' in page

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
-from armid_ros.report.diagnosis_report import DiagnosedRecordings, diagnosis_report, Extras
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras
 from armid_ros.residual import learn, learn_residual, lookup_table
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import suggest_law
@@ -115,12 +115,10 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown):
 
 
 def test_the_page_says_what_is_in_the_model_that_is_written(unknown):
-    plain = diagnosis_report(unknown, DiagnosedRecordings(), robot='two_links')
+    plain = diagnosis_report(unknown, {}, robot='two_links')
     asked = replace(unknown, verdict='unknown')
     learned = learn_residual(asked, np.random.default_rng(0))
-    page = diagnosis_report(
-        asked, DiagnosedRecordings(), robot='two_links', extras=Extras(residual=learned)
-    )
+    page = diagnosis_report(asked, {}, robot='two_links', extras=Extras(residual=learned))
     joint = asked.arm.robot.joints[1]
     assert 'The model is unchanged.' not in page
     assert f'the learned residual of {joint}' in page
@@ -134,9 +132,7 @@ def test_a_map_that_harms_held_out_recordings_says_so(unknown):
     learned = learn_residual(replace(unknown, verdict='unknown'), np.random.default_rng(0))
     harmful = replace(learned, joints=(replace(learned.joints[0], held_out=-140.0),))
     assert 'get worse' in harmful.sentences()[0]
-    page = diagnosis_report(
-        unknown, DiagnosedRecordings(), robot='two_links', extras=Extras(residual=harmful)
-    )
+    page = diagnosis_report(unknown, {}, robot='two_links', extras=Extras(residual=harmful))
     assert '>worse<' in page
     assert '-14000' not in page
 

@@ -13,7 +13,12 @@ from armid_ros.cli.terminal import progress, say
 import click
 
 if TYPE_CHECKING:
+    from armid_ros.api.identification import IdentificationResult
+    from armid_ros.arm import ArmModel
     from armid_ros.identification.assess.agreement import Agreement
+    from armid_ros.motion import FloatArray
+    from armid_ros.nodes.lockstep import Progress
+    import numpy as np
 
 #: Files that a folder to be filled may hold already, from a demo before.
 OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'report.html', 'story')
@@ -33,25 +38,19 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 @parameters.as_json
 def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bool) -> None:
     """Excite, move, identify online and offline; then find a hidden change of the arm."""
+    from armid_ros.api.identification import identify
     from armid_ros.arm import ArmModel, save_model
     from armid_ros.cli import options
     from armid_ros.cli.demo import steps
-    from armid_ros.cli.demo.story import show_story, tell_story
-    from armid_ros.excitation import save_excitation
+    from armid_ros.excitation import design, DesignSettings, save_excitation
     from armid_ros.files import json_text, settled, write_file
-    from armid_ros.identification import (
-        grade,
-        identification_document,
-        identify,
-        Score,
-        write_document,
-    )
+    from armid_ros.identification import write_document
     from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.identification.online.identifier import OnlineIdentifier
     from armid_ros.identification.output import SCHEMA
-    from armid_ros.nodes.lockstep import replay_lockstep
+    from armid_ros.nodes.lockstep import replay_lockstep, run_lockstep
     from armid_ros.recording import read_recording
-    from armid_ros.robots import load_robot
+    from armid_ros.robots import collision_model, load_robot
     from armid_ros.simulation import SimulatedArm
     import numpy as np
 
@@ -59,74 +58,116 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     robot = load_robot(steps.ROBOT, gravity=gravity)
     truth = steps.true_arm(robot)
     nominal = ArmModel(robot, truth.effects)
+    hidden = steps.hidden_change(robot, np.random.default_rng([seed, 1]), hide)
     staged = options.stage(out, SCHEMA, steps.ROBOT, [*OUTPUTS, '*.png'])
-    new = staged.folder
-    excitation = steps.excite(nominal, rng)
-    save_excitation(excitation, new / 'excitation.yaml')
-    identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
-    target = identifier.base.values(truth.theta)
-    plant = SimulatedArm(truth, rng=rng, sensors=steps.SENSORS)
-    history, end = steps.run_online(plant, excitation, identifier, target, new / 'bag', rate)
-    again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
-    with progress('playing the bag back') as tick:
+    new, bag = staged.folder, staged.folder / 'bag'
+    settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
+    with progress('designing the excitation') as tick:
+        excitation = design(
+            nominal,
+            settings,
+            rng,
+            collision=collision_model(robot),
+            progress=lambda now: tick(now.done),
+        ).excitation
+        save_excitation(excitation, new / 'excitation.yaml')
+        tick(0.0, 'moving, and identifying online')
+        identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
+        target = identifier.base.values(truth.theta)
+        plant = SimulatedArm(truth, rng=rng, sensors=steps.SENSORS)
+        history: list[Progress] = []
+
+        def watch(now: Progress) -> None:
+            history.append(now)
+            tick(now.t / now.duration)
+
+        end = run_lockstep(plant, excitation, identifier, bag, rate=rate, on_progress=watch)
+        tick(0.0, 'playing the bag back')
         replay = replay_lockstep(
-            new / 'bag',
-            again,
+            bag,
+            OnlineIdentifier(nominal, rng=np.random.default_rng(seed)),
             duration=end.duration,
             on_progress=lambda now: tick(now.t / now.duration),
         )
         tick(0.0, 'identifying offline')
-        recording = read_recording(new / 'bag', joints=robot.joints)
-        recording = replace(recording, source=str(settled(new / 'bag')))
-        result = identify(nominal, [recording], rng=rng, progress=tick)
-        graded = grade(result, nominal, [recording], {})
-    offline = Agreement.of(result.estimate, result.base.values(truth.theta))
+        recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
+        found = identify(nominal, recording, rng=rng, progress=tick)
+    offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
     online = Agreement.of(end.estimate, target)
-    document = {
-        **identification_document(result, steps.ROBOT, {}, grade=graded),
+    document: dict[str, Any] = {
+        **found.document(),
+        'robot': steps.ROBOT,
         'truth': offline.document(),
         'online': online.document(),
         'replay_difference': float(np.abs(replay.estimate.values - end.estimate.values).max()),
         'real_time_factor': end.real_time_factor,
-        'held_out': steps.held_out_error(result.arm, truth, rng),
+        'held_out': _held_out_error(found.arm, truth, rng),
     }
-    save_model(new / 'model.yaml', result.arm, steps.ROBOT, result.estimate)
-    page = steps.page(result, history, target, truth, graded, recording)
-    write_file(new / 'report.html', page)
-    if not as_json:
-        say(f'{graded.word}: {graded.reasons[0]}')
-        _tell(document, online, offline, Score.of(result.training).relative_error_percent)
+    save_model(new / 'model.yaml', found.arm, steps.ROBOT, found.estimate)
+    write_file(new / 'report.html', _page(found, truth, history, target))
+    changed = truth.with_effect(hidden.effect, hidden.values)
     rng = np.random.default_rng([seed, 1])
-    told = tell_story(
-        new / 'story',
-        truth,
-        result.arm,
-        recording,
-        sensors=steps.SENSORS,
-        rng=rng,
-        hide=hide,
-        rate=rate,
-    )
-    document['story'] = told.document()
+    diagnosed = steps.diagnose_hidden(new / 'story', changed, found.arm, recording, rng, rate)
+    document['story'] = hidden.document(diagnosed)
     write_document(new / 'identification.json', document)
     staged.keep()
     if as_json:
         click.echo(json_text(document))
-    else:
-        show_story(told)
-        say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
+        return
+    _tell(document, found, online, offline)
+    steps.show_hidden(hidden, diagnosed)
+    say(f'Open {out / "report.html"} (model) and {out / "story" / "report.html"} (diagnosis).')
 
 
 def _tell(
-    document: dict[str, Any], online: Agreement, offline: Agreement, training: float
+    document: dict[str, Any], found: IdentificationResult, online: Agreement, offline: Agreement
 ) -> None:
+    """Print the grade, and how far both estimates are from the truth."""
+    say(f'{found.grade.upper()}: {found.graded.reasons[0]}')
     say(f'online:  {online.sentence()}')
     say(f'offline: {offline.sentence()}')
     say(
-        f'relative error of the torque {training:.2f} % (noise included); '
+        f'relative error of the torque {found.relative_error_percent:.2f} % (noise included); '
         f'{document["held_out"]:.2f} % against the true torque of another motion'
     )
-    say(
-        'playing the bag back repeats the online estimate (largest difference '
-        f'{document["replay_difference"]:.1g})'
+    difference = f'largest difference {document["replay_difference"]:.1g}'
+    say(f'playing the bag back repeats the online estimate ({difference})')
+
+
+def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> float:
+    """Return the error of the torque in a motion that was never run, in percent of the torque."""
+    from armid_ros.excitation import design, DesignSettings
+    from armid_ros.robots import collision_model
+    import numpy as np
+
+    settings = DesignSettings(period=10.0, starts=1, candidates=1, iterations=1, processes=1)
+    motion = design(arm, settings, rng, collision=collision_model(arm.robot)).excitation.motion(
+        100.0
+    )
+    tau = truth.torque(motion)
+    return float(100.0 * np.linalg.norm(arm.torque(motion) - tau) / np.linalg.norm(tau))
+
+
+def _page(
+    found: IdentificationResult, truth: ArmModel, history: list[Progress], target: FloatArray
+) -> str:
+    """Return report.html, with the truth and the convergence of the online estimate."""
+    from armid_ros.report.identification_report import Assessment, identification_report
+    from armid_ros.report.sections.convergence import convergence_section
+    import numpy as np
+
+    convergence = convergence_section(
+        np.array([now.t for now in history]),
+        np.array([now.estimate.values for now in history]),
+        np.array([now.estimate.std for now in history]),
+        target,
+        history[-1].estimate.parameters,
+    )
+    return identification_report(
+        found.core,
+        description=truth,
+        robot=truth.robot.name,
+        recordings=found.recordings,
+        validation={},
+        assessment=Assessment(grade=found.graded, reference='truth', sections=[convergence]),
     )

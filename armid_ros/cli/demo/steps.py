@@ -1,47 +1,52 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo does in order: a true arm, an excitation, a run over topics, figures."""
+"""The arm of the demo: its truth, its sensors, its runs over topics, and a hidden change."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
+from typing import Any
 
+from armid_ros.api.diagnosis import diagnose
+from armid_ros.api.table import ResultOrigin
 from armid_ros.arm import ArmModel
-from armid_ros.cli.terminal import progress
-from armid_ros.effects import make_effect
-from armid_ros.errors import ModelError, visible
-from armid_ros.estimate import Estimate
-from armid_ros.excitation import design, DesignSettings, Excitation
-from armid_ros.files import load_yaml, read_text
-from armid_ros.identification import Grade, Identification
-from armid_ros.identification.online.identifier import OnlineIdentifier
+from armid_ros.cli.terminal import progress, say
+from armid_ros.diagnosis import Diagnosis
+from armid_ros.effects import Effect, make_effect, parse_effect
+from armid_ros.errors import ModelError
+from armid_ros.excitation import Excitation, Limits, random_feasible
+from armid_ros.files import load_yaml, read_text, settled
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.lockstep import Progress, run_lockstep
-from armid_ros.recording import Recording
-from armid_ros.report import identification_report
-from armid_ros.report.identification_report import Assessment
-from armid_ros.report.sections.convergence import Convergence
+from armid_ros.nodes.lockstep import record_lockstep
+from armid_ros.recording import read_recording, Recording
+from armid_ros.report.notation import digits, pretty
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
 import numpy as np
-from rich.console import Console
-from rich.live import Live
-from rich.table import Table
-from rich.text import Text
 
 ROBOT = 'humanoid_arm'
 SENSORS = Sensors(
     torque_noise=np.array([0.02, 0.02, 0.01, 0.01, 0.004, 0.004]), resolution=2.0 * np.pi / 2**18
 )
+#: A run with the hidden change: seconds of a period, and harmonics.
+_PERIOD, _HARMONICS = 8.0, 5
+_RUNS = ('after_1', 'after_2', 'unused')
+#: Values of the hidden effect that are printed.
+_SHOWN = 4
+
+
+def _facts() -> dict[str, Any]:
+    found: dict[str, Any] = load_yaml(
+        read_text(shipped_path(ROBOT).with_name('demo.yaml'), ModelError)
+    )
+    return found
 
 
 def true_arm(robot: Robot) -> ArmModel:
     """Return the arm that is to be identified: other masses than described, and friction."""
-    path = shipped_path(ROBOT).with_name('demo.yaml')
-    true = load_yaml(read_text(path, ModelError))
+    true = _facts()
     factors = np.array(true['mass_factors'])[:, np.newaxis]
     parameters = robot.rigid_parameters.reshape(-1, 10) * factors
     arm = ArmModel(robot.with_inertias(parameters.ravel()))
@@ -50,114 +55,151 @@ def true_arm(robot: Robot) -> ArmModel:
     return arm
 
 
-def excite(arm: ArmModel, rng: np.random.Generator) -> Excitation:
-    """Design the excitation."""
-    settings = DesignSettings(period=10.0, harmonics=5, starts=2, candidates=20, iterations=40)
-    with progress('designing the excitation') as tick:
-        result = design(
-            arm,
-            settings,
-            rng,
-            collision=collision_model(arm.robot),
-            progress=lambda now: tick(now.done),
-        )
-    return result.excitation
-
-
-def run_online(
-    plant: SimulatedArm,
-    excitation: Excitation,
-    identifier: OnlineIdentifier,
-    target: FloatArray,
-    bag: Path,
-    rate: float,
-) -> tuple[list[Progress], Progress]:
-    """Move the arm and identify it online, in a table; return what was said, and the end."""
-    history: list[Progress] = []
-    with ConvergenceTable(target) as table:
-
-        def watch(now: Progress) -> None:
-            history.append(now)
-            table.show(now.t, now.duration, now.estimate, now.real_time_factor)
-
-        end = run_lockstep(plant, excitation, identifier, bag, rate=rate, on_progress=watch)
-    return history, end
-
-
-def held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) -> float:
-    """Return the error of the torque in a motion that was never run, in percent of the torque."""
-    settings = DesignSettings(period=10.0, starts=1, candidates=1, iterations=1, processes=1)
-    collision = collision_model(arm.robot)
-    motion = design(arm, settings, rng, collision=collision).excitation.motion(100.0)
-    tau = truth.torque(motion)
-    return float(100.0 * np.linalg.norm(arm.torque(motion) - tau) / np.linalg.norm(tau))
-
-
-def page(
-    result: Identification,
-    history: Sequence[Progress],
-    online_truth: FloatArray,
-    truth: ArmModel,
-    graded: Grade,
-    recording: Recording,
-) -> str:
-    """Return report.html, with the truth and the convergence of the online estimate."""
-    convergence = Convergence(
-        np.array([now.t for now in history]),
-        np.array([now.estimate.values for now in history]),
-        np.array([now.estimate.std for now in history]),
-        online_truth,
-        history[-1].estimate.parameters,
-    )
-    assessment = Assessment(grade=graded, reference='truth', sections=[convergence])
-    return identification_report(
-        result,
-        description=truth,
-        robot=truth.robot.name,
-        recordings=[recording],
-        validation={},
-        assessment=assessment,
-    )
-
-
-class ConvergenceTable:
+def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> HiddenChange:
     """
-    A live table of the last parameters, which are those of the effects.
+    Return what is hidden in the arm.
 
     Parameters
     ----------
-    truth : ndarray, shape (P,)
-        What the estimate should come to.
+    robot : Robot
+        The shipped arm.
+    rng : numpy.random.Generator
+        Draws one of the changes that are shipped.
+    hide : str
+        Which of them, as the beginning of 'effect@joint'; or any effect with its values, as for
+        ``armid simulate``.
+
+    Raises
+    ------
+    ModelError
+        If no shipped change begins so, and there are no values.
+
+    """
+    if ':' in hide:
+        return HiddenChange(*parse_effect(hide, robot))
+    known = [''.join(text.split()) for text in _facts()['hidden']]
+    fitting = [text for text in known if text.startswith(hide)]
+    if not fitting:
+        names = ', '.join(text.partition(':')[0] for text in known)
+        raise ModelError(f'--hide {hide}: give its values as E@joint:k=v, or one of {names}')
+    return HiddenChange(*parse_effect(str(rng.choice(fitting)), robot))
+
+
+@dataclass(frozen=True)
+class HiddenChange:
+    """
+    What the arm has and its model has not.
+
+    Attributes
+    ----------
+    effect : Effect
+        The effect, with its joint.
+    values : ndarray, shape (P,)
+        Its parameters.
 
     """
 
-    ROWS = 12
+    effect: Effect
+    values: FloatArray
 
-    def __init__(self, truth: FloatArray) -> None:
-        self._truth = truth
-        self._live = Live(console=Console(stderr=True), transient=True)
+    def sentence(self, arm: ArmModel) -> str:
+        """Return effect, joint and the first values that are not zero."""
+        shown = [
+            f'{name.name.replace("_", " ")} {digits(float(value), 3)} {pretty(name.unit)}'.rstrip()
+            for name, value in zip(self.effect.parameters(arm.robot), self.values, strict=True)
+            if value
+        ]
+        where = ', '.join(self.effect.joints) or 'the whole arm'
+        return f'{self.effect.name.replace("_", " ")} in {where} ({", ".join(shown[:_SHOWN])})'
 
-    def __enter__(self) -> Self:
-        """Begin to show."""
-        self._live.start()
-        return self
+    def found_by(self, diagnosis: Diagnosis) -> bool:
+        """Return whether the first name is that of the effect, and its joint."""
+        first = diagnosis.findings[:1]
+        named = self.effect.name, self.effect.joints
+        return any((one.name, one.joints) == named for one in first)
 
-    def __exit__(self, *error: object) -> None:
-        """Leave the terminal as it was."""
-        self._live.stop()
+    def document(self, diagnosis: Diagnosis) -> dict[str, Any]:
+        """Return what was hidden and found, for programs to read."""
+        gap, joints = diagnosis.gap, diagnosis.arm.robot.joints
+        return {
+            'hidden': {
+                'name': self.effect.name,
+                'joints': list(self.effect.joints),
+                'values': self.values.tolist(),
+            },
+            'verdict': diagnosis.verdict,
+            'summary': diagnosis.summary,
+            'found': self.found_by(diagnosis),
+            'gap': None
+            if gap is None
+            else {
+                'before': dict(zip(joints, gap.before.tolist(), strict=True)),
+                'after': dict(zip(joints, gap.after.tolist(), strict=True)),
+            },
+        }
 
-    def show(self, t: float, duration: float, estimate: Estimate, factor: float) -> None:
-        """Show the state at a time [s]."""
-        title = f'{t:.0f} of {duration:.0f} s, {factor:.1f} x real time'
-        table = Table(title=title, box=None, header_style='bold')
-        for head in ('parameter', 'joint', 'estimate', 'std', 'truth', 'unit'):
-            table.add_column(
-                head, justify='right' if head in ('estimate', 'std', 'truth') else 'left'
+
+def diagnose_hidden(
+    out: Path,
+    changed: ArmModel,
+    known: ArmModel,
+    baseline: Recording,
+    rng: np.random.Generator,
+    rate: float,
+) -> Diagnosis:
+    """
+    Record a changed arm over topics, and diagnose it with the model from before.
+
+    Parameters
+    ----------
+    out : Path
+        Folder to fill.
+    changed : ArmModel
+        The arm with the hidden change.
+    known : ArmModel
+        The model that was identified.
+    baseline : Recording
+        What it was identified from.
+    rng : numpy.random.Generator
+        Draws motions and noise.
+    rate : float
+        Joint states per second.
+
+    """
+    limits, bodies, recordings = Limits.of(known.robot), collision_model(known.robot), []
+    for name in _RUNS:
+        drawn = random_feasible(known, limits, _PERIOD, _HARMONICS, rng, collision=bodies)
+        plant = SimulatedArm(changed, rng=rng, sensors=SENSORS)
+        with progress(f'recording {name}') as tick:
+            record_lockstep(
+                plant, Excitation(drawn, 2, 1.0), out / name, rate=rate, on_progress=tick
             )
-        for k in range(len(self._truth))[-self.ROWS :]:
-            name = estimate.parameters[k]
-            numbers = (estimate.values[k], estimate.std[k], self._truth[k])
-            texts = [f'{number:.4f}' for number in numbers]
-            cells = (name.name, name.joint, *texts, name.unit)
-            table.add_row(*(Text(visible(cell)) for cell in cells))
-        self._live.update(table)
+        recording = read_recording(out / name, joints=known.robot.joints)
+        recordings.append(replace(recording, source=str(settled(out / name))))
+    with progress('diagnosing') as tick:
+        found = diagnose(
+            known,
+            recordings[:-1],
+            validate=recordings[-1:],
+            baseline=[baseline],
+            rng=rng,
+            progress=tick,
+        )
+        found.fill(out, ResultOrigin(known.robot.name, known.robot.name))
+    return found.core
+
+
+def show_hidden(hidden: HiddenChange, found: Diagnosis) -> None:
+    """Print the diagnosis, what it did for the held-out run, and what was hidden."""
+    say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
+    say(f'{found.verdict.replace("_", " ").upper()}: {found.summary}')
+    gap, arm = found.gap, found.arm
+    if gap is not None:
+        worst = int(np.argmax(gap.chi2_before))
+        say(
+            f'Held-out run: the error of {arm.robot.joints[worst]} is '
+            f'{digits(float(gap.before[worst]))} N m, and {digits(float(gap.after[worst]))} N m '
+            'with the named effect.'
+        )
+    rank = 'found it' if hidden.found_by(found) else 'did not rank it first'
+    say(f'Hidden was: {hidden.sentence(arm)}. The diagnosis {rank}.')

@@ -10,14 +10,13 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.diagnose import partner as partner_options
-from armid_ros.cli.terminal import print_rows, progress, say
+from armid_ros.cli.terminal import progress, say, Tick
 from armid_ros.errors import ArmidError
 import click
 
 if TYPE_CHECKING:
     from armid_ros.api.diagnosis import DiagnosisResult
     from armid_ros.arm import ArmModel
-    from armid_ros.diagnosis import Diagnosis, Finding
     from armid_ros.robots import Robot
 
 
@@ -185,22 +184,32 @@ def diagnose(
         )
         result.fill(staged.folder, origin)
         staged.keep()
-        if residual is not None:
-            tick(1.0, 'learning the residual')
-            result = result.with_residual(seed)
-        result = result.with_simulations(tick)
-        tick(1.0, 'next run')
-        result = result.with_next_run(seed)
+        result = _with_extras(result, residual is not None, seed, tick)
         tick(1.0, 'writing')
         document = result.fill(staged.folder, origin)
         staged.keep()
     if as_json:
         click.echo(json_text(document))
     else:
-        show(result.core)
-        _show_extras(out, result)
+        for line in result.summary().full_text():
+            say(line)
+        for step in result.extras.steps(result.core, str(out / 'model.yaml')):
+            say(f'next: {step}')
+        say(f'{out}: {", ".join(result.files)}')
     stopped = {'bad_data': 2, **({'unknown': 3, 'not_repeatable': 3} if strict else {})}
     click.get_current_context().exit(stopped.get(result.verdict, 0))
+
+
+def _with_extras(
+    result: DiagnosisResult, residual: bool, seed: int, tick: Tick
+) -> DiagnosisResult:
+    """Learn the residual where that is wanted, simulate, and plan the next run."""
+    if residual:
+        tick(1.0, 'learning the residual')
+        result = result.with_residual(seed)
+    result = result.with_simulations(tick)
+    tick(1.0, 'next run')
+    return result.with_next_run(seed)
 
 
 def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
@@ -241,74 +250,3 @@ def _model_of(path: Path, robot: Robot) -> ArmModel:
             f'{robot.name}; give --robot the one that it names, or identify this arm'
         )
     return arm
-
-
-def show(result: Diagnosis) -> None:
-    """Print the sentence first, then the values, then the small print."""
-    from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
-
-    say(f'{result.verdict.replace("_", " ").upper()}: {result.summary}')
-    if result.findings:
-        for group in by_cause(result.findings):
-            share = share_in_words(group[0], interval=True)
-            together = ', together' if len(group) > 1 else ''
-            say(f'  {names_and_places(group)}: {share}{together}')
-        rows = [row for finding in result.findings for row in _rows(finding)]
-        print_rows(rows, as_json=False, right=('value, 95 %',))
-    if result.minor:
-        say('minor effects: statistically significant, but negligible or not confirmed')
-        share = 'share of the gap' if result.findings else 'share of what is left'
-        rows = [_minor(finding, share) for finding in result.minor]
-        print_rows(rows, as_json=False, right=(share, 'p'))
-    if result.verdict == 'consistent':
-        say('note: how large each effect has to be to be seen is in report.html')
-    for note in result.notes:
-        say(f'note: {note}')
-
-
-def _rows(finding: Finding) -> list[dict[str, str]]:
-    """Return a row for every value whose interval excludes zero."""
-    from armid_ros.identification.fitting.identifiability import excludes_zero
-    from armid_ros.report.notation import value_of
-
-    every = list(zip(finding.parameters, finding.values, finding.std, strict=True))
-    values = [row for row in every if excludes_zero(row[1], row[2])] or every
-    return [
-        {
-            'effect': '' if number else finding.name.replace('_', ' '),
-            'joint': finding.place_of(name.joint) or 'whole arm',
-            'parameter': name.name.replace('_', ' '),
-            'value, 95 %': value_of(finding, name, value, std),
-        }
-        for number, (name, value, std) in enumerate(values)
-    ]
-
-
-def _minor(finding: Finding, share: str) -> dict[str, str]:
-    from armid_ros.report.notation import percent, probability
-
-    return {
-        'effect': finding.name.replace('_', ' '),
-        'joints': ', '.join(finding.joints) or 'whole arm',
-        share: percent(finding.share),
-        'p': probability(finding.p),
-    }
-
-
-def _show_extras(out: Path, result: DiagnosisResult) -> None:
-    from armid_ros.diagnosis import EXPERIMENT_FILE
-    from armid_ros.residual import TABLE_FILE
-
-    extras = result.extras
-    for sentence in () if extras.residual is None else extras.residual.sentences():
-        say(sentence)
-    for pair in extras.forward:
-        say(pair.sentence())
-    for note in extras.notes:
-        say(f'note: {note}')
-    files = ['diagnosis.json', 'model.yaml', 'report.html']
-    files += [] if extras.residual is None else [TABLE_FILE]
-    files += [] if extras.next_run is None else [EXPERIMENT_FILE]
-    for step in extras.steps(result.core, str(out / 'model.yaml')):
-        say(f'next: {step}')
-    say(f'{out}: {", ".join(files)}')

@@ -97,14 +97,14 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     type=click.Choice(list(CRITERIA)),
     default='D',
     show_default=True,
-    help='; '.join(f'{name}: {what}' for name, what in CRITERIA.items()),
+    help='. '.join(f'{name}: {what}' for name, what in CRITERIA.items()),
 )
 @click.option(
     '--target',
     type=click.Choice(list(TARGETS)),
     default='all',
     show_default=True,
-    help='; '.join(f'{name}: {what}' for name, what in TARGETS.items()),
+    help='. '.join(f'{name}: {what}' for name, what in TARGETS.items()),
 )
 @click.option(
     '--focus',
@@ -163,7 +163,7 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @click.option(
     '--floor',
     metavar='Z|none',
-    help='Height of the floor above the origin of the base [m]; without it and without '
+    help='Height of the floor above the origin of the base [m]. By default, without '
     '--environment, the base plane of an arm that stands.',
 )
 @click.option(

@@ -272,21 +272,6 @@
     }
   });
 
-  function matrix(figure) {
-    const {labels, percent} = JSON.parse(figure.querySelector('script').textContent);
-    const image = figure.querySelector('img');
-    const output = figure.querySelector('output');
-    const read = (event) => {
-      const box = image.getBoundingClientRect();
-      const entry = (part) => Math.min(labels.length - 1, Math.max(0, Math.floor(part * labels.length)));
-      const row = entry((event.clientY - box.top) / box.height);
-      const column = entry((event.clientX - box.left) / box.width);
-      output.textContent = `${labels[row]} and ${labels[column]}: ${(percent[row][column] / 100).toFixed(2)}`;
-    };
-    image.addEventListener('pointermove', read);
-    image.addEventListener('pointerdown', read);
-  }
-
   function drawAll() {
     const started = performance.now();
     document.querySelectorAll('figure.chart').forEach(draw);
@@ -299,23 +284,45 @@
     charts.forEach(({plot}) => plot.redraw(false, true));
   };
 
-  let closed = [];
   window.addEventListener('beforeprint', () => {
-    closed = [...document.querySelectorAll('details:not([open])')];
-    closed.forEach((details) => { details.open = true; });
     root.classList.add('paper');
-    readColours();
-    drawAll();
     repaint();
   });
   window.addEventListener('afterprint', () => {
-    closed.forEach((details) => { details.open = false; });
     root.classList.remove('paper');
     repaint();
   });
+
+  // A button below each table copies it as CSV; a field above those of parameters filters rows.
+  const csv = (table) => [...table.rows].map((row) => [...row.cells].map(
+    (cell) => `"${cell.innerText.trim().replace(/"/g, '""')}"`).join(',')).join('\n');
+
+  function addCopy(table) {
+    const button = document.createElement('button');
+    Object.assign(button, {type: 'button', className: 'tool', textContent: 'copy as CSV'});
+    button.addEventListener('click', async () => {
+      await navigator.clipboard.writeText(csv(table));
+      button.textContent = 'copied';
+    });
+    table.parentElement.after(button);
+  }
+
+  function addFilter(section) {
+    const field = document.createElement('input');
+    Object.assign(field, {type: 'search', className: 'tool', placeholder: 'filter parameters'});
+    field.setAttribute('aria-label', 'Filter parameters');
+    field.addEventListener('input', () => {
+      for (const row of section.querySelectorAll('table.parameters tbody tr')) {
+        row.hidden = !row.innerText.toLowerCase().includes(field.value.toLowerCase());
+      }
+    });
+    section.querySelector('details').before(field);
+  }
+
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
   document.querySelectorAll('details').forEach((details) => details.addEventListener('toggle', drawAll));
-  document.querySelectorAll('figure.matrix').forEach(matrix);
+  document.querySelectorAll('.scroll > table').forEach(addCopy);
+  document.querySelectorAll('section:has(table.parameters)').forEach(addFilter);
   readColours();
   drawAll();
 })();

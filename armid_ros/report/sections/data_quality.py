@@ -4,131 +4,121 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from collections.abc import Collection, Mapping, Sequence
 
 from armid_ros.identification import Fit
 from armid_ros.identification.rows.period import exact_period
 from armid_ros.recording import Recording
-from armid_ros.report.notation import digits, torque_unit
-from armid_ros.report.page import Section
+from armid_ros.report.blocks import (
+    BulletList,
+    ContentSection,
+    DataTable,
+    Fold,
+    PageBlock,
+    Paragraph,
+    TableCell,
+)
+from armid_ros.report.notation import digits, plain
 from armid_ros.report.repeatability import Repeatability
+from armid_ros.report.sources import with_names
 from armid_ros.robots import Robot
 import numpy as np
 
+#: Steps longer than this many periods are gaps, and no jitter.
+_GAP = 5.0
+#: Share of the residual that repeats, from which a better model would help [%].
+_TELLING = 50.0
 
-@dataclass(frozen=True)
-class RecordingQuality:
+
+def data_quality_section(
+    read: Sequence[tuple[Recording, str, Sequence[Fit]]],
+    robot: Robot | None = None,
+    at_fault: Collection[str] = (),
+    names: Mapping[str, str] | None = None,
+) -> ContentSection:
     """
-    One recording in numbers.
+    Return rate, gaps and repairs of every recording.
 
-    Attributes
+    Parameters
     ----------
-    source, role : str
-        Which, and what it was used for.
-    duration : float
-        [s].
-    rate : float
-        Samples per second [Hz].
-    jitter : float
-        Standard deviation of the time between samples, as a share of it, holes left out.
-    longest_gap : float
-        Longest time between two samples [s].
-    clock : str
-        Whose time it is.
-    description : str
-        What reading it met.
-    clean : bool
-        Whether that was nothing.
-    repeatability : Repeatability or None
-        What its periods differ by; None where nothing repeats.
-
-    """
-
-    source: str
-    role: str
-    duration: float
-    rate: float
-    jitter: float
-    longest_gap: float
-    clock: str
-    description: str
-    clean: bool
-    repeatability: Repeatability | None
-
-    @staticmethod
-    def of(recording: Recording, role: str, fits: Sequence[Fit] = ()) -> RecordingQuality:
-        """Measure a recording."""
-        steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
-        period = recording.period or 1.0
-        ordinary = steps[steps < 5.0 * period]
-        return RecordingQuality(
-            source=recording.source or 'in memory',
-            role=role,
-            duration=recording.duration,
-            rate=1.0 / period,
-            jitter=float(np.std(ordinary) / period) if len(ordinary) else 0.0,
-            longest_gap=float(steps.max()),
-            clock=recording.clock,
-            description=recording.report.describe(),
-            clean=recording.report.unharmed,
-            repeatability=_repeatability(recording, fits),
-        )
-
-
-@dataclass(frozen=True)
-class DataQuality(Section):
-    """
-    Rate, gaps and repairs of every recording.
-
-    Attributes
-    ----------
-    recordings : sequence of RecordingQuality
-        Training data first.
-    robot : Robot or None
+    read : sequence of (Recording, str, sequence of Fit)
+        Each with what it was used for, and its fits.
+    robot : Robot, optional
         Gives joints and units, where repeatability is shown.
     at_fault : collection of str
-        Sources of what the verdict is that it is at fault, however well it was read.
+        Names of recordings that the verdict calls faulty, however well they were read.
+    names : mapping of str to str, optional
+        What recordings are called.
 
     """
-
-    title: ClassVar[str] = 'Data quality'
-    template: ClassVar[str] = 'data_quality.html'
-
-    recordings: Sequence[RecordingQuality]
-    robot: Robot | None = None
-    at_fault: Collection[str] = ()
-
-    @property
-    def repeating(self) -> list[tuple[str, float, list[tuple[str, str, str, float]]]]:
-        """Return recording, period, per joint what varies, the residual, what repeats of it."""
-        if self.robot is None:
-            return []
-        return [
-            (recording.source, recording.repeatability.period, _rows(recording, self.robot))
-            for recording in self.recordings
-            if recording.repeatability is not None
-        ]
-
-
-def _repeatability(recording: Recording, fits: Sequence[Fit]) -> Repeatability | None:
-    """Compare periods of the rows of a fit; how long one is, the recording tells better."""
-    found = Repeatability.of(fits) if fits else None
-    if found is None:
-        return None
-    return replace(found, period=exact_period(recording, found.period))
-
-
-def _rows(recording: RecordingQuality, robot: Robot) -> list[tuple[str, str, str, float]]:
-    given = recording.repeatability
-    assert given is not None
-    return [
-        (
-            joint,
-            f'{digits(given.varying[k])} {torque_unit(robot, k)}',
-            f'{digits(given.residual[k])} {torque_unit(robot, k)}',
-            100.0 * float(given.repeating_share[k]),
+    names = names or {}
+    rows, notes = [], []
+    for recording, role, _ in read:
+        source = names.get(recording.source, recording.source) or 'in memory'
+        steps = np.diff(recording.t) if len(recording) > 1 else np.zeros(1)
+        period = recording.period or 1.0
+        ordinary = steps[steps < _GAP * period]
+        rows.append(
+            (
+                source,
+                role,
+                f'{recording.duration:.1f} s',
+                f'{plain(1.0 / period, 4)} Hz',
+                f'{100 * float(np.std(ordinary) / period) if len(ordinary) else 0.0:.1f} %',
+                f'{plain(1e3 * float(steps.max()))} ms',
+                recording.clock,
+            )
         )
-        for k, joint in enumerate(robot.joints)
-    ]
+        said = with_names(recording.report.describe(), names)
+        clean, faulty = recording.report.unharmed, source in at_fault
+        if clean:
+            said += ' The recorded signals are at fault: see the verdict.' * faulty or (
+                ' Nothing dropped, nothing repaired.'
+            )
+        notes.append((f'{source}: {said}', 'fine' if clean and not faulty else 'warn'))
+    heads = ('Recording', 'Used for', 'Duration', 'Rate', 'Jitter', 'Longest step', 'Clock')
+    blocks: list[PageBlock] = [DataTable(heads, rows, (0, 1, 6)), BulletList(notes)]
+    if robot is not None:
+        blocks += _repeatability(read, robot)
+    return ContentSection('Data quality', blocks)
+
+
+def _repeatability(
+    read: Sequence[tuple[Recording, str, Sequence[Fit]]], robot: Robot
+) -> list[PageBlock]:
+    folds: list[PageBlock] = []
+    for recording, _, fits in read:
+        found = Repeatability.of(fits) if fits else None
+        if found is None:
+            continue
+        rows = []
+        for k, joint in enumerate(robot.joints):
+            share, unit = 100.0 * float(found.repeating_share[k]), robot.torque_units[k]
+            rows.append(
+                (
+                    joint,
+                    f'{digits(found.varying[k])} {unit}',
+                    f'{digits(found.residual[k])} {unit}',
+                    TableCell(f'{share:.0f} %', 'telling' if share > _TELLING else ''),
+                )
+            )
+        period = exact_period(recording, found.period)
+        source = recording.source or 'in memory'
+        folds.append(
+            Fold(
+                f'Repeatability: {source} repeats after {period:.2f} s',
+                [
+                    Paragraph(
+                        'The difference between two periods is noise. The part of the residual '
+                        'that repeats is not noise; a better model could explain it.'
+                    ),
+                    DataTable(('Joint', 'Not repeatable', 'Residual', 'Repeatable share'), rows),
+                ],
+                opened=not folds,
+            )
+        )
+    unknown = Paragraph(
+        'Repeatability: unknown, because no recording repeats its motion. Record two periods of '
+        'one excitation to separate noise from model error.'
+    )
+    return folds or [unknown]

@@ -1,112 +1,125 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The short sections of the page of a diagnosis: what was named, and where it shows."""
+"""The short sections of a diagnosis: what was named, where it shows, what else was tried."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 import math
-from typing import ClassVar
 
 from armid_ros.diagnosis import Diagnosis, Finding
+from armid_ros.diagnosis.search.patch import room
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.blocks import (
+    BulletList,
+    ContentSection,
+    DataTable,
+    Fold,
+    PageBlock,
+    Panels,
+    Paragraph,
+    TableCell,
+)
 from armid_ros.report.charts import Chart, Series
-from armid_ros.report.notation import digits, percent, pretty, probability, value_of
-from armid_ros.report.page import Section
+from armid_ros.report.notation import (
+    counted,
+    digits,
+    percent,
+    pretty,
+    probability,
+    value_of,
+    with_interval,
+)
+import numpy as np
 
-#: Joints that are shown.
-_MOST = 3
+#: Joints that are shown, and candidates.
+_JOINTS, _CANDIDATES = 3, 15
 #: Share of the power of a residual from which on its mean is said to be taken off.
 _MEAN_SAID = 0.005
+#: Standard deviations by which a value has to differ from zero, and from what is possible.
+_SIGNIFICANT = 3.0
 
 
-@dataclass(frozen=True)
-class Shares(Section):
+def shares_section(diagnosis: Diagnosis) -> ContentSection:
+    """Return the share of the held-out gap that each cause explains, and the rest."""
+    rows, taken = [], 0.0
+    for group in by_cause(diagnosis.findings):
+        one = group[0]
+        where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
+        names = ' and '.join(other.name.replace('_', ' ') for other in group)
+        share = max(one.share, 0.0)
+        taken += share
+        text = percent(one.share) + share_interval_in_words(one)
+        rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
+    rest = max(1.0 - taken, 0.0)
+    rows.append(('unexplained (noise included)', [Bar(rest, 'floor', percent(rest))]))
+    held_out = diagnosis.gap is not None and diagnosis.gap.predicted
+    data = 'on parts of the recordings, each predicted from the others'
+    return ContentSection(
+        'What explains the gap',
+        [
+            Paragraph(
+                'Share of the gap that each cause explains '
+                f'{"on recordings that were not used" if held_out else data}, with 95 % '
+                'intervals (block bootstrap). The gap is the sum of squared residuals without the '
+                'causes, each joint in units of its floor. Noise is part of the gap, so no cause '
+                'explains all of it.'
+            ),
+            BarChart(rows, '', full=1.0),
+        ],
+    )
+
+
+def named_rows(
+    findings: Sequence[Finding], certain: bool = False
+) -> list[tuple[str, str, str, str]]:
     """
-    Shares of the held-out gap.
+    Return effect, parameter, joint and value with its 95 % interval of what was named.
 
-    Attributes
-    ----------
-    diagnosis : Diagnosis
-        What was found; something was.
-
-    """
-
-    title: ClassVar[str] = 'What explains the gap'
-    template: ClassVar[str] = 'shares.html'
-
-    diagnosis: Diagnosis
-
-    @property
-    def bars(self) -> BarChart:
-        """One bar a cause, and one for the rest, in per cent of the gap."""
-        rows, taken = [], 0.0
-        for group in by_cause(self.diagnosis.findings):
-            one = group[0]
-            where = ', '.join(one.place_of(joint) for joint in one.joints) or 'whole arm'
-            names = ' and '.join(other.name.replace('_', ' ') for other in group)
-            text = percent(one.share) + share_interval_in_words(one)
-            share = max(one.share, 0.0)
-            taken += share
-            rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
-        rest = max(1.0 - taken, 0.0)
-        rows.append(('unexplained (noise included)', [Bar(rest, 'floor', percent(rest))]))
-        return BarChart(rows, '', full=1.0)
-
-    @property
-    def data(self) -> str:
-        """Return what the shares were measured on."""
-        gap = self.diagnosis.gap
-        if gap is not None and gap.predicted:
-            return 'on recordings that were not used'
-        return 'on parts of the recordings, each predicted from the others'
-
-
-@dataclass(frozen=True)
-class NamedParameters(Section):
-    """
-    Values with 95 % intervals.
-
-    Attributes
+    Parameters
     ----------
     findings : sequence of Finding
-        What was named.
+        The effects.
+    certain : bool
+        Whether values whose interval includes zero are left out, where an effect has others.
 
     """
-
-    title: ClassVar[str] = 'Parameters'
-    template: ClassVar[str] = 'named.html'
-
-    findings: Sequence[Finding]
-
-    @property
-    def rows(self) -> list[tuple[str, str, str, str]]:
-        """Effect, parameter, joint or segment, and value with its interval, as text."""
-        return [
+    rows = []
+    for finding in findings:
+        values = list(zip(finding.parameters, finding.values, finding.std, strict=True))
+        if certain:
+            values = [row for row in values if excludes_zero(row[1], row[2])] or values
+        rows += [
             (
                 finding.name.replace('_', ' '),
                 name.words,
                 finding.place_of(name.joint) or 'whole arm',
                 value_of(finding, name, value, std),
             )
-            for finding in self.findings
-            for name, value, std in zip(
-                finding.parameters, finding.values, finding.std, strict=True
-            )
+            for name, value, std in values
         ]
+    return rows
 
 
-@dataclass(frozen=True)
-class EvidenceSection(Section):
+def named_section(findings: Sequence[Finding]) -> ContentSection:
+    """Return the values of what was named, with 95 % intervals."""
+    heads = ('Effect', 'Parameter', 'Joint', 'Value, 95 %')
+    return ContentSection(
+        'Parameters', [DataTable(heads, named_rows(findings), (0, 1, 2), 'both')]
+    )
+
+
+def evidence_section(places: Sequence[Where], share_of: str = 'the gap') -> ContentSection:
     """
-    Residuals without what was named.
+    Return the residuals without what was named, in the worst joints.
 
-    Attributes
+    Parameters
     ----------
     places : sequence of Where
         Joints, the worst first.
@@ -114,162 +127,182 @@ class EvidenceSection(Section):
         What their shares are of.
 
     """
-
-    title: ClassVar[str] = 'Where it shows'
-    template: ClassVar[str] = 'evidence.html'
-
-    places: Sequence[Where]
-    share_of: str = 'the gap'
-
-    @property
-    def shown(self) -> Sequence[Where]:
-        """Return the worst joints."""
-        return self.places[:_MOST]
-
-    def taken_off(self, place: Where) -> str:
-        """Say which mean the curves are without; empty where it is next to nothing."""
-        if not place.axes or place.mean_share < _MEAN_SAID:
-            return ''
-        return (
-            f'The mean of the residual, {digits(place.mean)} {place.unit} or '
-            f'{percent(place.mean_share)} of its power, is subtracted; shares are of the rest.'
-        )
-
-    def charts(self, place: Where) -> list[tuple[str, Chart]]:
-        """Return a caption and a chart per quantity; the mean, common to all, is taken off."""
-        varies = max(1.0 - place.mean_share, 1e-9)
-        return [
-            (
-                f'{axis.name}: {percent(max(axis.share - place.mean_share, 0.0) / varies)} of the '
-                'power',
-                Chart(
-                    axis.centres,
-                    [Series('mean residual', axis.means - place.mean, 'before', 'trend')],
-                    f'{axis.name} [{pretty(axis.unit)}]',
-                    f'residual [{place.unit}]',
-                    height=170,
-                    symmetric=True,
-                    legend=False,
-                ),
+    folds = []
+    for number, place in enumerate(places[:_JOINTS]):
+        blocks: list[PageBlock] = []
+        if place.axes and place.mean_share >= _MEAN_SAID:
+            blocks.append(
+                Paragraph(
+                    f'The mean of the residual, {digits(place.mean)} {place.unit} or '
+                    f'{percent(place.mean_share)} of its power, is subtracted; shares are of the '
+                    'rest.'
+                )
             )
-            for axis in place.axes
-        ]
+        varies = max(1.0 - place.mean_share, 1e-9)
+        panels = []
+        for axis in place.axes:
+            share = percent(max(axis.share - place.mean_share, 0.0) / varies)
+            chart = Chart(
+                axis.centres,
+                [Series('mean residual', axis.means - place.mean, 'before', 'trend')],
+                f'{axis.name} [{pretty(axis.unit)}]',
+                f'residual [{place.unit}]',
+                height=170,
+                symmetric=True,
+                legend=False,
+            )
+            panels.append((f'{axis.name}: {share} of the power', '', [chart]))
+        share = f'{100 * place.share_of_gap:.0f} % of {share_of}'
+        folds.append(
+            Fold(
+                f'{place.joint}: {share}, {place.signature}',
+                [*blocks, Panels(panels)],
+                opened=number == 0,
+            )
+        )
+    return ContentSection('Where it shows', folds)
 
 
-@dataclass(frozen=True)
-class SmallPrint(Section):
+def minor_section(minor: Sequence[Finding], patched: bool, named: bool) -> ContentSection:
     """
-    Minor effects.
+    Return the effects that are significant, and negligible or not confirmed.
 
-    Attributes
+    Parameters
     ----------
     minor : sequence of Finding
-        What is there beyond chance, and too small or not borne out by other data.
+        The effects.
     patched : bool
-        Whether it was added to the model all the same.
+        Whether they were added to the model all the same.
     named : bool
         Whether the headline names anything.
 
     """
+    rows = [
+        (
+            one.name.replace('_', ' '),
+            ', '.join(one.joints) or 'whole arm',
+            value_of(one, one.parameters[0], one.values[0], one.std[0]) if one.values else '',
+            percent(one.share),
+            probability(one.p),
+        )
+        for one in minor
+    ]
+    share = 'Share of the gap' if named else 'Share of the remaining error'
+    outside = '' if patched else ' None of them is in model.yaml.'
+    return ContentSection(
+        'Minor effects',
+        [
+            Paragraph(
+                'Statistically significant but negligible, or not confirmed by held-out data.'
+                f'{outside} A value may stand for another effect with a similar torque.'
+            ),
+            DataTable(('Effect', 'Joints', 'Value, 95 %', share, 'p'), rows, (0, 1)),
+        ],
+    )
 
-    title: ClassVar[str] = 'Minor effects'
-    template: ClassVar[str] = 'small_print.html'
 
-    minor: Sequence[Finding]
-    patched: bool = False
-    named: bool = False
+def detectable_section(sizes: Sequence[Detectable]) -> ContentSection:
+    """Return the smallest detectable size of every effect, where it shows best and worst."""
 
-    @property
-    def share(self) -> str:
-        """Head of the column of shares: no gap is open where nothing was named."""
-        return 'Share of the gap' if self.named else 'Share of the remaining error'
+    def place(one: Detectable) -> str:
+        return ', '.join(one.joints) or 'the arm'
 
-    @property
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """Effect, joints, first value, share and p, as text."""
-        return [
-            (
-                one.name.replace('_', ' '),
-                ', '.join(one.joints) or 'whole arm',
-                value_of(one, one.parameters[0], one.values[0], one.std[0]) if one.values else '',
-                percent(one.share),
-                probability(one.p),
+    def size(one: Detectable) -> str:
+        unit = '' if one.parameter is None else pretty(one.parameter.unit)
+        where = f' in {place(one)}' if one.joints else ''
+        return f'{digits(one.size)} {unit}'.strip() + where
+
+    rows = []
+    for name in dict.fromkeys(one.name for one in sizes):
+        own = [one for one in sizes if one.name == name]
+        finite = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
+        best, worst = (size(finite[0]), size(finite[-1])) if finite else ('', '')
+        never = '; '.join(place(s) for s in own if not math.isfinite(s.size))
+        rows.append((name.replace('_', ' '), best, worst if worst != best else '', never))
+    heads = (
+        'Effect',
+        'Detectable from',
+        'At the worst joint from',
+        'Not detectable with this motion in',
+    )
+    return ContentSection(
+        'Smallest detectable effects',
+        [
+            Paragraph(
+                'An unnamed effect may exist if it is smaller than this. The limit is five '
+                'standard deviations of its value, at a torque above the misfit of the model.'
+            ),
+            Fold(f'Sizes of {len(rows)} effects', [DataTable(heads, rows, (0, 1, 2, 3))]),
+        ],
+    )
+
+
+def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:
+    """Return what was added to the model, with the effects of the text of model.yaml."""
+    start, end = max(text.find('effects:'), 0), text.find('\nmisfit:')
+    yaml = text[start:end] if end > start else text[start:]
+    own = 'an effect of your own'
+    added = [
+        (f'{f.name}: {CATALOGUE[f.name].summary if f.name in CATALOGUE else own}', '')
+        for f in findings
+    ]
+    line = 'Effects of model.yaml, which armid simulate --model reads'
+    return ContentSection('Patch', [BulletList(added), Fold(line, [Paragraph(yaml, 'code')])])
+
+
+def candidates_section(diagnosis: Diagnosis) -> ContentSection:
+    """Return what each cause alone would explain, in the order in which they were judged."""
+    explanation = diagnosis.explanation
+    survey = None if explanation is None else explanation.survey
+    names = {finding.name for finding in diagnosis.findings}
+    rows = [
+        (
+            TableCell(
+                trial.effect.name.replace('_', ' '),
+                'changed' if trial.effect.said_as in names else '',
+            ),
+            ', '.join(trial.effect.joints) or 'whole arm',
+            percent(trial.share),
+            f'{trial.gain / 2.0:.1f}',
+            _candidate_value(diagnosis, trial),
+            percent(trial.visible),
+        )
+        for trial in (() if survey is None else survey.ranking[:_CANDIDATES])
+    ]
+    if not rows:
+        nothing = Paragraph('No effect explains any of the residual.')
+        return ContentSection('Candidates', [nothing])
+    heads = ('Effect', 'Joints', 'Share', 'Evidence', 'Value, 95 %', 'Visible')
+    verb = 'was' if len(rows) == 1 else 'were'
+    return ContentSection(
+        'Candidates',
+        [
+            Fold(
+                f'{counted(len(rows), "cause")} that {verb} compared, the likeliest first',
+                [
+                    Paragraph(
+                        'Each cause alone, in its best shape. Share: what its torque has of the '
+                        'squared residual; similar causes explain the same part. Evidence: '
+                        'logarithm of how much likelier the data are with it than without. A '
+                        'value outside the possible range is no explanation.'
+                    ),
+                    DataTable(heads, rows, (0, 1)),
+                ],
             )
-            for one in self.minor
-        ]
+        ],
+    )
 
 
-@dataclass(frozen=True)
-class CouldBeSeen(Section):
-    """
-    Smallest sizes that show, by effect.
-
-    Attributes
-    ----------
-    sizes : sequence of Detectable
-        Of all effects on all joints, those of an effect together.
-
-    """
-
-    title: ClassVar[str] = 'Smallest detectable effects'
-    template: ClassVar[str] = 'could_be_seen.html'
-
-    sizes: Sequence[Detectable]
-
-    @property
-    def rows(self) -> list[tuple[str, str, str, str]]:
-        """Effect, size where it shows best and where worst, and where it does not, as text."""
-        rows = []
-        for name in dict.fromkeys(size.name for size in self.sizes):
-            own = [size for size in self.sizes if size.name == name]
-            told = sorted((s for s in own if math.isfinite(s.size)), key=lambda s: s.size)
-            best, worst = (_size(told[0]), _size(told[-1])) if told else ('', '')
-            never = '; '.join(_place(s) for s in own if not math.isfinite(s.size))
-            rows.append((name.replace('_', ' '), best, worst if worst != best else '', never))
-        return rows
-
-
-@dataclass(frozen=True)
-class PatchSection(Section):
-    """
-    What was added to the model, to be read and to be copied.
-
-    Attributes
-    ----------
-    findings : sequence of Finding
-        What was named.
-    text : str
-        model.yaml.
-
-    """
-
-    title: ClassVar[str] = 'Patch'
-    template: ClassVar[str] = 'patch.html'
-
-    findings: Sequence[Finding]
-    text: str
-
-    @property
-    def added(self) -> list[tuple[str, str]]:
-        """Name of each effect, and what it is."""
-        return [
-            (f.name, CATALOGUE[f.name].summary if f.name in CATALOGUE else 'an effect of your own')
-            for f in self.findings
-        ]
-
-    @property
-    def yaml(self) -> str:
-        """Return the effects of the patched model."""
-        start = max(self.text.find('effects:'), 0)
-        end = self.text.find('\nmisfit:')
-        return self.text[start:end] if end > start else self.text[start:]
-
-
-def _size(one: Detectable) -> str:
-    unit = '' if one.parameter is None else pretty(one.parameter.unit)
-    where = f' in {_place(one)}' if one.joints else ''
-    return f'{digits(one.size)} {unit}'.strip() + where
-
-
-def _place(one: Detectable) -> str:
-    return ', '.join(one.joints) or 'the arm'
+def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
+    """Return the first value, where it is one that the cause can have."""
+    arm, effect, kept = diagnosis.arm, trial.effect, list(trial.named.kept)
+    if diagnosis.explanation is not None:
+        arm = diagnosis.explanation.given
+    lower, upper = (bound[kept] for bound in room(effect, arm))
+    slack = _SIGNIFICANT * trial.std
+    if not np.all((trial.values > lower - slack) & (trial.values < upper + slack)):
+        return 'not possible'
+    if not np.any(np.abs(trial.values) > slack):
+        return 'includes 0'
+    name = effect.parameters(arm.robot)[kept[0]]
+    return with_interval(float(trial.values[0]), float(trial.std[0]), name.unit)

@@ -1,156 +1,140 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Measured against predicted torque."""
+"""Measured against predicted torque, and against predicted motion."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.identification import Fit, Score
+from armid_ros.identification.assess.verification import ForwardScore, ForwardValidation
 from armid_ros.motion import FloatArray
 from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    Fold,
+    PageBlock,
+    Panels,
+    Paragraph,
+)
 from armid_ros.report.charts import Chart, joined, joined_time, Role, Series, thinned
-from armid_ros.report.notation import digits, torque_unit
-from armid_ros.report.page import Section
+from armid_ros.report.notation import counted, digits
 from armid_ros.robots import Robot
 import numpy as np
 
+#: Fits by recording.
+Fits = Mapping[str, Sequence[Fit]]
 
-@dataclass(frozen=True)
-class JointCurves:
-    """One joint of one recording, drawn."""
-
-    name: str
-    summary: str
-    torque: Chart
-    residual: Chart
+ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to reset.'
 
 
-@dataclass(frozen=True)
-class ShownRecording:
-    """A recording whose curves are drawn."""
+def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
+    """Return fits by the recording that they are of."""
+    found: dict[str, list[Fit]] = {}
+    for fit in fits:
+        found.setdefault(fit.source, []).append(fit)
+    return found
 
-    source: str
-    role: str
-    joints: Sequence[JointCurves]
+
+def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
+    """Return the relative error of each joint, held-out and training, the worst joint first."""
+    groups: list[tuple[Role, Fits, str]] = [
+        ('after', validation, 'held-out'),
+        ('faint', training, 'training'),
+    ]
+    scores = [
+        (role, label, Score.of([fit for part in fits.values() for fit in part]))
+        for role, fits, label in groups
+        if fits
+    ]
+    rows = []
+    for joint in _worst_first(scores[0][2]):
+        unit = robot.torque_units[joint]
+        bars = []
+        for role, _, score in scores:
+            error = float(score.joint_relative_error_percent[joint])
+            bars.append(Bar(error, role, f'{digits(error)} % ({digits(score.rms[joint])} {unit})'))
+        rows.append((robot.joints[joint], bars))
+    return BarChart(
+        rows,
+        '%',
+        [
+            (role, f'{label} error: rms of residual over rms of torque')
+            for role, label, _ in scores
+        ],
+    )
 
 
-@dataclass(frozen=True)
-class JointErrors(Section):
+def fit_section(
+    robot: Robot, training: Fits, validation: Fits, reach: FloatArray
+) -> ContentSection:
     """
-    How large the errors are, without a curve.
+    Return how well a model predicts the torques, as curves.
 
-    Attributes
+    Parameters
     ----------
     robot : Robot
         Gives joints and units.
-    training : mapping of str to sequence of Fit
-        Data it was fitted to, by recording.
-    validation : mapping of str to sequence of Fit
-        Held-out data, by recording.
-
-    """
-
-    title: ClassVar[str] = 'Errors'
-    template: ClassVar[str] = 'joint_errors.html'
-
-    robot: Robot
-    training: Mapping[str, Sequence[Fit]]
-    validation: Mapping[str, Sequence[Fit]]
-
-    @property
-    def bars(self) -> BarChart:
-        """Relative error of each joint, held-out and training, the worst joint first."""
-        groups: list[tuple[Role, Mapping[str, Sequence[Fit]], str]] = [
-            ('after', self.validation, 'held-out'),
-            ('faint', self.training, 'training'),
-        ]
-        roles = [(role, label) for role, fits, label in groups if fits]
-        scores = [
-            (role, Score.of([fit for part in fits.values() for fit in part]))
-            for role, fits, _ in groups
-            if fits
-        ]
-        rows = []
-        for joint in _worst_first(scores[0][1]):
-            unit = torque_unit(self.robot, joint)
-            bars = [
-                Bar(
-                    float(score.joint_relative_error_percent[joint]),
-                    role,
-                    f'{digits(score.joint_relative_error_percent[joint])} % '
-                    f'({digits(score.rms[joint])} {unit} rms)',
-                )
-                for role, score in scores
-            ]
-            rows.append((self.robot.joints[joint], bars))
-        return BarChart(rows, '%', roles)
-
-
-@dataclass(frozen=True)
-class FitSection(JointErrors):
-    """
-    How well the model predicts the torques: `JointErrors` with curves.
-
-    Attributes
-    ----------
+    training, validation : mapping of str to sequence of Fit
+        Data that it was fitted to, and held-out data, by recording.
     reach : ndarray, shape (n,)
         Half width of the 95 % interval of the predicted torque [N m].
 
     """
-
-    title: ClassVar[str] = 'Fit'
-    template: ClassVar[str] = 'fit.html'
-
-    reach: FloatArray
-
-    @property
-    def certainty(self) -> str:
-        """Half width of the interval of every joint's torque in words."""
-        return ', '.join(
-            f'{name} ±{digits(self.reach[joint])} {torque_unit(self.robot, joint)}'
-            for joint, name in enumerate(self.robot.joints)
+    groups = {'held-out': validation, 'training': training}
+    certainty = ', '.join(
+        f'{name} ±{digits(value)} {unit}'
+        for name, value, unit in zip(robot.joints, reach, robot.torque_units, strict=True)
+    )
+    blocks: list[PageBlock] = [
+        Paragraph(
+            f'Uncertainty of the predicted torque from the parameters (95 %, rms over the '
+            f'motion): {certainty}. A larger residual is noise, or an effect that the model lacks.'
         )
-
-    @property
-    def errors(self) -> list[tuple[str, str, float]]:
-        """Return the recording, role and relative error [%], worst first within each role."""
-        rows = []
-        for role, group in (('held-out', self.validation), ('training', self.training)):
-            scored = [
-                (Score.of(fits).relative_error_percent, name) for name, fits in group.items()
-            ]
-            rows += [(name, role, error) for error, name in sorted(scored, reverse=True)]
-        return rows
-
-    @property
-    def rests(self) -> bool:
-        """Whether a joint is held by friction somewhere."""
-        groups = (*self.training.values(), *self.validation.values())
-        return not all(bool(fit.informative.all()) for fits in groups for fit in fits)
-
-    @property
-    def shown(self) -> list[ShownRecording]:
-        """Return the worst held-out recording, and the worst of the training data."""
-        chosen = []
-        for role, group in (('held-out', self.validation), ('training', self.training)):
-            if group:
-                worst = max(group, key=lambda name: Score.of(group[name]).relative_error_percent)
-                chosen.append(ShownRecording(worst, role, self._joints(worst, group[worst], role)))
-        return chosen
-
-    def _joints(self, source: str, fits: Sequence[Fit], role: str) -> list[JointCurves]:
-        score = Score.of(fits)
-        drawn = []
+    ]
+    errors = [
+        (name, role, error)
+        for role, group in groups.items()
+        for error, name in sorted(
+            ((Score.of(fits).relative_error_percent, name) for name, fits in group.items()),
+            reverse=True,
+        )
+    ]
+    several = len(errors) > 2
+    if several:
+        rows = [(name, role, f'{digits(error)} %') for name, role, error in errors]
+        table = DataTable(('Recording', 'Used for', 'Error'), rows, (0, 1))
+        blocks.append(Fold(f'{counted(len(errors), "recording")} one by one', [table]))
+    rests = not all(
+        bool(fit.informative.all())
+        for group in groups.values()
+        for fits in group.values()
+        for fit in fits
+    )
+    still = ' Grey residual: static friction holds the joint, and the sample does not count.'
+    hint = Paragraph(ZOOM + still * rests, 'hint')
+    for role, group in groups.items():
+        if not group:
+            continue
+        worst = next(name for name, own, _ in errors if own == role)
+        score = Score.of(group[worst])
+        panels = []
         for joint in _worst_first(score):
-            name, unit = self.robot.joints[joint], torque_unit(self.robot, joint)
-            percent = digits(score.joint_relative_error_percent[joint])
-            summary = f'residual {digits(score.rms[joint])} {unit} rms, {percent} %'
-            torque, residual = fit_charts(fits, joint, unit, f'{role}-{joint}')
-            drawn.append(JointCurves(name, summary, torque, residual))
-        return drawn
+            unit = robot.torque_units[joint]
+            share = digits(score.joint_relative_error_percent[joint])
+            said = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
+            charts = fit_charts(group[worst], joint, unit, f'{role}-{joint}')
+            panels.append((robot.joints[joint], said, charts))
+        which = ' predicted worst' * several
+        blocks.append(
+            Fold(
+                f'Torques of the {role} recording{which}: {worst}',
+                [hint, Panels(panels)] if role == errors[0][1] else [Panels(panels)],
+                opened=role == errors[0][1],
+            )
+        )
+    return ContentSection('Fit', blocks)
 
 
 def _worst_first(score: Score) -> list[int]:
@@ -205,3 +189,87 @@ def fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[C
         legend=False,
     )
     return torque_chart, residual_chart
+
+
+def forward_section(
+    robot: Robot,
+    pairs: Sequence[ForwardValidation],
+    labels: tuple[str, str] = ('description', 'identified'),
+) -> ContentSection:
+    """
+    Return the position errors of two models that the recorded torques drive.
+
+    Parameters
+    ----------
+    robot : Robot
+        Gives joints and units.
+    pairs : sequence of ForwardValidation
+        One for each held-out recording.
+    labels : tuple of str
+        What both models are called.
+
+    """
+    blocks: list[PageBlock] = [
+        Paragraph(
+            f'Root mean square errors of position and torque of two models: {labels[0]} and '
+            f'{labels[1]}. The recorded torques drive both. The same 8 Hz feedback keeps both at '
+            'the recorded motion, because commanded positions are not recorded.'
+        )
+    ]
+    for number, pair in enumerate(pairs):
+        models: list[tuple[Role, str, ForwardScore]] = [('after', labels[1], pair.after)]
+        if pair.before is not None:
+            models.insert(0, ('before', labels[0], pair.before))
+        own: list[PageBlock] = []
+        if pair.before is None:
+            inconsistent = 'its inertias are not physically consistent'
+            own.append(Paragraph(f'The model before cannot be simulated: {inconsistent}.'))
+        comment = pair.comment()
+        if comment:
+            own.append(Paragraph(f'{comment[:1].upper()}{comment[1:]}.'))
+        rows = [
+            (
+                name,
+                [
+                    Bar(
+                        1e3 * float(score.position_error[joint]),
+                        role,
+                        f'{digits(1e3 * score.position_error[joint])} m{score.units[joint]}, '
+                        f'{digits(score.torque_error[joint])} {robot.torque_units[joint]}',
+                    )
+                    for role, _, score in models
+                ],
+            )
+            for joint, name in enumerate(robot.joints)
+        ]
+        own.append(BarChart(rows, 'mrad', [(role, label) for role, label, _ in models], True))
+        own += _worst_joint(robot, pair, models)
+        said = pair.after.worst
+        if pair.before is not None:
+            said = f'{pair.before.worst} before, {said} after'
+        blocks.append(Fold(f'{pair.after.source}: at most {said}', own, opened=number == 0))
+    return ContentSection('Forward validation', blocks)
+
+
+def _worst_joint(
+    robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
+) -> list[PageBlock]:
+    """Return the position error over time of the joint that one of the models is off most."""
+    farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
+    worst, motion = int(farthest.position_error.argmax()), pair.after.motion
+    curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]
+    kept, joint = thinned(*curves), robot.joints[worst]
+    return [
+        Paragraph(f'Position error of {joint}, the worst joint, over time:', 'hint'),
+        Chart(
+            motion.t[kept],
+            [
+                Series(label, curve[kept], role)
+                for (role, label, _), curve in zip(models, curves, strict=True)
+            ],
+            'time [s]',
+            f'{joint}: error [m{pair.after.units[worst]}]',
+            height=190,
+            symmetric=True,
+        ),
+    ]

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from armid_ros.report.bars import BarChart
+from armid_ros.report.blocks import BulletList, ContentSection
 from armid_ros.report.page import Section
 from armid_ros.report.provenance import Provenance
 
@@ -20,13 +22,15 @@ class VerdictSection(Section):
     Attributes
     ----------
     grade : str
-        One word, shown as a badge.
-    tone : {'good', 'fair', 'bad'}
+        One word, shown as a badge; empty for none.
+    tone : {'good', 'fair', 'bad', ''}
         Colour of the badge.
     sentences : sequence of str
         What was found; the first stands out.
     beware : sequence of str
         What not to overlook.
+    bars : BarChart or None
+        The number of the verdict for each joint.
 
     """
 
@@ -37,42 +41,12 @@ class VerdictSection(Section):
     tone: str
     sentences: Sequence[str]
     beware: Sequence[str] = ()
+    bars: BarChart | None = None
 
 
-@dataclass(frozen=True)
-class Asked(Section):
-    """
-    What was asked for.
-
-    Attributes
-    ----------
-    facts : sequence of (str, str)
-        Name and value.
-
-    """
-
-    title: ClassVar[str] = 'What was asked'
-    template: ClassVar[str] = 'facts.html'
-
-    facts: Sequence[tuple[str, str]]
-
-
-@dataclass(frozen=True)
-class NextSteps(Section):
-    """
-    What to do next.
-
-    Attributes
-    ----------
-    steps : sequence of str
-        In order of worth.
-
-    """
-
-    title: ClassVar[str] = 'What to do next'
-    template: ClassVar[str] = 'next_steps.html'
-
-    steps: Sequence[str]
+def next_steps_section(steps: Sequence[str]) -> ContentSection:
+    """Return what to do next, in order of worth."""
+    return ContentSection('What to do next', [BulletList([(step, '') for step in steps], True)])
 
 
 @dataclass(frozen=True)

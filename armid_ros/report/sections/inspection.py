@@ -4,115 +4,93 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
-
-from armid_ros.inspection import Inspection, JointFacts
-from armid_ros.motion import FloatArray
+from armid_ros.inspection import Inspection
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    FactList,
+    PageBlock,
+    Panels,
+    Paragraph,
+)
 from armid_ros.report.charts import Chart, Level, Series, thinned
 from armid_ros.report.notation import digits, plain
-from armid_ros.report.page import Section
 import numpy as np
 
 #: Samples of one curve on the page.
 _MOST = 2000
-_LINK = 'time'
 #: No encoder of an arm resolves less [rad or m].
 _FINEST = 1e-7
 
 
-@dataclass(frozen=True)
-class ContentsSection(Section):
-    """Topics of the bag, and how it is sampled."""
+def recording_facts(found: Inspection) -> list[tuple[str, str]]:
+    """Return how a recording is sampled, whether it repeats, and what reading it met."""
+    sampling, recording, trial = found.sampling, found.recording, found.trial
+    motion = 'does not repeat'
+    if sampling.period is not None:
+        motion = f'repeats after {sampling.period:.2f} s, {sampling.periods:.1f} times'
+    facts = [
+        ('Duration', f'{sampling.duration:.2f} s, {len(recording)} samples'),
+        (
+            'Rate',
+            f'{plain(sampling.rate_hz, 4)} Hz, steps vary by {100 * sampling.jitter:.1f} %',
+        ),
+        ('Longest step', f'{plain(1000 * sampling.longest_step)} ms'),
+        ('Gaps', str(sampling.gaps) if sampling.gaps else 'none'),
+        ('Motion', motion),
+        ('Clock', recording.clock),
+        ('Reading', recording.report.describe()),
+    ]
+    if trial is not None and trial.cutoff_hz is not None:
+        facts.append(('Cut-off', f'{trial.cutoff_hz:.3g} Hz would be chosen by identify'))
+    return facts
 
-    title: ClassVar[str] = 'What is in it'
-    template: ClassVar[str] = 'inspection_contents.html'
 
-    found: Inspection
-
-    @property
-    def facts(self) -> list[tuple[str, str]]:
-        """Return what is to be said of its time."""
-        sampling, recording = self.found.sampling, self.found.recording
-        rate = plain(sampling.rate_hz, 4)
-        facts = [
-            ('Duration', f'{sampling.duration:.2f} s, {len(recording)} samples'),
+def contents_section(found: Inspection) -> ContentSection:
+    """Return the topics of a bag, and how it is sampled."""
+    blocks: list[PageBlock] = [FactList(recording_facts(found))]
+    if found.topics:
+        rows = [
             (
-                'Rate',
-                f'{rate} Hz, steps vary by {100 * sampling.jitter:.1f} %',
-            ),
-            ('Longest step', f'{plain(1000 * sampling.longest_step)} ms'),
-            ('Gaps', str(sampling.gaps) if sampling.gaps else 'none'),
-            ('Motion', repetition(self.found)),
-            ('Clock', recording.clock),
-            ('Reading', recording.report.describe()),
+                topic.name + ' (read)' * (topic.name == found.recording.topic),
+                str(topic.count),
+                topic.type_name,
+                ', '.join(topic.joints),
+            )
+            for topic in found.topics
         ]
-        trial = self.found.trial
-        if trial is not None and trial.cutoff_hz is not None:
-            facts.append(('Cut-off', f'{trial.cutoff_hz:.3g} Hz would be chosen by identify'))
-        return facts
+        heads = ('Topic', 'Messages', 'Type', 'Joints')
+        blocks.insert(0, DataTable(heads, rows, (0, 2, 3)))
+    return ContentSection('What is in it', blocks)
 
 
-@dataclass(frozen=True)
-class JointTable(Section):
-    """Ranges, speeds and efforts."""
-
-    title: ClassVar[str] = 'Joints'
-    template: ClassVar[str] = 'table.html'
-    hint: ClassVar[str] = (
+def joints_section(found: Inspection) -> ContentSection:
+    """Return ranges, speeds and efforts; no head is broken within its unit."""
+    heads = list(joint_heads(found))
+    if len(set(found.units)) == 1:
+        for column, like in ((2, 1), (5, 1), (8, 7)):
+            heads[column] += heads[like][heads[like].index(' [') :]
+    heads = [head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads]
+    said = (
         'Speed: 99th percentile, from the positions. Step: smallest change of position between '
         'samples. Dq ratio: recorded velocity over the derivative of the positions; 1 if units '
         'and signs agree. Effort: rms and maximum.'
     )
-
-    found: Inspection
-
-    @property
-    def heads(self) -> tuple[str, ...]:
-        """Heads of the columns, with units; none is broken within its unit."""
-        heads, units = list(joint_heads(self.found)), set(self.found.units)
-        if len(units) == 1:
-            for column, like in ((2, 1), (5, 1), (8, 7)):
-                heads[column] += heads[like][heads[like].index(' [') :]
-        return tuple(head.replace('N m', 'N\N{NO-BREAK SPACE}m') for head in heads)
-
-    @property
-    def rows(self) -> list[tuple[str, ...]]:
-        """One row a joint."""
-        return joint_rows(self.found)
+    table = DataTable(heads, joint_rows(found), kind='tight')
+    return ContentSection('Joints', [table, Paragraph(said, 'hint')])
 
 
-@dataclass(frozen=True)
-class RecordingCurves(Section):
-    """All that was recorded, over time."""
-
-    title: ClassVar[str] = 'Curves'
-    template: ClassVar[str] = 'inspection_curves.html'
-
-    found: Inspection
-
-    @property
-    def joints(self) -> list[tuple[str, list[Chart]]]:
-        """Name and charts of every joint."""
-        return [(name, self._charts(k)) for k, name in enumerate(self.found.recording.joints)]
-
-    @property
-    def steps(self) -> Chart:
-        """Time between samples."""
-        t = self.found.recording.t
-        steps = 1e3 * np.diff(t)
-        chosen = thinned(steps, most=_MOST)
-        return Chart(
-            t[1:][chosen],
-            [Series('step', steps[chosen], 'residual')],
-            'time [s]',
-            'step [ms]',
-            height=150,
-            legend=False,
+def curves_section(found: Inspection) -> ContentSection:
+    """Return all that was recorded, over time."""
+    recording, robot = found.recording, found.robot
+    blocks: list[PageBlock] = [
+        Paragraph(
+            'Unfiltered signals. Long recordings are drawn by the extremes of short intervals. '
+            'Drag to zoom all curves.',
+            'hint',
         )
-
-    def _charts(self, k: int) -> list[Chart]:
-        recording, robot, unit = self.found.recording, self.found.robot, self.found.units[k]
+    ]
+    for k, (name, unit) in enumerate(zip(recording.joints, found.units, strict=True)):
         levels: list[Level] = []
         if robot is not None:
             low, high = recording.q[:, k].min(), recording.q[:, k].max()
@@ -122,35 +100,46 @@ class RecordingCurves(Section):
                 for limit in (robot.lower[k], robot.upper[k])
                 if np.isfinite(limit) and low - reach < limit < high + reach
             ]
-        torque = 'N' if unit == 'm' else 'N m'
-        charts = [_chart(recording.t, recording.q[:, k], f'position [{unit}]', levels)]
-        if recording.dq is not None:
-            charts.append(_chart(recording.t, recording.dq[:, k], f'velocity [{unit}/s]'))
-        if recording.tau is not None:
-            charts.append(_chart(recording.t, recording.tau[:, k], f'effort [{torque}]'))
-        return charts
-
-
-def _chart(t: FloatArray, y: FloatArray, label: str, levels: list[Level] | None = None) -> Chart:
-    chosen = thinned(y, most=_MOST)
-    series = [Series(label.split(' ')[0], y[chosen], 'after')]
-    return Chart(t[chosen], series, 'time [s]', label, 160, _LINK, levels or (), legend=False)
-
-
-def repetition(found: Inspection) -> str:
-    """Say whether the motion repeats."""
-    sampling = found.sampling
-    if sampling.period is None:
-        return 'does not repeat'
-    return f'repeats after {sampling.period:.2f} s, {sampling.periods:.1f} times'
+        quantities = (
+            ('position', unit, recording.q, levels),
+            ('velocity', f'{unit}/s', recording.dq, levels[:0]),
+            ('effort', 'N' if unit == 'm' else 'N m', recording.tau, levels[:0]),
+        )
+        panels: list[tuple[str, str, list[PageBlock]]] = []
+        for quantity, own, values, lines in quantities:
+            if values is not None:
+                chosen = thinned(values[:, k], most=_MOST)
+                chart = Chart(
+                    recording.t[chosen],
+                    [Series(quantity, values[chosen, k], 'after')],
+                    'time [s]',
+                    f'{quantity} [{own}]',
+                    height=160,
+                    link='time',
+                    levels=lines,
+                    legend=False,
+                )
+                panels.append((name if not panels else '\N{NO-BREAK SPACE}', '', [chart]))
+        blocks.append(Panels(panels, three=True))
+    steps = 1e3 * np.diff(recording.t)
+    chosen = thinned(steps, most=_MOST)
+    chart = Chart(
+        recording.t[1:][chosen],
+        [Series('step', steps[chosen], 'residual')],
+        'time [s]',
+        'step [ms]',
+        height=150,
+        legend=False,
+    )
+    return ContentSection('Curves', [*blocks, Panels([('Time between samples', '', [chart])])])
 
 
 def joint_heads(found: Inspection) -> tuple[str, ...]:
     """Return the heads of the table of joints; with units, where all joints have the same."""
-    alike = len(set(found.units)) == 1
-    length = f' [{found.units[0]}]' if alike else ''
-    speed = f' [{found.units[0]}/s]' if alike else ''
-    torque = (' [N]' if found.units[0] == 'm' else ' [N m]') if alike else ''
+    alike, unit = len(set(found.units)) == 1, found.units[0]
+    length, speed, torque = (
+        f' [{one}]' if alike else '' for one in (unit, f'{unit}/s', 'N' if unit == 'm' else 'N m')
+    )
     return (
         'joint',
         f'from{length}',
@@ -167,28 +156,22 @@ def joint_heads(found: Inspection) -> tuple[str, ...]:
 def joint_rows(found: Inspection) -> list[tuple[str, ...]]:
     """Return a row for each joint: name, range, speed, moving, step, velocity ratio, efforts."""
     alike = len(set(found.units)) == 1
-    return [
-        _row(joint, '' if alike else f' {unit}')
-        for joint, unit in zip(found.joints, found.units, strict=True)
-    ]
-
-
-def _step(size: float) -> str:
-    """Write the smallest change of a position; of what no encoder resolves, that it is less."""
-    if size and size < _FINEST:
-        return f'< {_FINEST:.0e}'.replace('e-0', 'e-')
-    return f'{size:.2g}' if size else '-'
-
-
-def _row(joint: JointFacts, unit: str) -> tuple[str, ...]:
-    efforts = (joint.effort_rms, joint.effort_largest)
-    return (
-        joint.name,
-        f'{joint.lower:.3g}',
-        f'{joint.upper:.3g}{unit}',
-        digits(joint.speed),
-        f'{100 * joint.moving:.0f} %',
-        _step(joint.step),
-        '-' if joint.velocity_ratio is None else f'{joint.velocity_ratio:.3g}',
-        *('-' if effort is None else digits(effort) for effort in efforts),
-    )
+    rows = []
+    for joint, unit in zip(found.joints, found.units, strict=True):
+        step = f'{joint.step:.2g}' if joint.step else '-'
+        if 0.0 < joint.step < _FINEST:
+            step = f'< {_FINEST:.0e}'.replace('e-0', 'e-')
+        efforts = (joint.effort_rms, joint.effort_largest)
+        rows.append(
+            (
+                joint.name,
+                f'{joint.lower:.3g}',
+                f'{joint.upper:.3g}' + ('' if alike else f' {unit}'),
+                digits(joint.speed),
+                f'{100 * joint.moving:.0f} %',
+                step,
+                '-' if joint.velocity_ratio is None else f'{joint.velocity_ratio:.3g}',
+                *('-' if effort is None else digits(effort) for effort in efforts),
+            )
+        )
+    return rows

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is left without a name, learned: torque over position and velocity, and how sure it is."""
+"""The learned residual: torque over position and velocity, and its standard deviation."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph, TableCell, Templated
 from armid_ros.report.charts import image_data
-from armid_ros.report.notation import digits, percent, position_unit, torque_unit
-from armid_ros.report.page import Section
+from armid_ros.report.notation import digits, percent
 from armid_ros.residual import JointResidual, Residual, TABLE_FILE
 import numpy as np
 
@@ -20,107 +20,104 @@ _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 
 
 
 @dataclass(frozen=True)
-class Picture:
+class HeatMaps(Templated):
     """
-    A map of one joint at its middle load.
+    Pictures over position and velocity.
 
     Attributes
     ----------
-    joint : str
-        The joint.
-    torque, std : str
-        Images of the torque and of its deviation, as data.
-    alt : str
-        The same in words.
-    peak, unsure : str
-        The largest torque and the largest deviation, with units.
-    left, right, low, high : str
-        Ends of position and velocity, with units.
+    pictures : sequence of (str, str, str, tuple of str)
+        Caption, image as data, the same in words, and the left, right, low and high end of the
+        axes with units.
 
     """
 
-    joint: str
-    torque: str
-    std: str
-    alt: str
-    peak: str
-    unsure: str
-    left: str
-    right: str
-    low: str
-    high: str
+    template: ClassVar[str] = 'heat_maps.html'
+
+    pictures: Sequence[tuple[str, str, str, Sequence[str]]]
 
 
-@dataclass(frozen=True)
-class ResidualMap(Section):
-    """
-    Maps of what has no name.
-
-    Attributes
-    ----------
-    residual : Residual
-        What was learned.
-
-    """
-
-    title: ClassVar[str] = 'Learned residual'
-    template: ClassVar[str] = 'residual_map.html'
-    table: ClassVar[str] = TABLE_FILE
-
-    residual: Residual
-
-    @property
-    def rows(self) -> Sequence[tuple[str, ...]]:
-        """Joint, rms without and with the map, shares of the map, the law and its share."""
-        return [
+def residual_map_section(residual: Residual) -> ContentSection:
+    """Return maps of what no effect explains, at the middle load of each joint."""
+    robot = residual.base.robot
+    rows, pictures = [], []
+    for one in residual.joints:
+        j = robot.joints.index(one.joint)
+        unit, length = robot.torque_units[j], robot.position_units[j]
+        held_out = '' if one.held_out is None else percent(one.held_out)
+        if one.held_out is not None and one.held_out < 0.0:
+            held_out = 'worse'
+        rows.append(
             (
                 one.joint,
-                f'{digits(one.before)} {self._unit(one)}',
-                f'{digits(one.after)} {self._unit(one)}',
+                f'{digits(one.before)} {unit}',
+                f'{digits(one.after)} {unit}',
                 percent(one.gain),
-                _alone(one),
-                'none of few terms' if one.law is None else one.law.text,
+                held_out,
+                TableCell('none of few terms' if one.law is None else one.law.text, 'law'),
                 '' if one.law is None else percent(one.law.share),
             )
-            for one in self.residual.joints
-        ]
-
-    @property
-    def pictures(self) -> list[Picture]:
-        """Return a map a joint."""
-        return [self._picture(one) for one in self.residual.joints]
-
-    def _unit(self, one: JointResidual) -> str:
-        robot = self.residual.base.robot
-        return torque_unit(robot, robot.joints.index(one.joint))
-
-    def _picture(self, one: JointResidual) -> Picture:
-        robot = self.residual.base.robot
-        unit, length = self._unit(one), position_unit(robot, robot.joints.index(one.joint))
-        q, dq = (one.axis(number, count) for number, count in enumerate(_CELLS))
-        load = np.full((len(dq), len(q)), one.ranges[2].mean())
-        inputs = np.stack([*np.meshgrid(q, dq[::-1]), load], axis=-1)
-        torque, std = one.learned.torque(inputs), one.learned.std(inputs)
-        peak = max(float(np.abs(torque).max()), 1e-12)
-        most = inputs[np.unravel_index(np.argmax(np.abs(torque)), torque.shape)]
-        return Picture(
-            joint=one.joint,
-            torque=image_data(
-                np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE), torque / peak
-            ),
-            std=image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
-            alt=f'most at {digits(most[0])} {length} and {digits(most[1])} {length}/s',
-            peak=f'{digits(peak)} {unit}',
-            unsure=f'{digits(one.learned.amplitude)} {unit}',
-            left=f'{digits(q[0])} {length}',
-            right=f'{digits(q[-1])} {length}',
-            low=f'{digits(dq[0])} {length}/s',
-            high=f'{digits(dq[-1])} {length}/s',
         )
+        pictures += _pictures(one, unit, length)
+    heads = (
+        'Joint',
+        'Residual, rms',
+        'With the map',
+        'Share, map',
+        'Held-out alone',
+        'Looks like',
+        'Share, law',
+    )
+    return ContentSection(
+        'Learned residual',
+        [
+            Paragraph(
+                'No effect of the catalogue explains the residual of these joints. A Gaussian '
+                'process over position, velocity and load has learned it. model.yaml has it as '
+                f'the effect learned_torque, {TABLE_FILE} as a table. It is zero where there were '
+                'no data. Shares are of the squared residual in cross-validation, and in held-out '
+                'recordings close to the data.'
+            ),
+            DataTable(heads, rows, (0, 5)),
+            Paragraph(
+                'q: position, dq: velocity, w: gravity torque. A law is a suggestion: write it as '
+                'an effect of your own if it is plausible, and diagnose again.',
+                'hint',
+            ),
+            HeatMaps(pictures),
+        ],
+    )
 
 
-def _alone(one: JointResidual) -> str:
-    """Return the share of held-out recordings."""
-    if one.held_out is None:
-        return ''
-    return 'worse' if one.held_out < 0.0 else percent(one.held_out)
+def _pictures(
+    one: JointResidual, unit: str, length: str
+) -> list[tuple[str, str, str, Sequence[str]]]:
+    """Return pictures of torque and deviation at the middle load, the largest velocity on top."""
+    q, dq = (one.axis(number, count) for number, count in enumerate(_CELLS))
+    load = np.full((len(dq), len(q)), one.ranges[2].mean())
+    inputs = np.stack([*np.meshgrid(q, dq[::-1]), load], axis=-1)
+    torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+    peak = max(float(np.abs(torque).max()), 1e-12)
+    row, column = np.unravel_index(np.argmax(np.abs(torque)), torque.shape)
+    most = f'most at {digits(q[column])} {length} and {digits(dq[::-1][row])} {length}/s'
+    colours = np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE)
+    unsure = f'{digits(one.learned.amplitude)} {unit}'
+    ends = (
+        *(f'{digits(value)} {length}' for value in (q[0], q[-1])),
+        *(f'{digits(value)} {length}/s' for value in (dq[0], dq[-1])),
+    )
+    return [
+        (
+            f'{one.joint}: torque, blue up to {digits(peak)} {unit}, orange down to '
+            f'-{digits(peak)} {unit}',
+            image_data(colours, torque / peak),
+            f'Learned torque of {one.joint} over position and velocity, {most}',
+            ends,
+        ),
+        (
+            f'{one.joint}: standard deviation (dark: large; {unsure} far from data)',
+            image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
+            'Standard deviation of that torque',
+            ends,
+        ),
+    ]

@@ -1,20 +1,25 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the residual goes with."""
+"""What the residual depends on: speed, position, load, and itself a while before."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.identification import Fit
 from armid_ros.motion import FloatArray
-from armid_ros.report.charts import Chart, Series
+from armid_ros.report.blocks import (
+    Cells,
+    ContentSection,
+    DataTable,
+    Fold,
+    Panels,
+    Paragraph,
+    TableCell,
+)
+from armid_ros.report.charts import Chart, Level, Series
 from armid_ros.report.judgement import explained_shares, TELLING_SHARE
-from armid_ros.report.notation import position_unit, torque_unit
-from armid_ros.report.page import Section
-from armid_ros.report.statistics import Trend
+from armid_ros.report.statistics import Trend, Whiteness
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -22,26 +27,11 @@ import numpy as np
 _CLOUD = 500
 
 
-@dataclass(frozen=True)
-class JointResidualView:
-    """The residual of one joint against its speed, its position and its load."""
-
-    name: str
-    shares: Sequence[tuple[str, float]]
-    charts: Sequence[Chart]
-
-    @property
-    def worst(self) -> float:
-        """Largest share of the residual that one variable explains."""
-        return max((share for _, share in self.shares), default=0.0)
-
-
-@dataclass(frozen=True)
-class Residuals(Section):
+def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
     """
-    The residual against what could explain it.
+    Return the residual of each joint against its speed, its position and its load.
 
-    Attributes
+    Parameters
     ----------
     robot : Robot
         Gives joints and units.
@@ -51,36 +41,44 @@ class Residuals(Section):
         'held-out' or 'training'.
 
     """
-
-    title: ClassVar[str] = 'Residual by variable'
-    template: ClassVar[str] = 'residuals.html'
-    telling: ClassVar[float] = TELLING_SHARE
-
-    robot: Robot
-    fits: Sequence[Fit]
-    role: str
-
-    @property
-    def joints(self) -> list[JointResidualView]:
-        """Every joint, in the order of the robot."""
-        return [self._joint(joint) for joint in range(self.robot.n_joints)]
-
-    def _joint(self, joint: int) -> JointResidualView:
-        used = np.concatenate([fit.informative[:, joint] for fit in self.fits])
-        residual = np.concatenate([fit.residual[:, joint] for fit in self.fits])[used]
-        torque = torque_unit(self.robot, joint)
-        length = position_unit(self.robot, joint)
+    shares = [list(explained_shares(fits, joint).values()) for joint in range(robot.n_joints)]
+    most = [max(own, default=0.0) for own in shares]
+    rows: list[Cells] = []
+    folds = []
+    for joint, name in enumerate(robot.joints):
+        cells: Cells = [
+            TableCell(f'{100 * share:.0f} %', 'telling' if share > TELLING_SHARE else '')
+            for share in shares[joint]
+        ]
+        rows.append([name, *(cells or ('too few samples in motion', '', ''))])
+        used = np.concatenate([fit.informative[:, joint] for fit in fits])
+        residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
+        torque, length = robot.torque_units[joint], robot.position_units[joint]
         axes = (
-            ([fit.motion.dq[:, joint] for fit in self.fits], f'speed [{length}/s]'),
-            ([fit.motion.q[:, joint] for fit in self.fits], f'position [{length}]'),
-            ([fit.predicted[:, joint] for fit in self.fits], f'load: predicted torque [{torque}]'),
+            ([fit.motion.dq[:, joint] for fit in fits], f'speed [{length}/s]'),
+            ([fit.motion.q[:, joint] for fit in fits], f'position [{length}]'),
+            ([fit.predicted[:, joint] for fit in fits], f'load: predicted torque [{torque}]'),
         )
         charts = [
-            cloud(np.concatenate(parts)[used], residual, xlabel, f'residual [{torque}]')
-            for parts, xlabel in axes
+            cloud(np.concatenate(parts)[used], residual, label, f'residual [{torque}]')
+            for parts, label in axes
         ]
-        shares = explained_shares(self.fits, joint)
-        return JointResidualView(self.robot.joints[joint], tuple(shares.items()), charts)
+        opened = most[joint] == max(most) or most[joint] > TELLING_SHARE
+        panels = Panels([('', '', [chart]) for chart in charts], three=True)
+        folds.append(Fold(name, [panels], opened))
+    return ContentSection(
+        'Residual by variable',
+        [
+            Paragraph(
+                f'Share of the {role} residual that one variable explains, beyond chance. Noise '
+                'depends on none. Wrong friction depends on speed; wrong gravity or masses on '
+                'position; gears and drives on load.'
+            ),
+            DataTable(('Joint', 'Speed', 'Position', 'Load'), rows),
+            *folds,
+            Paragraph('Dots: samples. Line: their mean in bins.', 'hint'),
+        ],
+    )
 
 
 def cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
@@ -113,3 +111,26 @@ def cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Char
         symmetric=True,
         legend=False,
     )
+
+
+def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
+    """Return the autocorrelation of the residuals with the band of white noise."""
+    panels = []
+    for joint, name in enumerate(robot.joints):
+        found = Whiteness.of(fits, joint)
+        chart = Chart(
+            found.lag,
+            [Series('autocorrelation', found.correlation, 'residual', 'sticks')],
+            'lag [s]',
+            'autocorrelation',
+            height=150,
+            levels=[Level(found.band, '99 %'), Level(-found.band)],
+            symmetric=True,
+            legend=False,
+        )
+        panels.append((name, f'{100 * found.outside:.0f} % of the lags outside', [chart]))
+    said = (
+        f'Autocorrelation of the {role} residual. Of white noise 1 % of the lags lie outside the '
+        'band; the filters colour the first lag or two.'
+    )
+    return ContentSection('Whiteness', [Paragraph(said), Panels(panels, three=True)])

@@ -1,0 +1,260 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Drawings of an arm: outlines of its collision bodies from a corner, far ones first.
+
+An arm without bodies is drawn as bars from each joint to the joints that it carries; the last bar
+ends beyond its centre of mass.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from armid_ros.excitation.geometry.capsules import outline
+from armid_ros.motion import FloatArray
+from armid_ros.report.page import render
+from armid_ros.report.strip import CORNER, Strip, svg_points
+from armid_ros.robots import collision_model, CollisionModel, Robot
+from armid_ros.robots.sticks import sticks
+import coal
+from markupsafe import Markup
+import numpy as np
+import pinocchio as pin
+from scipy.spatial import ConvexHull
+
+#: Size of one pose of a strip and of a single drawing [px], and space around it [m].
+_POSE, _SINGLE, _MARGIN = (190.0, 230.0), (300.0, 240.0), 0.03
+#: Corners of the outline of a ball.
+_ROUND = 16
+#: Radius of a bar [m].
+_BAR = 0.02
+#: Colour of what stands around the arm.
+OBSTACLE = 'var(--line)'
+#: What is smaller stands for a link without a body and cannot be seen [m].
+_POINT = 1e-3
+#: Height of a line of text, width of a letter, length of the arrow of gravity [px].
+_LINE, _LETTER, _ARROW = 16.0, 8.5, 26.0
+#: Poses that a single drawing is tried in.
+_POSES = 12
+#: Joint range beyond which a joint counts as endless [rad or m].
+_ENDLESS = 1e3
+
+
+@dataclass(frozen=True)
+class ArmDrawing:
+    """
+    A drawing of one pose or of several side by side.
+
+    Attributes
+    ----------
+    width, height : float
+        [px].
+    bodies : tuple of (str, str)
+        Outline of each body as coordinates of SVG, far ones first, and its colour.
+    paths : tuple of str
+        Way of the last body in each pose.
+    dots : tuple of (float, float, str, str)
+        Place, colour and name of joints, or of the last body in each pose [px].
+    captions : tuple of (float, str)
+        Where each pose is, and when.
+    labels : tuple of (float, float, float, float, str)
+        A line from a joint to its name, and the name [px].
+    gravity : tuple of float
+        Direction of gravity [px]; zero for none.
+    label : str
+        The drawing in words.
+
+    """
+
+    width: float
+    height: float
+    bodies: tuple[tuple[str, str], ...]
+    dots: tuple[tuple[float, float, str, str], ...]
+    paths: tuple[str, ...] = ()
+    captions: tuple[tuple[float, str], ...] = ()
+    labels: tuple[tuple[float, float, float, float, str], ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)
+    label: str = 'Poses of the arm'
+
+    def html(self) -> Markup:
+        """Return the drawing as SVG."""
+        return render('arm_drawing.html', {'drawing': self})
+
+
+def draw_poses(
+    collision: CollisionModel, poses: FloatArray, captions: Sequence[str], way: FloatArray
+) -> ArmDrawing:
+    """
+    Draw an arm and what stands around it in several poses.
+
+    Parameters
+    ----------
+    collision : CollisionModel
+        Bodies of the arm, and obstacles; half spaces are not drawn.
+    poses : ndarray, shape (K, n)
+        Poses to draw [rad or m].
+    captions : sequence of str, length K
+        What is written below.
+    way : ndarray, shape (N, n)
+        Poses between which the last body moves.
+
+    """
+    solids, model = _solids(collision), collision.robot.model
+    frames = [_frames(model, q) for q in poses]
+    last = max(solids, key=lambda solid: solid.joint)
+    middle = last.points.mean(axis=0)
+    track = np.array([CORNER.flat(_frames(model, q)[last.joint].act(middle)) for q in way])
+    strip = _strip(solids, frames, _POSE, track)
+    bodies = []
+    for solid, points in _outlines(solids, frames, strip):
+        share = round(100.0 * solid.joint / collision.robot.n_joints)
+        colour = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
+        bodies.append((points, colour if solid.of_arm else OBSTACLE))
+    tips = [CORNER.flat(frame[last.joint].act(middle)) for frame in frames]
+    return ArmDrawing(
+        *strip.size,
+        tuple(bodies),
+        tuple((*_placed(strip, tip, k), 'var(--predicted)', '') for k, tip in enumerate(tips)),
+        tuple(svg_points(strip.place(track, pose)) for pose in range(len(poses))),
+        strip.captions(captions),
+    )
+
+
+def draw_arm(
+    robot: Robot, marked: Sequence[str], q: FloatArray | None = None, label: str = ''
+) -> ArmDrawing:
+    """
+    Draw an arm in the pose that shows most of it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    marked : sequence of str
+        Joints to be coloured, each with its body, and to be named.
+    q : ndarray, shape (N, n), optional
+        Poses that it was in; the middle of its range by default [rad or m].
+    label : str
+        The drawing in words.
+
+    """
+    solids, model = _solids(collision_model(robot)), robot.model
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    ended = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < _ENDLESS)
+    poses = [
+        np.array(
+            [(a + b) / 2.0 if e else 0.0 for a, b, e in zip(lower, upper, ended, strict=True)]
+        )
+    ]
+    if q is not None and len(q):
+        poses = list(q[np.linspace(0, len(q) - 1, min(_POSES, len(q))).astype(np.intp)])
+    tried = [[_frames(model, pose)] for pose in poses]
+    flat = [np.array([CORNER.flat(one.translation) for one in frames]) for (frames,) in tried]
+    frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in flat]))]
+    strip = _strip(solids, frames, _SINGLE)
+    bodies = []
+    for solid, points in _outlines(solids, frames, strip):
+        chosen = solid.joint > 0 and robot.joints[solid.joint - 1] in marked
+        bodies.append((points, 'var(--predicted)' if chosen else 'var(--faint)'))
+    dots = [
+        (*_placed(strip, CORNER.flat(frames[0][k].translation), 0), name)
+        for k, name in enumerate(robot.joints, start=1)
+    ]
+    labels, y = [], 0.0
+    for x, top, name in sorted((dot for dot in dots if dot[2] in marked), key=lambda dot: dot[1]):
+        y = max(top, y + _LINE)
+        labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
+    letters = max((len(name) for *_, name in labels), default=0)
+    down = CORNER.flat(robot.gravity / max(float(np.linalg.norm(robot.gravity)), _POINT))
+    return ArmDrawing(
+        round(strip.pitch + _LETTER * letters, 1),
+        round(max(strip.height, y + _LINE), 1),
+        tuple(bodies),
+        tuple(
+            (x, top, 'var(--predicted)' if name in marked else 'var(--measured)', name)
+            for x, top, name in sorted(dots, key=lambda dot: dot[2] in marked)
+        ),
+        labels=tuple(labels),
+        gravity=(round(_ARROW * float(down[0]), 1), round(-_ARROW * float(down[1]), 1)),
+        label=label,
+    )
+
+
+@dataclass(frozen=True)
+class _Solid:
+    """A body: all points within a radius of some, in the frame of a joint of the model."""
+
+    joint: int
+    of_arm: bool
+    points: FloatArray
+    radius: float
+
+    def seen(self, frame: pin.SE3) -> tuple[FloatArray, float]:
+        """Return the outline as seen, shape (K, 2) [m], and how near it is to the eye."""
+        points = self.points @ frame.rotation.T + frame.translation
+        turn = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
+        ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
+        flat = CORNER.flat(points)
+        flat = flat[ConvexHull(flat).vertices] if len(flat) > _ROUND else flat
+        cloud = (flat[:, np.newaxis] + ring).reshape(-1, 2)
+        return cloud[ConvexHull(cloud).vertices], float(CORNER.near(points).mean())
+
+
+def _strip(
+    solids: Sequence[_Solid],
+    frames: Sequence[list[pin.SE3]],
+    room: tuple[float, float],
+    *others: FloatArray,
+) -> Strip:
+    """Return a frame for each pose [px] that holds all bodies."""
+    hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
+    every = np.concatenate([*others, *hulls])
+    size = np.ptp(every, axis=0) + 2.0 * _MARGIN
+    scale = float(min(room[0] / size[0], room[1] / size[1]))
+    return Strip.around(every, len(frames), _MARGIN, scale)
+
+
+def _outlines(
+    solids: Sequence[_Solid], frames: Sequence[list[pin.SE3]], strip: Strip
+) -> Iterator[tuple[_Solid, str]]:
+    """Yield each body with its outline on the paper, the far ones of each pose first."""
+    for pose, frame in enumerate(frames):
+        seen = [(solid, *solid.seen(frame[solid.joint])) for solid in solids]
+        for solid, hull, _ in sorted(seen, key=lambda one: one[2]):
+            yield solid, svg_points(strip.place(hull, pose))
+
+
+def _placed(strip: Strip, point: FloatArray, pose: int) -> tuple[float, float]:
+    x, y = strip.place(point, pose)
+    return round(float(x), 1), round(float(y), 1)
+
+
+def _solids(collision: CollisionModel) -> list[_Solid]:
+    """Return the bodies of an arm and of what is around it; bars for an arm without bodies."""
+    solids = []
+    for body in collision.geometry.geometryObjects:
+        shape = body.geometry
+        if isinstance(shape, coal.Cylinder):
+            turn = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
+            rim = shape.radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+            up = np.array([0.0, 0.0, shape.halfLength])
+            points, radius = np.concatenate([rim + up, rim - up]), 0.0
+        else:
+            points, radius = outline(shape)  # no points if it is endless
+        if len(points) and (radius > _POINT or np.ptp(points, axis=0).max() > _POINT):
+            placed = points @ body.placement.rotation.T + body.placement.translation
+            solids.append(_Solid(int(body.parentJoint), body.parentFrame > 0, placed, radius))
+    if any(solid.joint > 0 for solid in solids):
+        return solids
+    bars = sticks(collision.robot.model)
+    return solids + [_Solid(k, True, np.stack([np.zeros(3), end]), _BAR) for k, end in bars]
+
+
+def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
+    """Return where the joints of a model are in a pose."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, np.asarray(q, dtype=float))
+    return [pin.SE3(placement) for placement in data.oMi]

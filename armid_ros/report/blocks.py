@@ -1,0 +1,262 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""What sections are made of: paragraphs, tables, facts, lists, folds and panels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from armid_ros.report.page import render, Section
+from markupsafe import Markup
+
+
+class PageBlock(Protocol):
+    """Something that can be shown on a page."""
+
+    def html(self) -> Markup:
+        """Return it as HTML, everything in it escaped."""
+
+
+@dataclass(frozen=True)
+class ContentSection(Section):
+    """
+    A section of a page.
+
+    Attributes
+    ----------
+    title : str
+        Heading; empty for none.
+    blocks : sequence of PageBlock
+        Its content in order.
+
+    """
+
+    template: ClassVar[str] = 'content.html'
+
+    title: str  # type: ignore[misc]  # of an instance, not of a class
+    blocks: Sequence[PageBlock]
+
+
+class Templated:
+    """A block with a template, which sees the block under that name."""
+
+    template: ClassVar[str]
+
+    def html(self) -> Markup:
+        """Return the block as HTML, everything in it escaped."""
+        return render(self.template, {'block': self})
+
+
+@dataclass(frozen=True)
+class Paragraph(Templated):
+    """
+    A paragraph.
+
+    Attributes
+    ----------
+    text : str
+        Its sentences.
+    kind : str
+        'hint' for small print; 'code' for text as it is in a file.
+
+    """
+
+    template: ClassVar[str] = 'text.html'
+
+    text: str
+    kind: str = ''
+
+
+@dataclass(frozen=True)
+class TableCell:
+    """
+    A cell of a table.
+
+    Attributes
+    ----------
+    text : str
+        Content.
+    kind : str
+        'telling', 'changed' or 'unknown'; what is not as expected.
+    note : str
+        Small print below it.
+    shade : int
+        Strength of its background [%].
+
+    """
+
+    text: str
+    kind: str = ''
+    note: str = ''
+    shade: int = 0
+
+
+@dataclass(frozen=True)
+class IntervalTrack:
+    """
+    An interval and a reference on an axis with zero in the middle, as a cell of a table.
+
+    Attributes
+    ----------
+    value, reach : float
+        Middle and half width of the interval.
+    reference : float or None
+        What it is compared with; None where that has no value.
+
+    """
+
+    value: float
+    reach: float
+    reference: float | None
+
+    def place(self, number: float) -> float:
+        """Return where a number is, 0 to 100."""
+        span = max(abs(self.value) + self.reach, abs(self.reference or 0.0)) or 1.0
+        return round(50.0 + 48.0 * max(-1.0, min(1.0, number / span)), 2)
+
+
+@dataclass(frozen=True)
+class ShareBar:
+    """
+    A bar from the left, as a cell of a table.
+
+    Attributes
+    ----------
+    percent : float
+        Length [%].
+    role : str
+        What it is, which gives the colour.
+
+    """
+
+    percent: float
+    role: str
+
+
+#: Cells of a row.
+Cells = Sequence[str | TableCell | IntervalTrack | ShareBar]
+
+
+@dataclass(frozen=True)
+class DataTable(Templated):
+    """
+    A table.
+
+    Attributes
+    ----------
+    heads : sequence of str
+        Of the columns; none for a table without.
+    rows : sequence of sequence of (str, TableCell, IntervalTrack or ShareBar)
+        Cells.
+    words : collection of int
+        Columns of words; the others are numbers.
+    kind : str
+        'tight', 'both' or 'parameters': how it is set on a small screen.
+
+    """
+
+    template: ClassVar[str] = 'table.html'
+
+    heads: Sequence[str]
+    rows: Sequence[Cells]
+    words: Sequence[int] = (0,)
+    kind: str = ''
+
+
+@dataclass(frozen=True)
+class FactList(Templated):
+    """
+    Names and values.
+
+    Attributes
+    ----------
+    rows : sequence of (str, str)
+        In order.
+
+    """
+
+    template: ClassVar[str] = 'facts.html'
+
+    rows: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class BulletList(Templated):
+    """
+    A list.
+
+    Attributes
+    ----------
+    items : sequence of (str, str)
+        Text, and 'fine', 'warn', 'code' or ''.
+    numbered : bool
+        Whether the order counts.
+
+    """
+
+    template: ClassVar[str] = 'bullets.html'
+
+    items: Sequence[tuple[str, str]]
+    numbered: bool = False
+
+
+@dataclass(frozen=True)
+class Fold(Templated):
+    """
+    Blocks below a line that opens them.
+
+    Attributes
+    ----------
+    summary : str
+        The line.
+    blocks : sequence of PageBlock
+        What is below it.
+    opened : bool
+        Whether it is open at first.
+
+    """
+
+    template: ClassVar[str] = 'fold.html'
+
+    summary: str
+    blocks: Sequence[PageBlock]
+    opened: bool = False
+
+
+@dataclass(frozen=True)
+class Panels(Templated):
+    """
+    Blocks side by side, each with a heading.
+
+    Attributes
+    ----------
+    panels : sequence of (str, str, sequence of PageBlock)
+        Heading, small print beside it, and content.
+    three : bool
+        Whether there is room for three in a row, and not for two.
+
+    """
+
+    template: ClassVar[str] = 'panels.html'
+
+    panels: Sequence[tuple[str, str, Sequence[PageBlock]]]
+    three: bool = False
+
+
+@dataclass(frozen=True)
+class Legend(Templated):
+    """
+    What colours stand for.
+
+    Attributes
+    ----------
+    roles : sequence of (str, str)
+        Role of a series, or 'tick' for the mark of a reference, and what it stands for.
+
+    """
+
+    template: ClassVar[str] = 'legend.html'
+
+    roles: Sequence[tuple[str, str]]
