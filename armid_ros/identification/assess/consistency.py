@@ -96,6 +96,11 @@ class NoiseCheck:
         """Whether no parameter is biased by a share of its deviation that matters."""
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
 
+    def findings(self) -> tuple[tuple[str, bool], ...]:
+        """Say in words what was found, each with whether it is as it should be."""
+        test, bias = self.sentences()
+        return (test, self.consistent), (bias, self.harmless)
+
     def sentences(self) -> tuple[str, str]:
         """
         Say in words what was found.

@@ -53,8 +53,9 @@ def test_a_test_that_fires_is_not_fine_and_its_likelier_cause_is_said(
 ):
     _, check = checked(arm, structure, motion, 0.05, 0.0)
     check = replace(check, p_value=p_value, bias=bias * check.std)
-    assert said in check.sentences()[0]
-    assert (check.consistent, check.harmless) == fine
+    findings = check.findings()
+    assert said in findings[0][0]
+    assert tuple(right for _, right in findings) == fine
 
 
 def test_simulated_bias_is_the_error_of_a_fit_without_torque_noise(arm, structure, motion):
