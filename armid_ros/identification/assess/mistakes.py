@@ -182,7 +182,7 @@ class _Reference:
         described = [row for row in rows if row.as_described >= 1.0]
         both = [row for row in described if row.as_fitted >= 1.0]
         if both:
-            return _first(both, 'as_fitted', self.described)
+            return _first(both, 'as_described', self.described)
         price = LIMITS.gain ** (LIMITS.free_body - 1.0)
         changes = [row for row in rows if row.hypothesis.of_motion and row.as_fitted >= price]
         changes = [row for row in changes if self.near.of_data(row.fitted) >= 1.0]
