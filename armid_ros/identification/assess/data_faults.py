@@ -10,7 +10,8 @@ explains any gap. Names, signs and units are those that identification tells; se
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
@@ -18,24 +19,17 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
 from armid_ros.identification.assess.hypotheses import Hypothesis
 from armid_ros.identification.assess.joint_units import (
-    factors_apart,
-    knows,
-    units_beside_model,
+    factors_since,
+    unit_faults,
     units_beyond_drives,
 )
-from armid_ros.identification.assess.mistakes import (
-    effort_factor,
-    find_mistake,
-    is_factor,
-    slow_motions,
-)
+from armid_ros.identification.assess.mistakes import find_mistake, slow_motions
 from armid_ros.identification.assess.undriven import held_elsewhere
 from armid_ros.identification.assess.velocities import time_base_fault
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
     unit_of,
-    units_near,
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
@@ -54,6 +48,56 @@ _BEYOND = 1.5
 _CLIPPED = 0.02
 #: A step of a position at this multiple of the highest velocity is none of the arm.
 _IMPOSSIBLE = 10.0
+
+
+class SensorFault(NamedTuple):
+    """A fault of clocks or sensors in one recording, with its joint and remedy in words."""
+
+    kind: Literal['stamps', 'encoder', 'time', 'torque']
+    source: str
+    text: str
+    fatal: bool
+
+
+def sensor_faults(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    motions: Mapping[str, Sequence[Motion]],
+    cutoff_hz: float,
+    band_hz: float,
+) -> Iterator[SensorFault]:
+    """
+    Yield faults of clocks and sensors by kind; each kind makes those after it appear.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        What the data are compared with.
+    recordings : sequence of Recording
+        The data as they were recorded.
+    motions : mapping of str to sequence of Motion
+        Their filtered stretches, by recording.
+    cutoff_hz : float
+        Up to which positions are differentiated [Hz].
+    band_hz : float
+        Up to which rows hold motion [Hz].
+
+    """
+    for one in recordings:
+        uneven = uneven_stamps(one, cutoff_hz, band_hz)
+        if uneven:
+            yield SensorFault('stamps', one.source, f'in {uneven}', fatal=False)
+    for one in recordings:
+        for text in dead_encoders(arm.body, one, motions[one.source]):
+            yield SensorFault('encoder', one.source, text, fatal=True)
+    for one in recordings:
+        text = time_base_fault(one)
+        if text:
+            text = f'in {one.source or "a recording"}: {text}'
+            yield SensorFault('time', one.source, text, fatal=False)
+    for one in recordings:
+        for text in dead_channels(arm, one, motions[one.source]):
+            yield SensorFault('torque', one.source, text, fatal=True)
 
 
 def check_data(
@@ -92,25 +136,13 @@ def check_data(
         for one in recordings
     }
     band_hz = min(used.kept_hz, *(part.motion.band_hz for part in data))
-    stamps = [uneven_stamps(one, used.cutoff_hz, band_hz) for one in recordings]
-    times = [(one.source or 'recording', time_base_fault(one)) for one in recordings]
-    # each makes those after it appear
-    mistaken = (
-        [*filter(None, stamps)]
-        or [
-            text
-            for one in recordings
-            for text in dead_encoders(arm.body, one, motions[one.source])
-        ]
-        or [f'{source}: {text}' for source, text in times if text]
-    )
+    sensors = list(sensor_faults(arm, recordings, motions, used.cutoff_hz, band_hz))
+    mistaken = [fault.text for fault in sensors if fault.kind == sensors[0].kind]
     alone = not any(one.partner is not None for one in recordings)
     if alone and not mistaken:
         now, then = (slow_motions(some, used) for some in (recordings, before))
-        mistaken = (
-            _mistaken(arm, recordings, used, now, then)
-            or list(units_beside_model(arm, now, then))
-            or list(units_beyond_drives(arm.robot, recordings, now))
+        mistaken = _mistaken(arm, recordings, used, now, then) or list(
+            units_beyond_drives(arm.robot, recordings, now)
         )
     if mistaken:
         return mistaken, []
@@ -120,7 +152,7 @@ def check_data(
         for law in laws_of_controllers(arm.body, part.motion, part.informative)
     ]
     for one in recordings:
-        faults += [*_jumps(arm.robot, one), *dead_channels(arm, one, motions[one.source])]
+        faults += _jumps(arm.robot, one)
     if alone and not faults:  # another machine that an arm is tied to may drive it
         moved, torques = [part.motion for part in data], [part.tau for part in data]
         driven = driven_by_friction(arm.robot, moved, torques)
@@ -144,37 +176,16 @@ def _mistaken(
     before: Sequence[Motion],
 ) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
-    # by what factor torques of a baseline are those of the model: its masses are wrong on both
-    # days, where a factor leaves less than none does; one that knows the torque of no joint of the
-    # baseline tells nothing
-    then = effort_factor(arm.body, before)
-    if then is not None:
-        then = 1.0 if is_factor(arm.body, before, 1.0) else then
-        then = then if np.any(knows(ArmModel(arm.body), before, then)) else None
+    since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
     mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
-    found = [one.hypotheses for one in mistakes if one is not None]
-    if len(found) == len(recordings):
-        said = {tuple(_fault(one, then) for one in likely) for likely in found}
-        (first, *others) = said
-        if all(first) and not others:
-            return [', or '.join(first)]
-    now = None if then is None else effort_factor(arm.body, motions)
-    if now is None or then is None:
-        return []
-    units = [
-        unit
-        for unit, per in units_near(now / then).items()
-        if is_factor(arm.body, motions, then * per)
-    ]
-    scaled = len(found) == len(recordings) and all(likely[0].kind == 'scale' for likely in found)
-    if not units and not scaled:
-        return []
-    apart = factors_apart(arm, motions, before, units[0] if units else '')
-    if apart or not units:
-        return [apart] if apart else []
-    return [
-        f'torques are in {" or ".join(units)} if those of the baseline are in N m: convert them'
-    ]
+    said = {
+        tuple(_fault(one, since) for one in mistake.hypotheses) if mistake is not None else ('',)
+        for mistake in mistakes
+    }
+    (first, *others) = said
+    if all(first) and not others:
+        return [', or '.join(first)]
+    return unit_faults(arm, motions, before)
 
 
 def mistaken_recordings(
@@ -202,16 +213,17 @@ def mistaken_recordings(
         mistake = find_mistake(arm.body, recording, used)
         if mistake is None or not joints[mistake.joint]:
             continue
-        faults = [_fault(one, None) for one in mistake.hypotheses]
+        faults = [_fault(one, since=False) for one in mistake.hypotheses]
         if all(faults):
             said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
     return said
 
 
-def _fault(mistake: Hypothesis, since: float | None) -> str:
+def _fault(mistake: Hypothesis, since: bool) -> str:
     """Say what is wrong with data; empty if it is something that may happen to an arm."""
+    # a baseline gives the factor of all torques by itself
     if mistake.kind == 'scale':
-        unit = '' if since is not None else unit_of(mistake.factor)
+        unit = '' if since else unit_of(mistake.factor)
         return f'torques are in {unit} instead of N m: convert them' if unit else ''
     return mistake.text if mistake.of_data else ''
 

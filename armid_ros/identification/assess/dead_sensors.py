@@ -245,8 +245,8 @@ def _moves_unseen(
     rubs = motion.dq[:, others], np.sign(motion.dq[:, others])
     columns = np.column_stack([regressor(robot, motion)[:, joint], np.ones(len(motion)), *rubs])
     length = np.sqrt(np.mean(columns**2, axis=0))
-    columns = (columns / np.where(length > 0.0, length, 1.0))[:, np.newaxis]
-    left = left_of_blocks(columns, (torque - described)[:, np.newaxis] / size)[:, 0]
+    columns = columns / np.where(length > 0.0, length, 1.0)
+    left = left_of_blocks(columns, (torque - described) / size)
     smooth = float(np.mean(left**2)) - _white(left)
     return bool(100.0 * np.sqrt(max(smooth, 0.0)) > LIMITS.poor)
 

@@ -17,17 +17,17 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
+from armid_ros.identification.assess.data_faults import sensor_faults
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.joint_units import units_beyond_drives
 from armid_ros.identification.assess.mistakes import Mistake, suspected_mistake
 from armid_ros.identification.assess.undriven import held_elsewhere
-from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
+from armid_ros.identification.assess.velocities import velocity_faults
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
 from armid_ros.identification.rows.regression import Fit, Score
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.identification.rows.stamps import rounded_stamps, uneven_stamps
+from armid_ros.identification.rows.stamps import rounded_stamps
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -96,23 +96,19 @@ def grade(
     motions = {
         one.source: [fit.motion for fit in fits if fit.source == one.source] for one in every
     }
-    dead = {
-        one.source: [*dead_encoders(description.body, one, motions[one.source])] for one in every
-    }
-    # what else a recording with a dead encoder seems to show is of that
-    seeing = [one for one in every if not dead[one.source]]
+    used = result.used
+    band_hz = min(used.kept_hz, *(fit.motion.band_hz for fit in result.training))
+    sensors = list(sensor_faults(description, every, motions, used.cutoff_hz, band_hz))
+    # what else a recording with a dead sensor seems to show is of that
+    blind = {fault.source for fault in sensors if fault.fatal}
+    seeing = [one for one in every if one.source not in blind]
     mistakes, suspicions = _mistakes(result, description, seeing)
     moved = [fit.motion for fit in fits]
     units = [] if mistakes else units_beyond_drives(robot, seeing, moved)
-    silent = (
-        text for one in every for text in dead_channels(description, one, motions[one.source])
-    )
     faults = [
-        *(_Reason('unusable', text) for texts in dead.values() for text in texts),
-        *_time_bases(every, result),
+        *(_Reason('unusable' if fault.fatal else 'poor', fault.text) for fault in sensors),
         *mistakes,
         *(_Reason('poor', text) for text in units),
-        *(_Reason('unusable', text) for text in silent),
         *(
             _Reason('poor' if found.spoils else 'good', found.text)
             for found in held_elsewhere(robot, every, moved)
@@ -265,18 +261,6 @@ def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) ->
         text = f'not checked, as they do not move in what was held out: {names}'
         reasons.append(_Reason('good', text))
     return reasons
-
-
-def _time_bases(recordings: Sequence[Recording], result: Identification) -> Iterator[_Reason]:
-    """Say whose time is not that of the arm, or whose stamps are uneven."""
-    band_hz = min(result.used.kept_hz, *(fit.motion.band_hz for fit in result.training))
-    for recording in recordings:
-        text = time_base_fault(recording)
-        if text:
-            yield _Reason('poor', f'in {recording.source}: {text}')
-        uneven = uneven_stamps(recording, result.used.cutoff_hz, band_hz)
-        if uneven:
-            yield _Reason('poor', f'in {uneven}')
 
 
 def _velocities(recordings: Sequence[Recording]) -> Iterator[_Reason]:

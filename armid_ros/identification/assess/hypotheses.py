@@ -1,11 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What may be wrong with a recording: each a change of the data that would put it right.
+Hypotheses of what is wrong with a recording: each the change of the data that corrects it.
 
-A hypothesis changes the motion, or leaves some values free that the torque is linear in. It is
-believed if the arm then predicts data that were not used for the fit far better; nothing here
-decides that.
+A hypothesis is accepted by its likelihood ratio against the data as they are; see `mistakes`.
 
 """
 
@@ -18,6 +16,7 @@ from itertools import combinations
 from typing import Literal
 
 from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.prediction_error import common_values, thinned
 from armid_ros.identification.rows.checks import (
     effort_unit,
     torque_factors,
@@ -37,6 +36,8 @@ _FINER = (-15.0, 15.0)
 _STRONGEST = 24.8
 #: Free values that are within this of an axis [degrees] are written as that axis.
 _AXIS = 15.0
+#: Samples that gravity and the factor of all torques are estimated from.
+_ROWS = 600
 #: Correlation from which the factor of a joint is known: it leaves 15 % of the torque at most.
 _CLEAR = 0.989
 
@@ -57,10 +58,6 @@ Kind = Literal[
 ]
 
 
-def _as_described(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    return inverse_dynamics(robot, motion), np.empty((*motion.q.shape, 0))
-
-
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
     """
@@ -78,13 +75,8 @@ class Hypothesis:
         Joints and quantity, without by how much.
     values : int
         Numbers that are chosen to fit the data.
-    torque : callable
-        Returns what the described body takes along the changed motion of a robot: torque that is
-        known, shape (N, n) [N m], and what free values are multiplied by, shape (N, n, k).
-    settled : callable or None
-        Returns the hypothesis with the free values that fit, where there are any.
-    detailed : callable or None
-        Returns the hypothesis with what motions show of single joints, once it is believed.
+    body : callable
+        Returns the description as it would be without the mistake.
     nearby : callable
         Returns finer steps of the same kind.
     material : bool
@@ -103,9 +95,7 @@ class Hypothesis:
     motion: Callable[[Motion], Motion] = lambda motion: motion
     where: tuple[object, ...] = ()
     values: int = 1
-    torque: Callable[[Robot, Motion], tuple[FloatArray, FloatArray]] = _as_described
-    settled: Callable[[FloatArray], Hypothesis] | None = None
-    detailed: Callable[[Sequence[Motion]], Hypothesis] | None = None
+    body: Callable[[Robot], Robot] = lambda robot: robot
     nearby: Callable[[], Sequence[Hypothesis]] = tuple
     material: bool = True
     factor: float = 1.0
@@ -116,6 +106,11 @@ class Hypothesis:
     def of_masses(self) -> bool:
         """Whether masses that are all off by a factor do the same, up to where it is material."""
         return self.kind in ('gravity', 'scale')
+
+    @property
+    def of_motion(self) -> bool:
+        """Whether it is judged with a fitted body alone: that follows any factor of a torque."""
+        return self.kind != 'unit' and not self.of_masses
 
     @property
     def of_data(self) -> bool:
@@ -132,8 +127,8 @@ AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
 WITHOUT_BODY = Hypothesis(
     'body',
     'the description says nothing of the torques',
+    body=lambda robot: robot.with_inertias(np.zeros_like(robot.rigid_parameters)),
     values=0,
-    torque=lambda robot, motion: (np.zeros_like(motion.q), np.empty((*motion.q.shape, 0))),
 )
 
 
@@ -145,8 +140,7 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
 
     """
     turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi
-    yield other_gravity(robot)
-    yield other_scale(robot)
+    yield from _of_all_torques(robot, motions)
     if np.any(turned) and not np.all(robot.prismatic):
         yield _in_degrees(robot)
     for joint in range(robot.n_joints):
@@ -162,6 +156,21 @@ def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     for first, second in combinations(range(robot.n_joints), 2):
         for quantity in QUANTITIES:
             yield _exchanged(robot, first, second, quantity)
+
+
+def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
+    """Yield the gravity, and the factor of all torques, that fit best."""
+    motion = thinned(motions, _ROWS)
+    if motion is None:
+        return
+    described = inverse_dynamics(robot, motion)
+    weightless = inverse_dynamics(robot.with_gravity(np.zeros(3)), motion)
+    by_gravity = gravity_sensitivity(robot, motion.q)
+    yield other_gravity(robot, common_values(motion, weightless, by_gravity))
+    nothing, column = np.zeros_like(described), described[:, :, np.newaxis]
+    factor = float(common_values(motion, nothing, column)[0])
+    if abs(factor) > np.finfo(float).tiny:
+        yield other_scale(robot, factor, motions)
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
@@ -203,29 +212,20 @@ def shifted(motion: Motion, seconds: float) -> Motion:
     return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
 
 
-def other_gravity(robot: Robot, vector: FloatArray | None = None) -> Hypothesis:
+def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis:
     """
-    Return that gravity is not as described; torque is linear in it, so data give it.
+    Return that gravity is not as described.
 
     Parameters
     ----------
     robot : Robot
         The description.
-    vector : ndarray, shape (3,), optional
+    vector : ndarray, shape (3,)
         What it is instead [m/s^2]. It is material if it may be a planet's and is too far from the
         description to be wrong masses: these make all weight larger or smaller, and turn it
         nowhere.
 
     """
-    if vector is None:
-
-        def torque(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-            weightless = robot.with_gravity(np.zeros(3))
-            return inverse_dynamics(weightless, motion), gravity_sensitivity(robot, motion.q)
-
-        return Hypothesis(
-            'gravity', '', values=3, torque=torque, settled=partial(other_gravity, robot)
-        )
     told = robot.gravity
     size, length = (float(np.linalg.norm(one)) for one in (told, vector))
     far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
@@ -241,13 +241,12 @@ def other_gravity(robot: Robot, vector: FloatArray | None = None) -> Hypothesis:
         'gravity',
         f'gravity seems to act along ({direction}) of the base with {length:.3g} m/s^2: '
         f'--gravity {option}',
+        body=lambda robot: robot.with_gravity(vector),
         values=3,
     )
 
 
-def other_scale(
-    robot: Robot, factor: float | None = None, of_joints: Sequence[float] = ()
-) -> Hypothesis:
+def other_scale(robot: Robot, factor: float, motions: Sequence[Motion] = ()) -> Hypothesis:
     """
     Return that efforts are a factor from N m: a unit where it is that of every joint, or currents.
 
@@ -255,28 +254,17 @@ def other_scale(
     ----------
     robot : Robot
         The description.
-    factor : float, optional
+    factor : float
         Of all joints together.
-    of_joints : sequence of float
-        Of each joint, NaN where its torque does not show it.
+    motions : sequence of Motion
+        Data with torques, which show the factors of single joints.
 
     """
-    if factor is None:
-
-        def torque(robot: Robot, motion: Motion) -> tuple[FloatArray, FloatArray]:
-            described = inverse_dynamics(robot, motion)
-            return np.zeros_like(described), described[:, :, np.newaxis]
-
-        return Hypothesis(
-            'scale', '', torque=torque, settled=lambda values: other_scale(robot, float(values[0]))
-        )
-
-    def detailed(motions: Sequence[Motion]) -> Hypothesis:
+    of_joints = np.full(robot.n_joints, np.nan)
+    if motions:
         torques = [motion.tau for motion in motions if motion.tau is not None]
         factors, correlation = torque_factors(robot, motions, torques)
-        clear = np.where(correlation > _CLEAR, factors, np.nan)
-        return other_scale(robot, factor, tuple(clear))
-
+        of_joints = np.where(correlation > _CLEAR, factors, np.nan)
     unit = unit_of(factor, [one for one in of_joints if one > 0.0])
     text = (
         f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
@@ -284,7 +272,7 @@ def other_scale(
         else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
         'currents, or wrong masses in the description'
     )
-    known = np.array(of_joints) > 0.0
+    known = of_joints > 0.0
     if known.any() and not unit:
         gains = ','.join(f'{1.0 / one:.3g}' if one > 0.0 else '?' for one in of_joints)
         hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
@@ -293,7 +281,7 @@ def other_scale(
     return Hypothesis(
         'scale',
         text,
-        detailed=detailed,
+        lambda motion: _changed(motion, 'torque', lambda values: values / factor),
         material=_beyond_masses(factor),
         factor=factor,
         disputable=not unit,

@@ -1,10 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Torque of one joint in another unit than N m, where the described body does not show it.
+Torques in another unit than N m, where the described body does not show it.
 
 A joint whose torque is mostly friction, as that of a wrist, fits as well in any unit, for its
-friction is free; see `mistakes`. The limit of its drive shows it, or a model with its friction.
+friction is free; see `mistakes`. The limit of its drive shows it, or a model with its friction,
+or a baseline: masses that a model has wrong are wrong on both days.
 
 """
 
@@ -18,6 +19,7 @@ from armid_ros.identification.rows.checks import (
     effort_unit,
     FOLLOWS,
     NEAR,
+    torque_factors,
     TORQUE_UNITS,
     units_near,
 )
@@ -28,7 +30,7 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Factor of all torques from which they are in another unit: a load that is put down makes less.
+#: Median factor of torques from which they are in other units: a load that is put down makes less.
 _GAINS = 4.0
 #: Half of the readings of a joint at so many times the limit of its drive are in another unit: the
 #: smallest factor of one is a hundred, of which this is half in the logarithm, and no drive gives
@@ -82,13 +84,11 @@ def units_beyond_drives(
         )
 
 
-def units_beside_model(
+def unit_faults(
     arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
-) -> Iterator[str]:
+) -> list[str]:
     """
-    Say whose torque is in another unit, as a model with its friction shows.
-
-    Where most joints are, it may be the masses of the model that are wrong.
+    Say what unit torques are in, as a model with its friction or a baseline shows.
 
     Parameters
     ----------
@@ -97,87 +97,92 @@ def units_beside_model(
     motions : sequence of Motion
         Filtered motions with torque.
     before : sequence of Motion
-        The same from when nothing was wrong: factors are those since then.
+        The same from when nothing was wrong: factors are those since then. Without it, factors
+        of most joints may be of masses that the model has wrong, and no fault.
 
     """
-    factors = _since(arm, motions, before)
+    factors, robot = factors_since(arm, motions, before), arm.robot
     found = [
-        in_unit(arm.robot, joint, unit).text
+        in_unit(robot, joint, unit).text
         for joint, factor in enumerate(factors)
         for unit, per in TORQUE_UNITS.items()
         if per / NEAR < factor < per * NEAR
     ]
-    if 2 * len(found) <= arm.robot.n_joints:
-        yield from found
-
-
-def factors_apart(
-    arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = (), unit: str = ''
-) -> str:
-    """
-    Say what factors torques of joints are off by where no one unit makes them.
-
-    Parameters are those of `units_beside_model`, and the unit that all joints together are in, if
-    they are in one. Empty where each joint is in it, or each in N m.
-
-    """
-    factors = _since(arm, motions, before)
+    if 2 * len(found) <= robot.n_joints and found:
+        return found
     clear = np.flatnonzero(factors > 0.0).tolist()
-    in_unit = [unit in units_near(factors[k], _NEAR_SINCE) for k in clear]
-    if all(in_unit) or all(1.0 / _GAINS < factors[k] < _GAINS for k in clear):
-        return ''
-    named = ', '.join(f'{factors[k]:.3g} in {arm.robot.joints[k]}' for k in clear)
+    if not before or len(clear) < min(2, robot.n_joints):
+        return []
+    near = [set(units_near(factors[k], _NEAR_SINCE)) for k in clear]
+    typical = float(np.median(factors[clear]))
+    units = [one for one in units_near(typical) if all(one in some for some in near)]
+    if units:
+        return [
+            f'torques are in {" or ".join(units)} if those of the baseline are in N m: '
+            'convert them'
+        ]
+    if 1.0 / _GAINS < typical < _GAINS:
+        return []
+    named = ', '.join(f'{factors[k]:.3g} in {robot.joints[k]}' for k in clear)
     gains = ','.join(f'{1.0 / factor:.3g}' if factor > 0.0 else '?' for factor in factors)
     lacking = '' if len(clear) == len(factors) else '; ?: not determined by these data'
-    then = 'the baseline' if before else 'the model'
-    return (
-        f'torques are those of {then} times {named}: one of the two is in other units than N m '
-        '(currents? drivers change from one to the other with their version): convert each joint '
-        f'by its own gain, as with --current-gain {gains}{lacking}'
-    )
+    return [
+        f'torques are those of the baseline times {named}: one of the two is in other units than '
+        'N m (currents? drivers change from one to the other with their version): convert each '
+        f'joint by its own gain, as with --current-gain {gains}{lacking}'
+    ]
 
 
-def _since(arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion]) -> FloatArray:
-    """Return the factors of torques on the model's, over those of a baseline, (n,)."""
-    # Zero where one is not clear, or the model does not know the torque of the baseline.
-    factors = _factors(arm, motions)
-    if not before:
-        return factors
-    then = _factors(arm, before)
-    known = (then > 0.0) & knows(arm, before, then)
-    return np.asarray(np.where(known, factors / np.where(known, then, 1.0), 0.0))
-
-
-def knows(
-    arm: ArmModel, before: Sequence[Motion], factors: FloatArray | float = 1.0
-) -> npt.NDArray[np.bool_]:
+def factors_since(
+    arm: ArmModel, motions: Sequence[Motion], before: Sequence[Motion] = ()
+) -> FloatArray:
     """
-    Tell of which joints a model is off by less than the torque of a baseline itself, (n,).
+    Return the factors of torques on the model's, over those of a baseline if there is one.
 
-    Factors between the two are allowed for. Rows at rest count: friction holds a joint with any
-    torque up to that of its motion, and no more. A motion that does not determine a model shows
-    its errors there.
+    A model is off by less than the torque of a baseline itself, times the factor, or it gives
+    none: a motion that does not determine a model shows its errors there. Rows at rest count:
+    friction holds a joint with any torque up to that of its motion, and no more.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Zero where a torque does not follow the model clearly.
 
     """
-    moves, expected, measured = _torques(arm, before)
-    off = np.mean(np.square(measured - factors * expected), axis=0)
-    size = np.mean(np.square(measured), axis=0, where=moves)
-    return np.asarray(off < size)
-
-
-def _factors(arm: ArmModel, motions: Sequence[Motion]) -> FloatArray:
-    """Return the slope of torques on those of the model, (n,); zero where it is not clear."""
-    factors = np.zeros(arm.robot.n_joints)
+    best, factors = np.full((2, arm.robot.n_joints), 0.0)
     if not motions:
         return factors
+    # the body with friction and offset of the data, and the model with its own friction
+    for model in (ArmModel(arm.body), arm):
+        slope, correlation = _factors(model, motions)
+        if before:
+            then, follows = _factors(model, before)
+            moves, expected, measured = _torques(model, before)
+            off = np.mean(np.square(measured - then * expected), axis=0)
+            known = (then > 0.0) & (off < np.mean(np.square(measured), axis=0, where=moves))
+            slope = np.where(known, slope / np.where(known, then, 1.0), 0.0)
+            correlation = np.minimum(correlation, follows)
+        better = (correlation > np.maximum(best, FOLLOWS)) & (slope > 0.0)
+        best, factors = (
+            np.where(better, new, old) for new, old in ((correlation, best), (slope, factors))
+        )
+    return factors
+
+
+def _factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, FloatArray]:
+    """Return the slope of torques on those of the model, and their correlation, each (n,)."""
     moves, expected, measured = _torques(arm, motions)
-    for joint in range(len(factors)):
+    if not arm.effects:
+        torques = [motion.tau for motion in motions if motion.tau is not None]
+        return torque_factors(arm.robot, motions, torques)
+    slope, correlation = np.zeros((2, arm.robot.n_joints))
+    for joint in range(len(slope)):
         x, y = (torque[moves[:, joint], joint] for torque in (expected, measured))
         x, y = x - x.mean(), y - y.mean()
         size = float(np.sqrt((x @ x) * (y @ y)))
-        if size > 0.0 and x @ y > FOLLOWS * size:
-            factors[joint] = (x @ y) / (x @ x)
-    return factors
+        if size > 0.0:
+            slope[joint], correlation[joint] = (x @ y) / (x @ x), (x @ y) / size
+    return slope, correlation
 
 
 def _torques(

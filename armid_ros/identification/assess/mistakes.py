@@ -1,19 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Which mistake a recording shows, if any.
+Which mistake a recording shows, if any: hypotheses by their likelihood ratio.
 
-Hypotheses are tried one by one, where the arm as described predicts the recording badly enough
-for one of them to matter. Links that are off as those of descriptions are may be the cause too,
-and are the commoner one: a mistake is believed if it explains what no such body does. Where none
-is believed and the prediction fails, hypotheses are tried once more with such a body alone.
+Each is compared with the data as they were recorded. Links that are off as those of descriptions
+may be are the commoner cause, and so the body is fitted with that prior in both: a mistake is
+accepted if it explains what no such body does. Masses that are all off by one factor are within
+that prior; a factor of all torques is therefore judged with the body as described, too.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import NamedTuple
 
 from armid_ros.effects.timing import within_band
@@ -23,13 +24,11 @@ from armid_ros.identification.assess.hypotheses import (
     delayed,
     hypotheses,
     Hypothesis,
-    other_scale,
     WITHOUT_BODY,
 )
 from armid_ros.identification.assess.late_torque import late_torque
 from armid_ros.identification.assess.prediction_error import (
-    described_error,
-    nearest_error,
+    prediction_error,
     PredictionError,
     thinned,
 )
@@ -46,15 +45,12 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Samples of a recording that are looked at: a hundred and more for every value that is fitted to
-#: the torque of a joint, and ten and more where the body is fitted too.
-_ROWS, _ROWS_FITTED = 600, 200
+#: Samples of a recording that are looked at: twenty for every value of a link.
+_ROWS = 200
 #: The middle of a recording that tells what is usual of it, in percent.
 _USUAL = (1.0, 99.0)
 #: Samples below which nothing can be asked.
 _FEWEST = 40
-
-Judge = Callable[[Hypothesis], tuple[PredictionError, Hypothesis] | None]
 
 
 @dataclass(frozen=True)
@@ -69,7 +65,7 @@ class Mistake:
     before, after : PredictionError
         As recorded, and with the mistake put right.
     fitted : bool
-        Whether the body had to be fitted to see it.
+        Whether the body was fitted, too.
     links : bool
         Whether links that are off as those of a description may be explain as much.
 
@@ -129,30 +125,123 @@ def find_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mist
     return None if found is None or found.links else found
 
 
+class _Row(NamedTuple):
+    """A hypothesis, its errors, and its likelihood ratios over what its values have to reach."""
+
+    hypothesis: Hypothesis
+    described: PredictionError
+    as_described: float
+    fitted: PredictionError
+    as_fitted: float
+
+    def predicts(self, robot: Robot) -> bool:
+        """Whether the corrected data are predicted at all."""
+        after = self.described if self.as_described >= 1.0 else self.fitted
+        return bool(100.0 * after.whole(robot) < LIMITS.unusable)
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """The data as they were recorded, to which hypotheses are compared."""
+
+    robot: Robot
+    slow: Sequence[Motion]
+    near: PredictionError
+    described: PredictionError
+    without: PredictionError
+
+    @staticmethod
+    def of(robot: Robot, slow: Sequence[Motion]) -> _Reference | None:
+        near = _error(robot, slow, AS_RECORDED, near=True)
+        described = _error(robot, slow, AS_RECORDED, near=False)
+        without = _error(robot, slow, WITHOUT_BODY, near=False)
+        if near is None or described is None or without is None:
+            return None
+        return _Reference(robot, slow, near, described, described.least(without))
+
+    @property
+    def alone(self) -> bool:
+        """Whether a fitted body alone leaves enough to show what is wrong."""
+        return bool(100.0 * self.near.joints.max() >= LIMITS.poor)
+
+    def rows(self, some: Iterable[Hypothesis]) -> Iterator[_Row]:
+        """Judge hypotheses; a body is fitted where the described one leaves it open."""
+        for one in (one for one in some if one.material):
+            after = _error(self.robot, self.slow, one, near=False)
+            if after is None:
+                continue
+            price, fitted = LIMITS.gain**one.values, self.near
+            ratio = self.without.gain(after) / price
+            if ratio >= 1.0 or (self.alone and one.of_motion):
+                fitted = _error(self.robot, self.slow, one, near=True) or self.near
+            yield _Row(one, after, ratio, fitted, self.near.gain(fitted) / price)
+
+    def likeliest(self, rows: Sequence[_Row]) -> Mistake | None:
+        """Return what explains most: more than any body near the description does, if it can."""
+        rows = [row for row in rows if row.predicts(self.robot)]
+        described = [row for row in rows if row.as_described >= 1.0]
+        both = [row for row in described if row.as_fitted >= 1.0]
+        if both:
+            return _first(both, 'as_described', self.described)
+        price = LIMITS.gain ** (LIMITS.free_body - 1.0)
+        changes = [row for row in rows if row.hypothesis.of_motion and row.as_fitted >= price]
+        changes = [row for row in changes if self.near.of_data(row.fitted) >= 1.0]
+        if changes and self.alone:
+            return _first(changes, 'as_fitted', self.near, fitted=True)
+        masses = [row for row in described if row.hypothesis.of_masses]
+        if masses:
+            return _first(masses, 'as_described', self.described)
+        if described and 100.0 * self.described.joints.max() >= LIMITS.poor:
+            return replace(_first(described, 'as_described', self.described), links=True)
+        return None
+
+
 def suspected_mistake(robot: Robot, recording: Recording, used: Conditioning) -> Mistake | None:
     """Return what `find_mistake` does, or else what links that are off explain as well."""
     slow = slow_motions([recording], used)
     if sum(len(motion) for motion in slow) < _FEWEST:
         return None
-    tried = list(hypotheses(robot, slow))
-    late = late_torque(robot, recording, used)
-    tried += [] if late is None else [delayed(*late)]
-    faulty = faulty_samples(robot, recording, used)
-    tried += [] if faulty is None else [faulty]
-    described, fitted = (_judge(robot, slow, fitted=fitted) for fitted in (False, True))
-    found = _best(robot, tried, described, fitted)
-    if found is not None:
-        likely = (one.detailed(slow) if one.detailed else one for one in found.hypotheses)
-        found = replace(found, hypotheses=tuple(likely))
-    if found is not None and not found.links:
-        return found
-    for judge in (described, fitted):
-        as_recorded = judge(AS_RECORDED)
-        # data that are predicted as they were recorded, or are too few to ask
-        if as_recorded is None or 100.0 * float(as_recorded[0].joints.max()) < LIMITS.poor:
-            return found
-    changes = [one for one in tried if one.kind != 'unit' and not one.of_masses]
-    return _best(robot, changes, fitted) or found
+    reference = _Reference.of(robot, slow)
+    if reference is None:
+        return None
+    if reference.without.best_gain() < LIMITS.gain and not reference.alone:
+        return None
+    late, faulty = late_torque(robot, recording, used), faulty_samples(robot, recording, used)
+    tried = [
+        *hypotheses(robot, slow),
+        *([] if late is None else [delayed(*late)]),
+        *([] if faulty is None else [faulty]),
+    ]
+    rows = list(reference.rows(tried))
+    for ratio in ('as_described', 'as_fitted') if rows else ():
+        finer = max(rows, key=attrgetter(ratio)).hypothesis.nearby()
+        rows += reference.rows(finer)
+    return reference.likeliest(rows)
+
+
+def _error(
+    robot: Robot, slow: Sequence[Motion], one: Hypothesis, *, near: bool
+) -> PredictionError | None:
+    """Return how well a hypothesis predicts motions; None where too few samples remain."""
+    motion = thinned(one.stretches(slow), _ROWS)
+    if motion is None or len(motion) < _FEWEST:
+        return None
+    return prediction_error(one.body(robot), motion, near=near)
+
+
+def _first(
+    rows: Sequence[_Row], ratio: str, before: PredictionError, *, fitted: bool = False
+) -> Mistake:
+    """Return the hypothesis with the largest ratio, and those of other kinds that are as good."""
+    value = attrgetter(ratio)
+    first, *others = sorted(rows, key=value, reverse=True)
+    likely = {first.hypothesis.kind: first.hypothesis}
+    for row in others:
+        more = LIMITS.gain ** (row.hypothesis.values - first.hypothesis.values + 0.5)
+        if value(row) * more > value(first):
+            likely.setdefault(row.hypothesis.kind, row.hypothesis)
+    after = first.fitted if fitted else first.described
+    return Mistake(tuple(likely.values()), before, after, fitted)
 
 
 def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Hypothesis | None:
@@ -207,124 +296,6 @@ def faulty_samples(robot: Robot, recording: Recording, used: Conditioning) -> Hy
     many = '' if count == 1 else f' (the first of {count})'
     text = f'{first}{many}: leave out what is faulty, or record again'
     return Hypothesis('samples', text, where=(text,), without=without)
-
-
-def effort_factor(robot: Robot, slow: Sequence[Motion]) -> float | None:
-    """
-    Return how many times what is described the efforts of motions are, all joints together.
-
-    Friction, offset and drive inertia of each joint are fitted beside it. None where motion is
-    too short, or the efforts do not follow the description with any factor.
-
-    """
-    found = _judge(robot, slow)(other_scale(robot))
-    if found is None or 100.0 * found[0].whole(robot) > LIMITS.unusable:
-        return None
-    factor = float(found[0].shared[0])
-    return factor if factor > 0.0 else None
-
-
-def is_factor(robot: Robot, slow: Sequence[Motion], factor: float) -> bool:
-    """Whether efforts are so many times what is described: the one that fits leaves no less."""
-    converted = [one.with_torque(one.tau / factor) for one in slow if one.tau is not None]
-    free, fixed = (
-        _judge(robot, motions)(hypothesis)
-        for motions, hypothesis in ((slow, other_scale(robot)), (converted, AS_RECORDED))
-    )
-    return free is not None and fixed is not None and fixed[0].gain(free[0]) < LIMITS.gain**0.5
-
-
-def _judge(robot: Robot, slow: Sequence[Motion], *, fitted: bool = False) -> Judge:
-    """Return what predicts data with the body as described, or with the nearest that fits."""
-
-    def judge(one: Hypothesis) -> tuple[PredictionError, Hypothesis] | None:
-        motion = thinned(one.stretches(slow), _ROWS_FITTED if fitted else _ROWS)
-        if motion is None or len(motion) < _FEWEST:
-            return None
-        if fitted:
-            return nearest_error(robot, motion), one
-        error = described_error(motion, *one.torque(robot, motion))
-        return error, one.settled(error.shared) if one.settled else one
-
-    return judge
-
-
-def _best(
-    robot: Robot, tried: Sequence[Hypothesis], judge: Judge, near: Judge | None = None
-) -> Mistake | None:
-    """Return the hypothesis that gains most, if that is enough for what it is free to choose."""
-    # Beside a judge by the body as described, another one by bodies near it says which are of
-    # links.
-    as_recorded = judge(AS_RECORDED)
-    if as_recorded is None:
-        return None
-    before, fitted = as_recorded[0], near is None
-    nothing = None if fitted else judge(WITHOUT_BODY)
-    rival = before if nothing is None else before.least(nothing[0])
-    price = LIMITS.gain if not fitted else LIMITS.gain**LIMITS.free_body
-    if rival.best_gain() < price:
-        return None
-    rows = _judged(tried, judge, rival, price)
-    if not rows:
-        return None
-    nearest = max(rows, key=lambda row: row.surplus)
-    rows += _judged(nearest.hypothesis.nearby(), judge, rival, price)
-    believed = [
-        row
-        for row in rows
-        if row.surplus >= 1.0
-        and 100.0 * row.after.whole(robot) < LIMITS.unusable
-        and before.of_data(row.after) >= 1.0  # not only a body that is nearer
-    ]
-    if not believed:
-        return None
-    sure = believed
-    likeliest = None if near is None else near(AS_RECORDED)
-    if near is not None and likeliest is not None:
-        # where the centre of a wrist lies near its axis, a few millimetres turn its weight by as
-        # much as a wrong zero; a factor of all masses is none where it is material
-        def beyond_bodies(one: Hypothesis) -> bool:
-            put_right = None if one.of_masses else near(one)
-            if put_right is None:
-                return True
-            return likeliest[0].gain(put_right[0]) >= LIMITS.gain**one.values
-
-        sure = [row for row in believed if beyond_bodies(row.hypothesis)]
-        believed = sure or believed
-    first = max(believed, key=lambda row: row.surplus)
-    as_good = {
-        row.hypothesis.kind: row.hypothesis
-        for row in sorted(believed, key=lambda row: row.gain)
-        if row.hypothesis.kind != first.hypothesis.kind
-        and row.gain * LIMITS.gain**0.5 > first.gain
-    }
-    likely = (first.hypothesis, *as_good.values())
-    return Mistake(likely, before, first.after, fitted, links=not sure)
-
-
-class _Row(NamedTuple):
-    """A hypothesis, how far it divides the error, and that over what it has to."""
-
-    hypothesis: Hypothesis
-    after: PredictionError
-    gain: float
-    surplus: float
-
-
-def _judged(
-    tried: Sequence[Hypothesis],
-    judge: Judge,
-    rival: PredictionError,
-    price: float,
-) -> list[_Row]:
-    rows = []
-    for one in tried:
-        pair = judge(one)
-        if pair is not None and pair[1].material:
-            after, settled = pair
-            gain = rival.gain(after)
-            rows.append(_Row(settled, after, gain, gain / price**settled.values))
-    return rows
 
 
 def slow_motions(recordings: Sequence[Recording], used: Conditioning) -> list[Motion]:

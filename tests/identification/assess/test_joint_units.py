@@ -9,9 +9,8 @@ from armid_ros.effects import make_effect
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.data_faults import check_data
 from armid_ros.identification.assess.joint_units import (
-    factors_apart,
-    knows,
-    units_beside_model,
+    factors_since,
+    unit_faults,
     units_beyond_drives,
 )
 from armid_ros.identification.rows.regression import Stretch
@@ -57,10 +56,6 @@ def beyond_drives(robot, recording):
     return list(units_beyond_drives(robot, [recording], filtered(recording)))
 
 
-def beside_model(arm, recording):
-    return list(units_beside_model(arm, filtered(recording)))
-
-
 def test_half_of_the_readings_at_sixty_times_a_limit_are_in_another_unit(arm, run):
     (said,) = beyond_drives(arm.robot, times(run, 1e3))
     assert said.startswith(f'the torque of {arm.robot.joints[WRIST]} seems to be in N mm or N cm')
@@ -77,12 +72,13 @@ def test_currents_are_in_no_one_unit(arm, run):
     joints = arm.robot.joints
     gains = np.array([0.083, 0.025, 0.09, 0.125, 0.3, 0.5])
     currents = replace(run, tau=run.tau / gains)
-    said = factors_apart(arm, filtered(currents), filtered(run), 'N mm')
+    (said,) = unit_faults(arm, filtered(currents), filtered(run))
     assert f'12 in {joints[0]}, 40 in {joints[1]}' in said and 'currents?' in said
     assert said.endswith('--current-gain 0.083,0.025,0.09,0.125,0.3,0.5')
-    for factor, unit in ((1.0, ''), (1e3, 'N mm')):
+    for factor, unit in ((1.0, []), (1e3, ['torques are in N mm'])):
         scaled = filtered(replace(run, tau=factor * run.tau))
-        assert factors_apart(arm, scaled, filtered(run), unit) == ''
+        found = unit_faults(arm, scaled, filtered(run))
+        assert [one.partition(' if ')[0] for one in found] == unit
 
 
 def moved(motion, joints, pose):
@@ -116,9 +112,9 @@ def test_a_model_that_a_baseline_does_not_determine_tells_no_factor(arm):
     alone = [recorded(arm, moved(motion, joints, pose)) for joints in ([0], [1, 2, 3, 4, 5])]
     now = filtered(times(recorded(model, motion), 1.0 / 500.0, (0,)))
     before = [part for one in alone for part in filtered(one)]
-    assert factors_apart(model, now, before) == ''
-    assert not knows(model, before)[0] and knows(arm, before)[0]
-    assert 'in shoulder_pitch' in factors_apart(model, now)
+    assert unit_faults(model, now, before) == []
+    assert factors_since(model, now, before)[0] == 0.0 < factors_since(model, now)[0]
+    assert factors_since(arm, before, before)[0] == pytest.approx(1.0)
 
 
 def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
@@ -129,21 +125,21 @@ def test_limits_that_the_body_itself_needs_more_than_are_wrong(arm, run):
 
 @pytest.mark.parametrize(('factor', 'unit'), [(1e3, 'N mm'), (1e2, 'N cm'), (1e-3, 'kN m')])
 def test_a_model_with_the_friction_tells_the_unit(arm, run, factor, unit):
-    (said,) = beside_model(arm, times(run, factor))
+    (said,) = unit_faults(arm, filtered(times(run, factor)))
     assert arm.robot.joints[WRIST] in said
     assert f'in {unit} instead' in said
 
 
 @pytest.mark.parametrize('factor', [1.0, 3.0, 20.0])
 def test_other_factors_and_all_joints_alike_are_no_unit_of_a_joint(arm, run, factor):
-    assert beside_model(arm, times(run, factor)) == []
-    assert beside_model(arm, times(run, 1e3 * factor, range(6))) == []
+    assert unit_faults(arm, filtered(times(run, factor))) == []
+    assert unit_faults(arm, filtered(times(run, 1e3 * factor, range(6)))) == []
 
 
 def test_a_factor_that_was_there_before_is_that_of_the_model(arm, run):
     wrong = filtered(times(run, 1e3))
-    assert list(units_beside_model(arm, wrong, wrong)) == []
-    assert len(list(units_beside_model(arm, wrong, filtered(run)))) == 1
+    assert unit_faults(arm, wrong, wrong) == []
+    assert len(unit_faults(arm, wrong, filtered(run))) == 1
 
 
 def test_the_grade_of_a_fit_of_such_a_torque_is_poor(arm, run):
