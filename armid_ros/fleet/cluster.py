@@ -26,7 +26,7 @@ PATIENCE = 120.0
 #: How often is looked whether all workers of this machine are there [s].
 _LOOK_EVERY = 2.0
 
-#: What Dask does beside the work all the time, for pages that nobody looks at here.
+#: What Dask does all the time but the work, for pages that nobody looks at here.
 _QUIET = {
     'distributed.worker.profile.enabled': False,
     'distributed.admin.tick.interval': '1s',
