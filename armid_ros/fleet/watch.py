@@ -425,11 +425,11 @@ def _series(
     )
     keys, numbers = ('arm', 'name', 'joint', 'unit'), ('place', 'value', 'std')
     groups = table.group_by(keys, use_threads=False).aggregate([(one, 'list') for one in numbers])
-    for *key, at, values, std in zip(
-        *(groups[name].to_pylist() for name in keys),
-        *(groups[f'{name}_list'] for name in numbers),
+    for arm, name, joint, unit, *lists in zip(
+        *(groups[one].to_pylist() for one in keys),
+        *(groups[f'{one}_list'] for one in numbers),
         strict=True,
     ):
-        numbers_of = [one.values.to_numpy(zero_copy_only=False) for one in (at, values, std)]
-        found.append(ParameterHistory(*key, days[numbers_of[0]], numbers_of[1], numbers_of[2]))
+        at, values, std = (one.values.to_numpy(zero_copy_only=False) for one in lists)
+        found.append(ParameterHistory(arm, name, joint, unit, days[at], values, std))
     return found
