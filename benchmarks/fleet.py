@@ -203,7 +203,9 @@ def costs(folder, workers=2):
 def run_cost(bags, workers):
     """Identify a fleet; return processor seconds a bag, wall time, memory and bytes."""
     from armid_ros.fleet.cluster import connected
-    from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
+    from armid_ros.fleet.job import FleetSettings
+    from armid_ros.fleet.plan import plan_fleet
+    from armid_ros.fleet.run import identify_fleet
 
     with tempfile.TemporaryDirectory() as out, connected(None, workers) as client:
         settings = FleetSettings(EFFECTS)
@@ -229,7 +231,7 @@ def run_cost(bags, workers):
 
 def loop_seconds(bags):
     """Return processor seconds of identify for a bag, in one process."""
-    from armid_ros.fleet.identify import FleetSettings
+    from armid_ros.fleet.job import FleetSettings
     from armid_ros.fleet.kinds import choose_filters
     from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 
@@ -260,8 +262,7 @@ def _used(dask_worker):
 
 
 def merge(count=10_000, joints=7, rigid=63):
-    """Time the merge of triangles of seven joints with 84 parameters, as in a tree."""
-    from armid_ros.fleet.merge import FAN_IN
+    """Time the merge of triangles of seven joints with 84 parameters, sixteen at a time."""
     from armid_ros.identification.fitting.triangle import Triangle
 
     rng = np.random.default_rng(0)
@@ -274,7 +275,7 @@ def merge(count=10_000, joints=7, rigid=63):
     one = Triangle(factors, np.full(joints, 1000.0))
     level, start = [one] * count, time.process_time()
     while len(level) > 1:
-        level = [Triangle.merged(level[k : k + FAN_IN]) for k in range(0, len(level), FAN_IN)]
+        level = [Triangle.merged(level[k : k + 16]) for k in range(0, len(level), 16)]
     seconds = time.process_time() - start
     expected = np.sqrt(count) * np.linalg.norm(one.factors)
     error = abs(np.linalg.norm(level[0].factors) / expected - 1.0)

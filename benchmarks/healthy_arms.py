@@ -14,8 +14,8 @@ small or too large; errors have heavy tails; bags are missing. Some arms change,
 
 import argparse
 
-from armid_ros.fleet.changes import judge, named
-from armid_ros.fleet.scatter import ParameterHistory, without_days
+from armid_ros.changes.histories import judge, named
+from armid_ros.changes.scatter import ParameterHistory, spreads, without_days
 import numpy as np
 
 JOINTS = ('waist', 'shoulder', 'elbow')
@@ -94,7 +94,9 @@ def change_of(arm, bags, rng):
 def tally(arms, bags, sick, rng, alpha=0.05):
     """Return how many arms that have changed are named, and how many healthy ones."""
     series = draw(arms, bags, sick, rng)
-    found = {one.arm for one in judge(without_days(series)) if named(one, alpha)}
+    compared = without_days(series)
+    judged = judge([(compared, spreads(compared))])
+    found = {one.arm for one in judged if named(one, alpha)}
     ill = {f'arm_{arm}' for arm in range(sick)}
     return len(found & ill), len(found - ill)
 

@@ -3,8 +3,8 @@
 """
 Many arms and many bags: identified, watched over time and diagnosed on a cluster.
 
-Dask schedules, repeats and moves; fsspec opens stores; pyarrow keeps tables. Here is what they are
-asked to do: a bag becomes a triangle of fixed size, triangles of one arm become its estimate, and
+Dask schedules, repeats and moves; fsspec opens stores; pyarrow keeps tables. Here is
+their work: a bag becomes a triangle of fixed size, triangles of one arm become its estimate, and
 estimates over time become changes and alarms. Needs the extra ``fleet``.
 
 """

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The report of a bag, made when somebody asks for it: its own fit with the filters of the fleet.
+The report of a bag, made on demand: its own fit with the filters of the fleet.
 
     reports/arm=A/BAG/    identification.json, model.yaml, report.html
 
@@ -14,25 +14,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 import tempfile
-from typing import Any
 
 from armid_ros.api.identification import identify
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import BagFile, folder_of
-from armid_ros.fleet.identify import kind_arm
-from armid_ros.fleet.job import Filters
 from armid_ros.fleet.kinds import document
+from armid_ros.fleet.plan import kind_arm
 from armid_ros.fleet.store import fetched, Store
-from armid_ros.fleet.watch import Watch, WatchedArm
+from armid_ros.fleet.watch import arm_of, Watch, WatchedArm
+from armid_ros.identification import Conditioning
 from armid_ros.recording import read_recording, Recording
 
 
-def asked_bags(found: Watch, arm: str, names: Sequence[str]) -> list[str]:
+def bags_to_report(found: Watch, name: str, bags: Sequence[str]) -> tuple[WatchedArm, list[str]]:
     """
-    Return the URLs of the bags of an arm that reports are wanted of.
+    Return an arm, and the URLs of its bags that reports are wanted of.
 
-    Without names, those beside its change, and the latest one.
+    Without names of bags, those around its change, and the latest one.
 
     Raises
     ------
@@ -40,11 +39,20 @@ def asked_bags(found: Watch, arm: str, names: Sequence[str]) -> list[str]:
         There is no such arm, or no such bag of it.
 
     """
-    by_name = {one.arm: one for one in found.arms}
-    if arm not in by_name:
-        known = ', '.join(sorted(by_name)[:5])
-        raise FleetError(f"there is no arm '{arm}'; there are {known} ...")
-    return _named(by_name[arm], names) if names else _usual(by_name[arm])
+    arm = arm_of(found, name)
+    urls = [str(row['bag']) for row in arm.bags]
+    short = [url.rstrip('/').rsplit('/', 1)[-1] for url in urls]
+    chosen = []
+    for bag in bags:
+        fitting = [url for url, last in zip(urls, short, strict=True) if bag in (url, last)]
+        if not fitting:
+            known = ', '.join(short[-5:])
+            raise FleetError(f"{arm.arm}: has no bag '{bag}'; the latest are {known}")
+        chosen += fitting
+    if not bags:
+        around = [str(arm.bag_at(change, k)['bag']) for change in arm.named[:1] for k in (-1, 0)]
+        chosen = [*around, *urls[-1:]]
+    return arm, list(dict.fromkeys(chosen))
 
 
 def write_reports(
@@ -55,7 +63,7 @@ def write_reports(
 ) -> list[str]:
     """Write the reports of some bags of an arm; return their files among the results."""
     facts = document(store)['kinds'][arm.kind]
-    model, filters = kind_arm(store, facts, arm.kind), Filters(**facts['filters'])
+    model, filters = kind_arm(store, facts, arm.kind), Conditioning(**facts['filters'])
     written = []
     for url in urls:
         with fetched(url) as path:
@@ -66,7 +74,7 @@ def write_reports(
 
 
 def write_report(
-    store: Store, arm: str, url: str, recording: Recording, model: ArmModel, filters: Filters
+    store: Store, arm: str, url: str, recording: Recording, model: ArmModel, filters: Conditioning
 ) -> str:
     """Write the report of one bag; return its file among the results."""
     one = identify(model, recording, cutoff=filters.cutoff_hz, decimation=filters.decimation)
@@ -82,23 +90,3 @@ def keep(store: Store, save: Callable[[str], Path], name: str) -> None:
         files = sorted(Path(folder).iterdir(), key=lambda file: file.name == 'report.html')
         for file in files:
             store.write(f'{name}/{file.name}', file.read_bytes())
-
-
-def _named(arm: WatchedArm, names: Sequence[str]) -> list[str]:
-    found = []
-    for name in names:
-        fitting = [str(row['bag']) for row in arm.bags if name in (str(row['bag']), _last(row))]
-        if not fitting:
-            known = ', '.join(_last(row) for row in arm.bags[-5:])
-            raise FleetError(f"{arm.arm}: has no bag '{name}'; the latest are {known}")
-        found += fitting
-    return list(dict.fromkeys(found))
-
-
-def _usual(arm: WatchedArm) -> list[str]:
-    beside = [arm.bag_at(arm.named[0], offset)['bag'] for offset in (-1, 0)] if arm.named else []
-    return list(dict.fromkeys(map(str, [*beside, *(row['bag'] for row in arm.bags[-1:])])))
-
-
-def _last(row: dict[str, Any]) -> str:
-    return str(row['bag']).rstrip('/').rsplit('/', 1)[-1]

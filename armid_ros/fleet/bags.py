@@ -99,7 +99,10 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
     found: dict[str, BagFile] = {}
     for pattern in patterns:
         filesystem, path = opened(pattern)
-        listed = _listed(filesystem, path, pattern)
+        try:
+            listed = filesystem.glob(path, detail=True)
+        except Exception as error:  # every store has errors of its own
+            raise FleetError(f'{pattern}: cannot be listed: {error}') from error
         bags = list(_bags(filesystem, listed))
         if not bags:
             raise FleetError(
@@ -108,7 +111,12 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
             )
         for at, size, version in bags:
             url = filesystem.unstrip_protocol(at)
-            arm = _arm(path, at) if regular is None else _searched(regular, url)
+            arm = _arm(path, at)
+            if regular is not None:
+                match = regular.search(url)
+                if match is None:
+                    raise FleetError(f'{url}: --arm {arm_pattern} finds no arm in it')
+                arm = match.group(1) or ''
             length = len(file_name(arm).encode())
             if not 0 < length <= LONGEST_NAME:
                 raise FleetError(
@@ -118,14 +126,6 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
             plain = at if url.startswith('file://') else url
             found[plain] = BagFile(arm, plain, _day(at), size, version)
     return sorted(found.values())
-
-
-def _listed(filesystem: Any, path: str, pattern: str) -> Mapping[str, Mapping[str, Any]]:
-    try:
-        listed: Mapping[str, Mapping[str, Any]] = filesystem.glob(path, detail=True)
-    except Exception as error:  # every store has errors of its own
-        raise FleetError(f'{pattern}: cannot be listed: {error}') from error
-    return listed
 
 
 def _bags(
@@ -160,19 +160,12 @@ def _digest(*parts: str) -> str:
 
 
 def _arm(pattern: str, path: str) -> str:
+    """Return what the first wildcard stands for; where that is the bag, its folder."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILD.search(part)]
     parts = path.rstrip('/').split('/')
-    at = min(wild[0] if wild else len(parts) - 1, len(parts) - 1)
-    if at == len(parts) - 1 and at > 0:
-        at -= 1
+    last = len(parts) - 1
+    at = min(wild[0] if wild else last, max(last - 1, 0))
     return parts[at]
-
-
-def _searched(regular: re.Pattern[str], url: str) -> str:
-    match = regular.search(url)
-    if match is None:
-        raise FleetError(f'{url}: --arm {regular.pattern} finds no arm in it')
-    return match.group(1) or ''
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 import logging
 import os
 import tempfile
@@ -15,7 +14,6 @@ from armid_ros.errors import FleetError
 from armid_ros.version import __version__
 import dask
 from distributed import Client, LocalCluster
-from tornado.ioloop import PeriodicCallback
 
 #: What a worker of this machine may take before Dask moves results to the disk [bytes].
 WORKER_MEMORY = 1_200_000_000
@@ -23,10 +21,10 @@ WORKER_MEMORY = 1_200_000_000
 ANSWER = 30.0
 #: How long one that was lost may take to come back [s].
 PATIENCE = 120.0
-#: How often is looked whether all workers of this machine are there [s].
-_LOOK_EVERY = 2.0
+#: How often is looked whether all workers of this machine are there.
+_LOOK_EVERY = '2s'
 
-#: What Dask does beside the work all the time, for pages that nobody looks at here.
+#: What Dask does all the time but the work, for pages that nobody looks at here.
 _QUIET = {
     'distributed.worker.profile.enabled': False,
     'distributed.admin.tick.interval': '1s',
@@ -91,28 +89,14 @@ def _embedded(workers: int | None) -> Iterator[Client]:
                     silence_logs=logging.CRITICAL,
                 ) as cluster,
                 Client(cluster) as client,
-                _kept_up(cluster, count),
             ):
+                # Dask starts a worker again that has ended, but not one that ended while it was
+                # being started, and gives up one that takes long: with no worker left, tasks
+                # would wait for ever
+                cluster.adapt(minimum=count, maximum=count, interval=_LOOK_EVERY)
                 yield client
     finally:
         os.environ['PYTHONSAFEPATH'] = before
-
-
-@contextmanager
-def _kept_up(cluster: LocalCluster, workers: int) -> Iterator[None]:
-    """
-    Start workers anew that are gone for good.
-
-    Dask starts a worker again that has ended, but not one that ended while it was being started,
-    and gives up one that takes long: with no worker left, tasks would wait for ever.
-
-    """
-    again = PeriodicCallback(partial(cluster.scale, workers), 1000.0 * _LOOK_EVERY)
-    cluster.loop.add_callback(again.start)
-    try:
-        yield
-    finally:
-        cluster.loop.add_callback(again.stop)
 
 
 def _check_versions(client: Client, scheduler: str) -> None:

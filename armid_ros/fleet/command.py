@@ -4,13 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import Any
+import time
+from typing import Any, TYPE_CHECKING
 
+from armid_ros.cli import options as command_line
 from armid_ros.cli import parameters as options
+from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import FleetError
+from armid_ros.files import json_text
 import click
+
+if TYPE_CHECKING:
+    from armid_ros.fleet.store import Store
+
+#: Refused bags and changes that are shown; all are among the results.
+_SHOWN = 20
 
 
 def _out(command: Callable[..., None]) -> Callable[..., None]:
@@ -41,7 +52,7 @@ _alpha = click.option(
 
 
 class _Fleet(click.Group):
-    """Says which packages are missing before anything is asked of them."""
+    """Names missing packages before they are needed."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command of the group."""
@@ -60,6 +71,27 @@ class _Fleet(click.Group):
 )
 def fleet() -> None:
     """Identify, watch and diagnose many arms with many bags."""
+
+
+@contextmanager
+def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
+    """Hold a folder of results while a command runs, and show how far it is."""
+    from armid_ros.fleet.kinds import SCHEMA
+    from armid_ros.fleet.store import Store, StoreError
+
+    store = Store(out)
+    try:
+        with progress(doing) as tick:
+            if store.local is not None:
+                command_line.hold(store.local, SCHEMA)
+            yield store, tick
+    except StoreError as error:
+        raise FleetError(f'{error}; is --out a folder that can be read and written?') from error
+
+
+def _print_json(name: str, **document: Any) -> None:
+    """Print what a command found for programs to read."""
+    click.echo(json_text({'schema': f'armid/{name}/1', **document}, indent=1))
 
 
 @fleet.command(
@@ -103,17 +135,75 @@ def identify(
     scheduler: str | None,
     workers: int | None,
     arm: str | None,
-    gravity: str,
+    method: str,
+    cutoff: float | None,
+    decimation: int | None,
     joints: str | None,
     as_json: bool,
-    **fit: Any,
+    **settings: Any,
 ) -> None:
     """Identify every arm of a fleet from its bags."""
-    from armid_ros.fleet.work import ClusterOptions, FleetFitOptions, identify_bags, RobotOptions
+    from armid_ros.fleet.bags import find_bags
+    from armid_ros.fleet.cluster import connected
+    from armid_ros.fleet.job import FleetSettings
+    from armid_ros.fleet.kinds import read_table
+    from armid_ros.fleet.plan import plan_fleet
+    from armid_ros.fleet.run import identify_fleet
+    from armid_ros.identification import SignalSettings
 
-    robots = RobotOptions(robot_source, table, gravity, joints)
-    cluster = ClusterOptions(scheduler, workers)
-    identify_bags(globs, arm, robots, out, cluster, FleetFitOptions(**fit), as_json)
+    if (robot_source is None) == (table is None):
+        raise FleetError('name the robot of all arms with --robot, or a table with --robots')
+    robots = read_table(table) if table is not None else str(robot_source)
+    fit = FleetSettings(
+        joints=joints or '',
+        weighted=method == 'wls',
+        signals=SignalSettings(cutoff, decimation),
+        reading=command_line.read_settings(),
+        **settings,
+    )
+    start = time.monotonic()
+    with _results(out, 'listing bags') as (_, tick):
+        bags = find_bags(globs, arm)
+        jobs = plan_fleet(bags, robots, out, fit)
+        tick(0.0, 'starting workers')
+        with connected(scheduler, workers) as client:
+            outcome = identify_fleet(
+                client, bags, jobs, lambda ended, of: tick(ended / of, f'{ended} of {of} bags')
+            )
+    refused = [
+        {
+            'arm': one.bag.arm,
+            'bag': one.bag.url,
+            'what': 'failed' if one.failed else 'refused',
+            'reason': one.reason,
+        }
+        for one in outcome.refused
+    ]
+    without = {one.arm: one.problem for one in outcome.arms if one.problem}
+    if as_json:
+        counts = {'arms': len(outcome.arms), 'bags': outcome.done + len(refused)}
+        done = {'done': outcome.done, 'found': outcome.found}
+        _print_json(
+            'fleet-run', out=out, **counts, **done, refused=refused, without_estimate=without
+        )
+        return
+    found = f', {outcome.found} of them by earlier runs' if outcome.found else ''
+    say(
+        f'{len(outcome.arms)} arms: {outcome.done} bags done{found}, {len(refused)} refused, '
+        f'in {time.monotonic() - start:.0f} s'
+    )
+    for robot, filters in outcome.filters.items():
+        say(
+            f'{robot}: as `armid identify --cutoff {filters.cutoff_hz:.6g} '
+            f'--decimation {filters.decimation}`'
+        )
+    for name, problem in without.items():
+        say(f'{name}: no estimate: {problem}')
+    if refused:
+        print_rows(refused[:_SHOWN], as_json=False)
+        if len(refused) > _SHOWN:
+            say(f'... and {len(refused) - _SHOWN} more, in {out}/refused')
+    say(f'{out}: bags, parameters, arms, refused (Parquet), fleet.json')
 
 
 @fleet.command(epilog='Example: armid fleet watch --out results')
@@ -122,9 +212,27 @@ def identify(
 @options.as_json
 def watch(out: str, alpha: float, as_json: bool) -> None:
     """Find changes and wear over time, and draw the overview."""
-    from armid_ros.fleet.work import watch_arms
+    from armid_ros.fleet.pages import write_pages
+    from armid_ros.fleet.watch import change_rows, watch_fleet, write_watch
 
-    watch_arms(out, alpha, as_json)
+    with _results(out, 'reading results') as (store, tick):
+        found = watch_fleet(store, alpha)
+        tick(0.5, 'writing')
+        write_watch(store, found)
+        write_pages(store, found)
+    rows: list[Mapping[str, Any]] = [row for arm in found.arms for row in change_rows(arm)[:1]]
+    if as_json:
+        _print_json('fleet-watch', changes=rows)
+        return
+    counts = dict.fromkeys(('changed', 'wearing', 'healthy', 'too few bags'), 0)
+    for arm in found.arms:
+        counts[arm.health] += 1
+    say(', '.join(f'{count} {word}' for word, count in counts.items() if count))
+    for row in rows[:_SHOWN]:
+        say(f'{row["arm"]}: {row["text"]}')
+    if len(rows) > _SHOWN:
+        say(f'... and {len(rows) - _SHOWN} more, in {out}/alarms.jsonl')
+    say(f'{out}: index.html, pages/, watch/ (Parquet), alarms.jsonl')
 
 
 @fleet.command(epilog='Example: armid fleet diagnose --out results')
@@ -135,11 +243,44 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
 @click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
 @_alpha
 @options.as_json
-def diagnose(**values: Any) -> None:
+def diagnose(
+    out: str,
+    scheduler: str | None,
+    workers: int | None,
+    arms: tuple[str, ...],
+    everyone: bool,
+    alpha: float,
+    as_json: bool,
+) -> None:
     """Name what has happened to arms, each with its own past as baseline."""
-    from armid_ros.fleet.work import diagnose_arms
+    from armid_ros.fleet.cluster import connected
+    from armid_ros.fleet.diagnose import cases, diagnose_fleet
+    from armid_ros.fleet.pages import write_pages
+    from armid_ros.fleet.watch import watch_fleet, write_watch
 
-    diagnose_arms(**values)
+    rows: list[dict[str, Any]] = []
+    with _results(out, 'reading results') as (store, tick):
+        found = watch_fleet(store, alpha)
+        chosen = cases(found, arms, everyone)
+        if chosen:
+            with connected(scheduler, workers) as client:
+                rows = diagnose_fleet(
+                    client,
+                    store,
+                    chosen,
+                    found,
+                    lambda ended, of: tick(ended / of, f'{ended} of {of} arms'),
+                )
+        write_watch(store, found)
+        write_pages(store, found)
+    if as_json:
+        _print_json('fleet-diagnoses', arms=rows)
+        return
+    if not rows:
+        say('no arm is named; --arm or --all diagnose others')
+    for row in rows:
+        say(f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}')
+    say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')
 
 
 @fleet.command(epilog='Example: armid fleet report --out results --arm arm_7 --bag 2026-01-31')
@@ -150,11 +291,24 @@ def diagnose(**values: Any) -> None:
     'bags',
     multiple=True,
     metavar='NAME',
-    help='As on the page of the arm, or a URL; those beside its change and the latest, if none.',
+    help='As on the page of the arm, or a URL; those around its change and the latest, if none.',
 )
 @options.as_json
 def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
     """Make the reports of bags of an arm, and link them on its page."""
-    from armid_ros.fleet.work import report_bags
+    from armid_ros.fleet.bag_reports import bags_to_report, write_reports
+    from armid_ros.fleet.pages import write_pages
+    from armid_ros.fleet.watch import watch_fleet
 
-    report_bags(out, arm, bags, as_json)
+    with _results(out, 'reading results') as (store, tick):
+        found = watch_fleet(store)
+        watched, urls = bags_to_report(found, arm, bags)
+        written = write_reports(
+            store, watched, urls, lambda ended, of: tick(ended / of, f'{ended} of {of} bags')
+        )
+        write_pages(store, found, [watched])
+    if as_json:
+        _print_json('fleet-reports', reports=written)
+        return
+    for name in written:
+        say(f'{out}/{name}')

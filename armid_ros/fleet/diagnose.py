@@ -22,20 +22,20 @@ from typing import Any
 from armid_ros.api.diagnosis import diagnose
 from armid_ros.api.identification import identify
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError, FleetError
+from armid_ros.errors import ArmidError
 from armid_ros.fleet.bag_reports import keep, write_report
 from armid_ros.fleet.bags import folder_of
-from armid_ros.fleet.identify import kind_arm
-from armid_ros.fleet.job import Filters
 from armid_ros.fleet.kinds import document
+from armid_ros.fleet.plan import kind_arm
 from armid_ros.fleet.run import RETRIES
 from armid_ros.fleet.store import fetched, Store
-from armid_ros.fleet.watch import Watch, WatchedArm
-from armid_ros.recording import read_recording, Recording
+from armid_ros.fleet.watch import arm_of, Watch
+from armid_ros.identification import Conditioning
+from armid_ros.recording import read_recording
 from distributed import as_completed, Client
 import pyarrow as pa
 
-#: Bags before a change that say what the arm was, and bags after it that are looked at.
+#: Bags before a change that the arm is identified from, and bags after it that are diagnosed.
 BEFORE, AFTER = 3, 3
 
 DIAGNOSES = pa.schema(
@@ -90,15 +90,22 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
         An arm is not there.
 
     """
-    by_name = {arm.arm: arm for arm in found.arms}
-    missing = [arm for arm in arms if arm not in by_name]
-    if missing:
-        raise FleetError(f"there is no arm '{missing[0]}'; there are {', '.join(by_name)}")
-    if arms:
-        chosen = [by_name[arm] for arm in arms]
-    else:
+    chosen = [arm_of(found, name) for name in arms]
+    if not arms:
         chosen = [arm for arm in found.arms if arm.named or everyone]
-    return [_case(arm) for arm in chosen if len(arm.bags) >= 2]
+    some = []
+    for arm in chosen:
+        urls = [str(row['bag']) for row in arm.bags]
+        middle = max(1, len(urls) // 2)
+        before, after = urls[:middle], urls[middle:]
+        if arm.named and arm.named[0].kind == 'trend':
+            before, after = urls[: min(BEFORE, middle)], urls[-min(AFTER, len(urls) - middle) :]
+        elif arm.named:
+            cut = urls.index(arm.bag_at(arm.named[0])['bag'])
+            before, after = urls[:cut], urls[cut:]
+        if len(urls) >= 2:
+            some.append(ArmCase(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER])))
+    return some
 
 
 def diagnose_fleet(
@@ -120,7 +127,7 @@ def diagnose_fleet(
     futures = {}
     for case in chosen:
         facts = kinds[kind_of[case.arm]]
-        filters = Filters(**facts['filters'])
+        filters = Conditioning(**facts['filters'])
         model = model_of[kind_of[case.arm]]
         future = client.submit(
             one_arm, case, model, filters, facts['topic'], store.url, retries=RETRIES, pure=False
@@ -144,14 +151,19 @@ def diagnose_fleet(
 
 
 def one_arm(
-    case: ArmCase, model: ArmModel, filters: Filters, topic: str | None, out: str
+    case: ArmCase, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Task: identify what an arm was, diagnose what it is, and draw the bags beside the change."""
+    """Task: identify what an arm was, diagnose what it is, and draw the bags around the change."""
     store = Store(out)
     try:
         with ExitStack() as stack:
             before, after = (
-                [_read(stack, url, model, topic) for url in urls]
+                [
+                    read_recording(
+                        stack.enter_context(fetched(url)), joints=model.robot.joints, topic=topic
+                    )
+                    for url in urls
+                ]
                 for urls in (case.before, case.after)
             )
             for url, recording in zip(
@@ -181,24 +193,6 @@ def one_arm(
         None if gap is None else float(gap.closed),
         f'{report}/report.html',
     )
-
-
-def _case(arm: WatchedArm) -> ArmCase:
-    urls = [str(row['bag']) for row in arm.bags]
-    middle = max(1, len(urls) // 2)
-    if not arm.named:
-        before, after = urls[:middle], urls[middle:]
-    elif arm.named[0].kind == 'trend':
-        before, after = urls[: min(BEFORE, middle)], urls[-min(AFTER, len(urls) - middle) :]
-    else:
-        cut = urls.index(arm.bag_at(arm.named[0])['bag'])
-        before, after = urls[:cut], urls[cut:]
-    return ArmCase(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER]))
-
-
-def _read(stack: ExitStack, url: str, model: ArmModel, topic: str | None) -> Recording:
-    path = stack.enter_context(fetched(url))
-    return read_recording(path, joints=model.robot.joints, topic=topic)
 
 
 def _row(

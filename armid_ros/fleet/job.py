@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked of the bags of one kind of arm: the model, the filters, and where results go."""
+"""The job of the bags of one kind of arm: model, filters, settings, and place of results."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property
 import hashlib
 import json
@@ -12,7 +12,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
-from armid_ros.identification import Conditioning
+from armid_ros.identification import Conditioning, SignalSettings
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.nonlinear import curved
 from armid_ros.model import BaseParameters, random_motion
@@ -28,44 +28,68 @@ _MOST_SAMPLES = 1_400_000
 
 
 @dataclass(frozen=True)
-class Filters:
+class FleetSettings:
     """
-    Filters that all bags of one kind of arm go through, whenever they were recorded.
+    How a fleet is identified.
 
     Attributes
     ----------
-    cutoff_hz : float
-        Cut-off of the position filter [Hz].
-    decimation : int
-        One row for so many samples ...
-    rate_hz : float
-        ... of this rate [Hz].
+    effects : str
+        Of all arms, unless the table of robots has others.
+    gravity : str
+        'earth', 'moon' or a vector, unless the table of robots has another.
+    joints : str
+        Driven joints with commas; empty for all but grippers.
+    weighted : bool
+        Whether joints are weighted by their residuals.
+    signals : SignalSettings
+        Filters; what is None is chosen from a few bags of each kind of arm, once for all days.
+    topic : str or None
+        JointState topic.
+    resume : bool
+        Whether results of earlier runs count where bag and settings are the same.
+    seed : int
+        Of the states over which base parameters are found.
+    reading : ReadSettings
+        Checksums and memory.
 
     """
 
-    cutoff_hz: float
-    decimation: int
-    rate_hz: float
+    effects: str
+    gravity: str = 'earth'
+    joints: str = ''
+    weighted: bool = True
+    signals: SignalSettings = field(default_factory=SignalSettings)
+    topic: str | None = None
+    resume: bool = False
+    seed: int = 0
+    reading: ReadSettings = field(default_factory=ReadSettings)
 
-    def at(self, rate_hz: float, source: str) -> Conditioning:
-        """
-        Return the filters for a recording of some rate, with rows as often.
 
-        Raises
-        ------
-        FleetError
-            The rate is too low for the cut-off.
+def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioning:
+    """
+    Return the filters of a kind of arm for a recording of some rate, with rows as often.
 
-        """
-        if self.cutoff_hz >= 0.5 * rate_hz:
-            raise FleetError(
-                f'{source}: {rate_hz:.4g} samples/s are too few for the cut-off of '
-                f'{self.cutoff_hz:.4g} Hz of its arm; name a lower one with --cutoff'
-            )
-        decimation = self.decimation
-        if abs(rate_hz / self.rate_hz - 1.0) > _SAME_RATE:
-            decimation = max(1, round(rate_hz * self.decimation / self.rate_hz))
-        return Conditioning(rate_hz, self.cutoff_hz, decimation)
+    Raises
+    ------
+    FleetError
+        The rate is too low for the cut-off.
+
+    """
+    if filters.cutoff_hz >= 0.5 * rate_hz:
+        raise FleetError(
+            f'{source}: {rate_hz:.4g} samples/s are too few for the cut-off of '
+            f'{filters.cutoff_hz:.4g} Hz of its arm; name a lower one with --cutoff'
+        )
+    decimation = filters.decimation
+    if abs(rate_hz / filters.rate_hz - 1.0) > _SAME_RATE:
+        decimation = max(1, round(rate_hz * filters.decimation / filters.rate_hz))
+    return Conditioning(rate_hz, filters.cutoff_hz, decimation)
+
+
+def filter_facts(filters: Conditioning) -> dict[str, Any]:
+    """Return filters as fleet.json has them; they are the arguments of a ``Conditioning``."""
+    return {name: getattr(filters, name) for name in ('cutoff_hz', 'decimation', 'rate_hz')}
 
 
 @dataclass(frozen=True)
@@ -78,36 +102,27 @@ class Job:
     arm : ArmModel
         Rigid body and effects.
     theory : BaseParameters
-        What any motion of it can tell apart.
-    filters : Filters
-        Of all its bags.
+        What is identifiable with any motion.
+    filters : Conditioning
+        Of all its bags, whenever they were recorded; one row for so many samples of its rate.
     out : str
         URL of the results.
     run : str
         Name of the run; what it has written itself it does not make again.
-    weighted : bool
-        Whether joints are weighted by their residuals.
-    topic : str or None
-        JointState topic.
-    resume : bool
-        Whether results of earlier runs count where bag and settings are the same.
-    reading : ReadSettings
-        Checksums and memory.
+    settings : FleetSettings
+        Of the fleet.
 
     """
 
     arm: ArmModel
     theory: BaseParameters
-    filters: Filters
+    filters: Conditioning
     out: str
     run: str
-    weighted: bool = True
-    topic: str | None = None
-    resume: bool = False
-    reading: ReadSettings = field(default_factory=ReadSettings)
+    settings: FleetSettings
 
     @cached_property
-    def settings(self) -> dict[str, Any]:
+    def facts(self) -> dict[str, Any]:
         """Return what results depend on, other than the bag."""
         robot = self.arm.robot
         return {
@@ -116,15 +131,15 @@ class Job:
             'kinematics': kinematics_digest(robot),
             'gravity': [float(g) for g in robot.gravity],
             'effects': [[effect.name, list(effect.joints)] for effect in self.arm.effects],
-            'weighted': self.weighted,
-            'topic': self.topic,
-            **asdict(self.filters),
+            'weighted': self.settings.weighted,
+            'topic': self.settings.topic,
+            **filter_facts(self.filters),
         }
 
     @cached_property
     def digest(self) -> str:
         """Return a name for the settings."""
-        text = json.dumps(self.settings, sort_keys=True)
+        text = json.dumps(self.facts, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     @property
@@ -149,18 +164,13 @@ def require_linear(arm: ArmModel, rng: np.random.Generator) -> None:
     bare = ArmModel(arm.robot)
     for effect in arm.effects:
         one = bare.with_effect(effect)
-        size = len(one.theta) - len(bare.theta)
-        if not effect.instantaneous or size == 0:
-            raise FleetError(_refusal(effect.name))
-        lower, upper = effect.bounds()
-        values = np.clip(0.1, lower, upper)
-        theta = np.concatenate([1.1 * bare.theta, values])
-        if curved(one, one.with_theta(theta), [motion]):
-            raise FleetError(_refusal(effect.name))
-
-
-def _refusal(name: str) -> str:
-    return (
-        f'--effects {name}: the torque is not linear in its parameters, so bags cannot be merged '
-        'with it; name others, and look for it with `armid diagnose`'
-    )
+        linear = effect.instantaneous and len(one.theta) > len(bare.theta)
+        if linear:
+            values = np.clip(0.1, *effect.bounds())
+            theta = np.concatenate([1.1 * bare.theta, values])
+            linear = not curved(one, one.with_theta(theta), [motion])
+        if not linear:
+            raise FleetError(
+                f'--effects {effect.name}: the torque is not linear in its parameters, so bags '
+                'cannot be merged with it; name others, and look for it with `armid diagnose`'
+            )

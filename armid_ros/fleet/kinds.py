@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 import csv
 from dataclasses import dataclass
@@ -14,15 +15,15 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, FleetError
 from armid_ros.files import load_json, reading
 from armid_ros.fleet.bags import BagFile
-from armid_ros.fleet.job import Filters
 from armid_ros.fleet.store import fetched, opened, Store, StoreError
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
 from armid_ros.identification.rows.damage import without_damage
-from armid_ros.identification.rows.signals import conditioning, SignalSettings
+from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.pieces import read_pieces
 
+SCHEMA = 'armid/fleet/1'
 #: Bags that the filters are chosen by, of as many arms where there are.
 _CHOSEN_BY = 4
 #: Bags that are tried for that, where some cannot be read.
@@ -41,7 +42,7 @@ class Entry:
     robot : str
         Shipped name, or path of a URDF or xacro.
     gravity, joints, effects : str
-        As of `armid identify`; empty where the table does not say.
+        As of `armid identify`; empty where the table has none.
 
     """
 
@@ -58,7 +59,7 @@ def read_table(url: str) -> dict[str, Entry]:
     Raises
     ------
     FleetError
-        It cannot be read, or a line does not say arm and robot.
+        It cannot be read, or a line has no arm or robot.
 
     """
     filesystem, path = opened(url)
@@ -89,10 +90,10 @@ def choose_filters(
     arm: ArmModel,
     theory: BaseParameters,
     bags: Sequence[BagFile],
-    asked: SignalSettings,
+    wanted: SignalSettings,
     topic: str | None,
     settings: ReadSettings,
-) -> Filters:
+) -> Conditioning:
     """
     Choose the filters for a kind of arm by a few of its bags.
 
@@ -107,7 +108,12 @@ def choose_filters(
     """
     recordings: list[Recording] = []
     problem = 'there is none'
-    for bag in _spread(bags):
+    turns: Counter[str] = Counter()
+    order = []
+    for bag in bags:  # one of each arm before a second one of any
+        turns[bag.arm] += 1
+        order.append((turns[bag.arm], bag))
+    for _, bag in sorted(order)[:_TRIED]:
         try:
             with fetched(bag.url) as path:
                 first = read_pieces(
@@ -119,7 +125,7 @@ def choose_filters(
                     settings=settings,
                 )
                 piece, _ = next(first)
-                conditioning([piece], asked)
+                conditioning([piece], wanted)
                 recordings.append(piece)
         except (ArmidError, StoreError) as error:
             problem = str(error)
@@ -127,29 +133,11 @@ def choose_filters(
             break
     if not recordings:
         raise FleetError(f'no bag of {arm.robot.name} can be read: {problem}')
-    used = conditioning(recordings, asked)
-    if asked.cutoff_hz is None:
+    used = conditioning(recordings, wanted)
+    if wanted.cutoff_hz is None:
         repaired, _ = without_damage(recordings, SignalSettings(used.cutoff_hz, used.decimation))
         used = cutoff_of_torques(arm, theory.independent, repaired, used)
-    return Filters(used.cutoff_hz, used.decimation, used.rate_hz)
-
-
-def _spread(bags: Sequence[BagFile]) -> list[BagFile]:
-    """Return some bags, one of each arm before a second one of any."""
-    turn: dict[str, int] = {}
-    order = []
-    for bag in bags:
-        turn[bag.arm] = turn.get(bag.arm, 0) + 1
-        order.append((turn[bag.arm], bag))
-    return [bag for _, bag in sorted(order)][:_TRIED]
-
-
-def known_filters(store: Store) -> dict[str, Filters]:
-    """Return the filters that earlier runs have chosen, by kind."""
-    return {
-        kind: Filters(*(facts['filters'][n] for n in ('cutoff_hz', 'decimation', 'rate_hz')))
-        for kind, facts in document(store).get('kinds', {}).items()
-    }
+    return Conditioning(used.rate_hz, used.cutoff_hz, used.decimation)
 
 
 def document(store: Store) -> dict[str, Any]:
@@ -170,6 +158,3 @@ def document(store: Store) -> dict[str, Any]:
         if found['schema'] != SCHEMA:
             raise FleetError(f'holds {found["schema"]}, not {SCHEMA}; name another folder')
     return dict(found)
-
-
-SCHEMA = 'armid/fleet/1'

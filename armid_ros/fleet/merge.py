@@ -1,121 +1,61 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to their arm: triangles merged in a tree, a fit, and its deviations.
+From bags to estimates: triangles merged, a fit, and its deviations.
 
 The deviations of a fit come from the spectrum of its residuals, which no summary of fixed size
-has; so bags are asked a second time, for the noise products at the values of their arm. These add
+has; so bags are read a second time, for the noise products at the values of their arm. These add
 up over bags, and what comes out is that of one identification of all bags.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from armid_ros.estimate import ParameterName
+from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Job
-from armid_ros.fleet.summary import (
-    BagSummary,
-    MotionStatistics,
-    noise_of,
-    PreparedBag,
-    Refused,
-    rows_of,
-)
 from armid_ros.identification.fitting.excited import bounds, identifiable_base
+from armid_ros.identification.fitting.least_squares import noise_products
 from armid_ros.identification.fitting.triangle import (
     fit_triangle,
     joint_std,
     Triangle,
     TriangleFit,
 )
+from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Triangles that one step of a tree merges.
-FAN_IN = 16
 
-
-@dataclass(frozen=True, eq=False)
-class Branch:
+@dataclass(frozen=True)
+class Refused:
     """
-    Bags of one arm, merged.
+    A bag that is not used.
 
     Attributes
     ----------
-    triangle : Triangle or None
-        Of all their rows; None if all were refused.
-    motion : MotionStatistics or None
-        How the arm moved.
-    versions : tuple of (str, str)
-        URL and version of every bag in it.
-    refused : tuple of Refused
-        Bags that are not in it.
+    bag : BagFile
+        Which one.
+    reason : str
+        Why, and what to do.
+    failed : bool
+        Whether it was not the bag's fault: a store, or a worker, that was lost too often.
 
     """
 
-    triangle: Triangle | None
-    motion: MotionStatistics | None
-    versions: tuple[tuple[str, str], ...]
-    refused: tuple[Refused, ...] = ()
-    found: int = 0
-
-    @classmethod
-    def of(cls, summary: BagSummary | Refused) -> Branch:
-        """Return the branch of one bag."""
-        if isinstance(summary, Refused):
-            return cls(None, None, (), (summary,))
-        version = (summary.bag.url, summary.bag.version)
-        found = 0 if summary.computed else 1
-        return cls(summary.triangle, summary.motion, (version,), found=found)
+    bag: BagFile
+    reason: str
+    failed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class ArmFit:
+class FleetEstimate:
     """
-    The values of an arm, before their deviations.
-
-    Attributes
-    ----------
-    base : BaseParameters
-        What its bags tell apart.
-    kept : tuple of int
-        Columns of the theory that they keep.
-    fit : TriangleFit
-        The fit in these.
-
-    """
-
-    base: BaseParameters
-    kept: tuple[int, ...]
-    fit: TriangleFit
-
-
-@dataclass(frozen=True, eq=False)
-class Root:
-    """
-    All bags of an arm, merged and fitted.
-
-    Attributes
-    ----------
-    branch : Branch
-        All of them.
-    fit : ArmFit or None
-        Their values; None if all were refused.
-
-    """
-
-    branch: Branch
-    fit: ArmFit | None
-
-
-@dataclass(frozen=True, eq=False)
-class ArmEstimate:
-    """
-    What the bags of an arm tell together.
+    The estimate of a bag by itself, or of all bags of an arm together.
 
     Attributes
     ----------
@@ -123,114 +63,111 @@ class ArmEstimate:
         Base parameters and those of the effects.
     values, std : ndarray, shape (r,)
         Values and standard deviations.
-    covariance : ndarray, shape (r, r)
-        Covariance.
     joint_std : ndarray, shape (n,)
         Standard deviation of the residual of each joint [N m].
     relative_error_percent : float
-        100 |tau - tau_hat| / |tau| over all joints and bags.
+        100 |tau - tau_hat| / |tau| over all joints and rows.
     condition_number : float
         Of the weighted regressor.
-    motion : MotionStatistics
-        How the arm moved.
-    versions : tuple of (str, str)
-        URL and version of every bag.
 
     """
 
     parameters: tuple[ParameterName, ...]
     values: FloatArray
     std: FloatArray
-    covariance: FloatArray
     joint_std: FloatArray
     relative_error_percent: float
     condition_number: float
-    motion: MotionStatistics
-    versions: tuple[tuple[str, str], ...]
-
-
-def merged(branches: Sequence[Branch]) -> Branch:
-    """Return one branch of several."""
-    triangles = [branch.triangle for branch in branches if branch.triangle is not None]
-    motions = [branch.motion for branch in branches if branch.motion is not None]
-    return Branch(
-        Triangle.merged(triangles) if triangles else None,
-        sum(motions[1:], start=motions[0]) if motions else None,
-        tuple(version for branch in branches for version in branch.versions),
-        tuple(refused for branch in branches for refused in branch.refused),
-        sum(branch.found for branch in branches),
-    )
-
-
-def rooted(branches: Sequence[Branch], job: Job) -> Root:
-    """Merge what is left of a tree, and fit the bags of the arm."""
-    branch = merged(branches)
-    if branch.triangle is None:
-        return Root(branch, None)
-    base, kept = identifiable_base(job.theory, branch.triangle)
-    fit = fit_triangle(
-        branch.triangle.restrict(kept), weighted=job.weighted, bounds=bounds(job.arm, base)
-    )
-    return Root(branch, ArmFit(base, tuple(kept), fit))
-
-
-def noise_products_of(prepared: PreparedBag, fit: ArmFit | None, job: Job) -> Packed | None:
-    """Return what the residuals of a bag at its arm's values say of the deviations."""
-    if fit is None or isinstance(prepared.summary, Refused):
-        return None
-    return Packed.of(noise_of(rows_of(prepared, job), fit.fit, fit.kept))
-
-
-def summed(products: Sequence[Packed | None]) -> Packed | None:
-    """Add noise products up."""
-    there = [one.numbers for one in products if one is not None]
-    return Packed(np.sum(there, axis=0)) if there else None
-
-
-def estimated(root: Root, products: Packed | None, job: Job) -> ArmEstimate | None:
-    """Return the estimate of an arm; None if it has no bags."""
-    branch, fit = root.branch, root.fit
-    if fit is None or products is None or branch.triangle is None or branch.motion is None:
-        return None
-    triangle = branch.triangle.restrict(fit.kept)
-    covariance = fit.fit.covariance(products.matrix)
-    squares = triangle.squares(fit.fit.values).sum() / triangle.torque_squares.sum()
-    return ArmEstimate(
-        fit.base.parameters,
-        fit.fit.values,
-        np.sqrt(np.diag(covariance)),
-        covariance,
-        joint_std(triangle, fit.fit.values),
-        float(100.0 * np.sqrt(squares)),
-        fit.fit.condition_number,
-        branch.motion,
-        branch.versions,
-    )
 
 
 @dataclass(frozen=True, eq=False)
-class Packed:
+class FleetFit:
     """
-    A symmetric matrix as its upper triangle.
+    The values that fit rows, before their deviations.
 
     Attributes
     ----------
-    numbers : ndarray, shape (r (r + 1) / 2,)
-        Row by row.
+    base : BaseParameters
+        The identifiable parameters.
+    kept : sequence of int
+        Columns of the theory that they keep.
+    fit : TriangleFit
+        The fit in these.
 
     """
 
-    numbers: FloatArray
+    base: BaseParameters
+    kept: Sequence[int]
+    fit: TriangleFit
 
     @classmethod
-    def of(cls, matrix: FloatArray) -> Packed:
-        """Pack a symmetric matrix."""
-        return cls(matrix[np.triu_indices(len(matrix))])
+    def of(cls, triangle: Triangle, job: Job) -> FleetFit | None:
+        """Fit compressed rows; None where there are too few."""
+        base, kept = identifiable_base(job.theory, triangle)
+        if triangle.counts.sum() < 2 * base.rank:
+            return None
+        limits = bounds(job.arm, base)
+        fit = fit_triangle(triangle.restrict(kept), weighted=job.settings.weighted, bounds=limits)
+        return cls(base, tuple(kept), fit)
 
-    @property
-    def matrix(self) -> FloatArray:
-        """Return the whole matrix, shape (r, r)."""
-        size = int((np.sqrt(8.0 * len(self.numbers) + 1.0) - 1.0) / 2.0)
-        upper = np.zeros((size, size))
-        upper[np.triu_indices(size)] = self.numbers
-        return np.asarray(upper + np.triu(upper, 1).T)
+    def noise(self, rows: Iterable[Regression]) -> FloatArray:
+        """Return the covariance of the products of columns and residuals of rows, (r, r)."""
+        products = np.zeros((len(self.kept), len(self.kept)))
+        for part in rows:
+            some = part if len(self.kept) == part.columns.shape[2] else part.restrict(self.kept)
+            weights = some.informative / self.fit.scale
+            residual = some.tau - some.columns @ self.fit.values
+            products += noise_products([some], residual * weights, weights, self.fit.inverse)
+        return products
+
+    def estimate(self, triangle: Triangle, noise: FloatArray) -> FleetEstimate:
+        """Return the estimate of compressed rows, given the noise products of the same rows."""
+        some = triangle.restrict(self.kept)
+        squares = some.squares(self.fit.values).sum() / some.torque_squares.sum()
+        return FleetEstimate(
+            self.base.parameters,
+            self.fit.values,
+            np.sqrt(np.diag(self.fit.covariance(noise))),
+            joint_std(some, self.fit.values),
+            float(100.0 * np.sqrt(squares)),
+            self.fit.condition_number,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MergedBags:
+    """
+    Bags of one arm, merged.
+
+    Attributes
+    ----------
+    triangle : Triangle or None
+        Of all their rows; None if all were refused.
+    seconds : float
+        Motion in them [s].
+    versions : tuple of (str, str)
+        URL and version of every bag.
+    found : int
+        Bags that an earlier run had read.
+    refused : tuple of Refused
+        Bags that are not among them.
+
+    """
+
+    triangle: Triangle | None = None
+    seconds: float = 0.0
+    versions: tuple[tuple[str, str], ...] = ()
+    found: int = 0
+    refused: tuple[Refused, ...] = ()
+
+    @classmethod
+    def of(cls, parts: Sequence[MergedBags]) -> MergedBags:
+        """Merge several groups of bags, in order."""
+        triangles = [part.triangle for part in parts if part.triangle is not None]
+        return cls(
+            Triangle.merged(triangles) if triangles else None,
+            sum(part.seconds for part in parts),
+            tuple(version for part in parts for version in part.versions),
+            sum(part.found for part in parts),
+            tuple(refused for part in parts for refused in part.refused),
+        )

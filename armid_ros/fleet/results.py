@@ -4,8 +4,8 @@
 The tables of results: what is in them, and how a bag or an arm becomes rows.
 
     bags/arm=A/day=D/BAG.parquet         one row: what was recorded, how well it fits, its triangle
-    parameters/arm=A/day=D/BAG.parquet   one row a parameter: what the bag tells by itself
-    arms/arm=A/estimate.parquet          one row a parameter: what all bags of the arm tell
+    parameters/arm=A/day=D/BAG.parquet   one row a parameter: estimate of the bag by itself
+    arms/arm=A/estimate.parquet          one row a parameter: estimate of all bags
     refused/arm=A/BAG.parquet            one row: why a bag is not used
 
 A bag has one file in each, named after it, so a run writes over what it made of the same bag and
@@ -21,14 +21,12 @@ import hashlib
 
 from armid_ros.arm import parameter_table
 from armid_ros.errors import FleetError
-from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import BagFile, folder_of, part_of
 from armid_ros.fleet.job import Job
-from armid_ros.fleet.merge import ArmEstimate
+from armid_ros.fleet.merge import FleetEstimate, MergedBags, Refused
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import BagSummary, MotionStatistics, OwnEstimate, Refused
+from armid_ros.fleet.summary import BagSummary
 from armid_ros.identification.fitting.triangle import Triangle
-from armid_ros.motion import FloatArray
 import numpy as np
 import pyarrow as pa
 
@@ -94,10 +92,10 @@ REFUSED = pa.schema(
 
 def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
     """Write what is kept of a bag."""
-    bag, own, motion = summary.bag, summary.own, summary.motion
+    bag, own = summary.bag, summary.own
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
     robot = job.arm.robot
-    rows = [] if own is None else _rows(own.parameters, own.values, own.std)
+    rows = [] if own is None else _rows(own)
     table = pa.Table.from_pylist(
         [{'bag': bag.url, 'start': start, **row} for row in rows], PARAMETERS
     )
@@ -109,16 +107,16 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
         'run': job.run,
         'start': start,
         'start_ns': summary.start_ns,
-        'seconds': motion.seconds,
-        'samples': motion.samples,
+        'seconds': summary.seconds,
+        'samples': summary.samples,
         'bytes': bag.size,
         'relative_error_percent': None if own is None else own.relative_error_percent,
         'condition_number': None if own is None else own.condition_number,
         'joints': list(robot.joints),
         'residual_std': None if own is None else own.joint_std,
-        'lowest': motion.lowest,
-        'highest': motion.highest,
-        'top_speed': motion.top_speed,
+        'lowest': summary.lowest,
+        'highest': summary.highest,
+        'top_speed': summary.top_speed,
         'notes': list(summary.notes),
         'triangle': summary.triangle.packed(),
     }
@@ -142,12 +140,23 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
         row = refused.to_pylist()[0]
         if _same(row, bag, job) and not row['failed']:
             return Refused(bag, row['reason'])
-    days = [bag.day] if bag.day else _days(store, bag) if job.resume else []
+    days = [bag.day] if bag.day else _days(store, bag) if job.settings.resume else []
     for day in days:
         table = store.read_table(part_of('bags', bag, day))
         row = {} if table is None else table.to_pylist()[0]
         if row and _same(row, bag, job):
-            return _summary(row, bag, day, job)
+            return BagSummary(
+                bag,
+                day,
+                row['start_ns'],
+                row['seconds'],
+                row['samples'],
+                np.array(row['lowest']),
+                np.array(row['highest']),
+                np.array(row['top_speed']),
+                Triangle.unpacked(np.array(row['triangle'])),
+                computed=row['run'] == job.run,
+            )
     return None
 
 
@@ -167,18 +176,19 @@ def write_refused(store: Store, refused: Refused, job: Job) -> None:
             store.remove(part_of(data_set, refused.bag, day))
 
 
-def write_arm(store: Store, arm: str, estimate: ArmEstimate, job: Job) -> None:
-    """Write what the bags of an arm tell together."""
+def write_arm(
+    store: Store, arm: str, estimate: FleetEstimate, merged: MergedBags, job: Job
+) -> None:
+    """Write the estimate of all bags of an arm together."""
     common = {
         'settings': job.digest,
-        'versions': versions_digest(estimate.versions),
-        'bags': len(estimate.versions),
-        'seconds': estimate.motion.seconds,
+        'versions': versions_digest(merged.versions),
+        'bags': len(merged.versions),
+        'seconds': merged.seconds,
         'relative_error_percent': estimate.relative_error_percent,
         'condition_number': estimate.condition_number,
     }
-    rows = _rows(estimate.parameters, estimate.values, estimate.std)
-    table = pa.Table.from_pylist([{**common, **row} for row in rows], ARMS)
+    table = pa.Table.from_pylist([{**common, **row} for row in _rows(estimate)], ARMS)
     store.write_table(_estimate(arm), table)
 
 
@@ -231,10 +241,10 @@ def table_of(store: Store, data_set: str) -> pa.Table:
     return table
 
 
-def _rows(
-    parameters: tuple[ParameterName, ...], values: FloatArray, std: FloatArray
-) -> list[dict[str, object]]:
-    rows: list[dict[str, object]] = parameter_table(parameters, values, list(std))
+def _rows(estimate: FleetEstimate) -> list[dict[str, object]]:
+    rows: list[dict[str, object]] = parameter_table(
+        estimate.parameters, estimate.values, list(estimate.std)
+    )
     return [
         {name: row[name] for name in ('name', 'joint', 'unit', 'value', 'std')} for row in rows
     ]
@@ -243,25 +253,7 @@ def _rows(
 def _same(row: dict[str, object], bag: BagFile, job: Job) -> bool:
     if row['version'] != bag.version or row['settings'] != job.digest:
         return False
-    return job.resume or row['run'] == job.run
-
-
-def _summary(row: dict[str, object], bag: BagFile, day: str, job: Job) -> BagSummary:
-    def array(name: str) -> FloatArray:
-        return np.array(row[name], dtype=float)
-
-    motion = MotionStatistics(
-        int(str(row['samples'])),
-        float(str(row['seconds'])),
-        array('lowest'),
-        array('highest'),
-        array('top_speed'),
-    )
-    own: OwnEstimate | None = None  # is among the parameters already
-    triangle = Triangle.unpacked(array('triangle'))
-    start = int(str(row['start_ns']))
-    computed = row['run'] == job.run
-    return BagSummary(bag, day, start, triangle, motion, own, computed=computed)
+    return job.settings.resume or row['run'] == job.run
 
 
 def _refused(bag: BagFile) -> str:

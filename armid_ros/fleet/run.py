@@ -14,17 +14,7 @@ from typing import Any
 from armid_ros.errors import ArmidError, FleetError
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Job
-from armid_ros.fleet.merge import (
-    Branch,
-    estimated,
-    FAN_IN,
-    merged,
-    noise_products_of,
-    Packed,
-    Root,
-    rooted,
-    summed,
-)
+from armid_ros.fleet.merge import FleetFit, MergedBags, Refused
 from armid_ros.fleet.results import (
     arm_is_done,
     find_summary,
@@ -33,8 +23,11 @@ from armid_ros.fleet.results import (
     write_summary,
 )
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import prepare, PreparedBag, Refused
+from armid_ros.fleet.summary import prepare, PreparedBag
+from armid_ros.identification import Conditioning
+from armid_ros.motion import FloatArray
 from distributed import as_completed, Client, Future, KilledWorker
+import numpy as np
 
 #: Times that an arm is begun again whose tasks were on workers that others ended.
 _HIT = 3
@@ -80,40 +73,159 @@ class ArmOutcome:
     problem: str = ''
 
 
-class Tally:
+@dataclass(frozen=True)
+class FleetOutcome:
     """
-    How far a run is.
+    What became of a fleet.
 
-    Parameters
+    Attributes
     ----------
-    bags : int
-        All of them.
-    tell : callable
-        Told how many have ended, and how many there are.
+    arms : tuple of ArmOutcome
+        Every arm.
+    filters : dict of str to Conditioning
+        Of every kind of arm, by the name of its robot.
 
     """
 
-    def __init__(self, bags: int, tell: Callable[[int, int], None]) -> None:
-        self._bags, self._tell = bags, tell
-        self._ended: set[str] = set()
+    arms: tuple[ArmOutcome, ...]
+    filters: dict[str, Conditioning]
 
-    def watch(self, bags: Sequence[BagFile], future: Future) -> None:
-        """Count bags when their task ends; those that are lost or shared out will come again."""
+    @property
+    def done(self) -> int:
+        """Bags that estimates are made of."""
+        return sum(arm.done for arm in self.arms)
 
-        def ended(future: Future) -> None:
-            if future.status == 'finished' or (future.status == 'error' and len(bags) == 1):
-                self.add(bags)
+    @property
+    def found(self) -> int:
+        """Of these, those that an earlier run had read."""
+        return sum(arm.found for arm in self.arms)
 
-        future.add_done_callback(ended)
-
-    def add(self, bags: Sequence[BagFile]) -> None:
-        """Count bags that have ended."""
-        self._ended.update(bag.url for bag in bags)
-        self._tell(len(self._ended), self._bags)
+    @property
+    def refused(self) -> tuple[Refused, ...]:
+        """Bags that are not used."""
+        return tuple(sorted((one for a in self.arms for one in a.refused), key=lambda r: r.bag))
 
 
 #: Bags of an arm that are read by one task.
 Group = tuple[BagFile, ...]
+#: All bags of an arm, and the fit of them; None where they have too few rows.
+Fitted = tuple[MergedBags, FleetFit | None]
+
+
+def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[PreparedBag, ...]:
+    """Task: find bags among the results, or read them and write them there."""
+    store, taken = Store(job.out), []
+    for bag in bags:
+        known = find_summary(store, bag, job)
+        prepared = prepare(bag, job, bags_of_arm) if known is None else PreparedBag(known)
+        taken.append(prepared)
+        if known is None and isinstance(prepared.summary, Refused):
+            write_refused(store, prepared.summary, job)
+        elif known is None and not isinstance(prepared.summary, Refused):
+            write_summary(store, prepared.summary, job)
+    return tuple(taken)
+
+
+def same(job: Job) -> Job:
+    """Task: hold a job on a worker; unlike scattered data it can be made again."""
+    return job
+
+
+def merge(prepared: Sequence[PreparedBag]) -> MergedBags:
+    """Task: merge the bags of a group, and leave their rows where they are."""
+    return MergedBags.of([one.merged() for one in prepared])
+
+
+def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
+    """Task: merge the groups of an arm, and fit all its bags."""
+    merged = MergedBags.of(groups)
+    return merged, None if merged.triangle is None else FleetFit.of(merged.triangle, job)
+
+
+def noise(prepared: Sequence[PreparedBag], fitted: Fitted, job: Job) -> FloatArray | None:
+    """Task: compute the noise products of a group at the values of its arm."""
+    known, found = fitted[1], None
+    for one in prepared:
+        if known is not None and not isinstance(one.summary, Refused):
+            products = known.noise(one.rows_again(job))
+            found = products if found is None else found + products
+    return found
+
+
+def finish(
+    arm: str, fitted: Fitted, products: Sequence[FloatArray | None], job: Job
+) -> ArmOutcome:
+    """Task: write the estimate of an arm."""
+    merged, known = fitted
+    problem = ''
+    if known is None or merged.triangle is None:
+        problem = 'no bag of it can be used'
+    else:
+        total = np.sum([one for one in products if one is not None], axis=0)
+        write_arm(Store(job.out), arm, known.estimate(merged.triangle, total), merged, job)
+    return ArmOutcome(arm, len(merged.versions), merged.found, merged.refused, problem)
+
+
+def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
+    """
+    Share the bags of an arm out to tasks, in order.
+
+    By their sizes alone, so that the order of merges, and with it the last digit, is the same on
+    every cluster. A bag of unknown size is alone.
+
+    """
+    groups: list[list[BagFile]] = []
+    total = 0
+    for bag in bags:
+        size = bag.size or TASK_BYTES
+        if not groups or total + size > TASK_BYTES or len(groups[-1]) == TASK_BAGS:
+            groups.append([])
+            total = 0
+        groups[-1].append(bag)
+        total += size
+    return tuple(tuple(group) for group in groups)
+
+
+def identify_fleet(
+    client: Client,
+    bags: Sequence[BagFile],
+    job_of: Mapping[str, Job],
+    tell: Callable[[int, int], None] = lambda finished, bags: None,
+) -> FleetOutcome:
+    """
+    Identify every arm of a fleet.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        A cluster.
+    bags : sequence of BagFile
+        All bags.
+    job_of : mapping of str to Job
+        Model and filters of every arm.
+    tell : callable
+        Called with how many bags have ended, and how many there are.
+
+    Raises
+    ------
+    FleetError
+        The scheduler was lost and did not come back.
+
+    """
+    run = _Run(client, bags, job_of, tell)
+    for _ in range(_LOST):
+        if run.work():
+            outcomes = sorted(run.outcomes, key=lambda one: one.arm)
+            filters = {job.arm.robot.name: job.filters for job in job_of.values()}
+            return FleetOutcome(tuple(outcomes), filters)
+        while client.status == 'connecting':
+            time.sleep(_LOOK_EVERY)
+        if client.status != 'running':
+            break
+    raise FleetError(
+        'the scheduler was lost, and with it the tasks; what is done is kept: run the same '
+        'command again with --resume'
+    )
 
 
 @dataclass(frozen=True)
@@ -137,258 +249,148 @@ class _UnderWay:
 
     arm: _Waiting
     prepared: list[Future]
-    root: Future
+    fitted: Future
     noise: list[Future]
     last: Future
 
 
-def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[PreparedBag, ...]:
-    """Task: find bags among the results, or read them and write them there."""
-    return tuple(_taken(bag, job, bags_of_arm) for bag in bags)
+class _Run:
+    """Arms that wait, and what became of the others."""
 
+    def __init__(
+        self,
+        client: Client,
+        bags: Sequence[BagFile],
+        job_of: Mapping[str, Job],
+        tell: Callable[[int, int], None],
+    ) -> None:
+        self._client, self._job_of = client, job_of
+        self._tell, self._bags = tell, len(bags)
+        self._ended: set[str] = set()
+        self._jobs: dict[str, Future] = {}
+        self._waiting: deque[_Waiting] = deque()
+        self.outcomes: list[ArmOutcome] = []
+        for arm, group in itertools.groupby(sorted(bags), key=lambda bag: bag.arm):
+            own, job = list(group), job_of[arm]
+            refused = arm_is_done(Store(job.out), arm, own, job) if job.settings.resume else None
+            if refused is None:
+                self._waiting.append(_Waiting(arm, grouped(own)))
+            else:
+                done = len(own) - len(refused)
+                self.outcomes.append(ArmOutcome(arm, done, done, tuple(refused)))
+                self._count(own)
 
-def same(job: Job) -> Job:
-    """Task: hold a job on a worker; unlike scattered data it can be made again."""
-    return job
-
-
-def branch(prepared: Sequence[PreparedBag]) -> Branch:
-    """Task: merge the bags of a group, and leave their rows where they are."""
-    return merged([Branch.of(one.summary) for one in prepared])
-
-
-def noise(prepared: Sequence[PreparedBag], root: Root, job: Job) -> Packed | None:
-    """Task: what the residuals of a group at its arm's values say of the deviations."""
-    return summed([noise_products_of(one, root.fit, job) for one in prepared])
-
-
-def finish(arm: str, root: Root, products: Sequence[Packed | None], job: Job) -> ArmOutcome:
-    """Task: write the estimate of an arm."""
-    whole = root.branch
-    estimate = estimated(root, summed(products), job)
-    if estimate is not None:
-        write_arm(Store(job.out), arm, estimate, job)
-    problem = '' if estimate is not None else 'no bag of it can be used'
-    return ArmOutcome(arm, len(whole.versions), whole.found, whole.refused, problem)
-
-
-def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
-    """
-    Share the bags of an arm out to tasks, in order.
-
-    By their sizes alone, so that the tree of merges, and with it the last digit, is the same on
-    every cluster. A bag of unknown size is alone.
-
-    """
-    groups: list[list[BagFile]] = []
-    total = 0
-    for bag in bags:
-        size = bag.size or TASK_BYTES
-        if not groups or total + size > TASK_BYTES or len(groups[-1]) == TASK_BAGS:
-            groups.append([])
-            total = 0
-        groups[-1].append(bag)
-        total += size
-    return tuple(tuple(group) for group in groups)
-
-
-def run_fleet(
-    client: Client,
-    bags: Sequence[BagFile],
-    job_of: Mapping[str, Job],
-    tell: Callable[[int, int], None] = lambda finished, bags: None,
-) -> list[ArmOutcome]:
-    """
-    Identify every arm of a fleet.
-
-    Parameters
-    ----------
-    client : distributed.Client
-        A cluster.
-    bags : sequence of BagFile
-        All bags.
-    job_of : mapping of str to Job
-        Model and filters of every arm.
-    tell : callable
-        Told how many bags have ended, and how many there are.
-
-    Raises
-    ------
-    FleetError
-        The scheduler was lost and did not come back.
-
-    """
-    tally = Tally(len(bags), tell)
-    outcomes: list[ArmOutcome] = []
-    waiting: deque[_Waiting] = deque()
-    for arm, group in itertools.groupby(sorted(bags), key=lambda bag: bag.arm):
-        own = list(group)
-        job = job_of[arm]
-        refused = arm_is_done(Store(job.out), arm, own, job) if job.resume else None
-        if refused is None:
-            waiting.append(_Waiting(arm, grouped(own)))
-        else:
-            done = len(own) - len(refused)
-            outcomes.append(ArmOutcome(arm, done, done, tuple(refused)))
-            tally.add(own)
-    return outcomes + _worked_off(client, waiting, job_of, tally)
-
-
-def _worked_off(
-    client: Client, waiting: deque[_Waiting], job_of: Mapping[str, Job], tally: Tally
-) -> list[ArmOutcome]:
-    """Work on all arms; begin again with those under way where the scheduler was lost."""
-    outcomes: list[ArmOutcome] = []
-    for _ in range(_LOST):
+    def work(self) -> bool:
+        """Keep so many arms under way that no worker waits; return False when all were lost."""
+        limit = _UNDER_WAY + _MORE * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
-        if _ended(client, waiting, under_way, job_of, tally, outcomes):
-            return outcomes
-        waiting.extendleft(one.arm for one in under_way.values())
-        while client.status == 'connecting':
-            time.sleep(_LOOK_EVERY)
-        if client.status != 'running':
-            break
-    raise FleetError(
-        'the scheduler was lost, and with it the tasks; what is done is kept: run the same '
-        'command again with --resume'
-    )
+        self._jobs = {}
+        ended = as_completed(raise_errors=False)
+        while self._waiting or under_way:
+            while self._waiting and sum(len(one.prepared) for one in under_way.values()) < limit:
+                tasks = self._submitted(self._waiting.popleft())
+                under_way[tasks.last.key] = tasks
+                ended.add(tasks.last)
+            future = next(ended)
+            try:
+                outcome = future.result()
+            except Exception:
+                # Also of an arm that had finished, where its worker ended and it could not be
+                # done again.
+                outcome = None
+            if future.status in _BROKEN:
+                self._waiting.extendleft(one.arm for one in under_way.values())
+                return False
+            tasks = under_way.pop(future.key)
+            if outcome is None:
+                self._begin_again(tasks)
+            else:
+                refused = (*tasks.arm.refused, *outcome.refused)
+                self.outcomes.append(replace(outcome, refused=refused))
+        return True
 
+    def _count(self, bags: Sequence[BagFile]) -> None:
+        """Count bags that have ended."""
+        self._ended.update(bag.url for bag in bags)
+        self._tell(len(self._ended), self._bags)
 
-def _ended(
-    client: Client,
-    waiting: deque[_Waiting],
-    under_way: dict[Any, _UnderWay],
-    job_of: Mapping[str, Job],
-    tally: Tally,
-    outcomes: list[ArmOutcome],
-) -> bool:
-    """Keep so many arms under way that no worker waits; return False when all were lost."""
-    limit = _UNDER_WAY + _MORE * sum(client.nthreads().values())
-    jobs: dict[str, Future] = {}
-    ended = as_completed(raise_errors=False)
-    while waiting or under_way:
-        while waiting and sum(len(one.prepared) for one in under_way.values()) < limit:
-            arm = waiting.popleft()
-            job = job_of[arm.arm]
-            if job.digest not in jobs:
-                jobs[job.digest] = client.submit(same, job, pure=False)
-            tasks = _submitted(client, arm, jobs[job.digest], tally)
-            under_way[tasks.last.key] = tasks
-            ended.add(tasks.last)
-        future = next(ended)
-        outcome = _fetched(future)
-        if future.status in _BROKEN:
-            return False
-        tasks = under_way.pop(future.key)
-        if outcome is not None:
-            refused = (*tasks.arm.refused, *outcome.refused)
-            outcomes.append(replace(outcome, refused=refused))
-            continue
-        left, failed = _without_failed(tasks, client, jobs[job_of[tasks.arm.arm].digest])
+    def _submit(self, task: Callable[..., Any], *arguments: Any, **options: Any) -> Future:
+        return self._client.submit(task, *arguments, pure=False, **options)
+
+    def _job(self, arm: str) -> Future:
+        job = self._job_of[arm]
+        if job.digest not in self._jobs:
+            self._jobs[job.digest] = self._submit(same, job)
+        return self._jobs[job.digest]
+
+    def _submitted(self, arm: _Waiting) -> _UnderWay:
+        """Submit the tasks of an arm: groups of bags, its fit, their noise, the end."""
+        job, count = self._job(arm.arm), sum(len(group) for group in arm.groups)
+        prepared = []
+        for group in arm.groups:
+            future = self._submit(take, group, job, count, retries=RETRIES)
+            prepared.append(future)
+
+            def ended(future: Future, group: Group = group) -> None:
+                # those that are lost or shared out will come again
+                if future.status == 'finished' or (future.status == 'error' and len(group) == 1):
+                    self._count(group)
+
+            future.add_done_callback(ended)
+        fitted = self._submit(fit, [self._submit(merge, one) for one in prepared], job)
+        products = [self._submit(noise, one, fitted, job, retries=RETRIES) for one in prepared]
+        last = self._submit(finish, arm.arm, fitted, products, job, retries=RETRIES)
+        return _UnderWay(arm, prepared, fitted, products, last)
+
+    def _begin_again(self, tasks: _UnderWay) -> None:
+        """
+        Let what is left of an arm wait whose tasks have failed, and give up the bags at fault.
+
+        A group that has failed is shared out, bag by bag, to find the one to blame. What waits for
+        a task fails with it, so the noise is looked at only where all bags were read. A bag whose
+        worker another bag may have ended is read once more by itself.
+
+        """
+        arm = tasks.arm
+        job, futures = self._job_of[arm.arm], tasks.prepared
+        if tasks.fitted.status == 'finished' and all(one.status != 'error' for one in futures):
+            futures = tasks.noise
+        groups: list[Group] = []
+        failed: list[Refused] = []
+        error = tasks.last.exception()
+        hit = isinstance(error, KilledWorker) and all(one.status != 'error' for one in futures)
+        for group, future in zip(arm.groups, futures, strict=True):
+            if future.status != 'error':
+                groups.append(group)
+            elif len(group) > 1:
+                groups.extend((bag,) for bag in group)
+            elif isinstance(future.exception(), KilledWorker) and self._read(group, arm.arm):
+                groups.append(group)
+                hit = True
+            else:
+                failed.append(Refused(group[0], _reason(future.exception()), failed=True))
         for one in failed:
-            write_refused(Store(job_of[tasks.arm.arm].out), one, job_of[tasks.arm.arm])
-        if left.groups and left != tasks.arm:
-            waiting.appendleft(left)
+            write_refused(Store(job.out), one, job)
+        left = _Waiting(
+            arm.arm,
+            tuple(groups),
+            (*arm.refused, *failed),
+            arm.hit + (hit and arm.hit < _HIT),
+        )
+        if left.groups and left != arm:
+            self._waiting.appendleft(left)
         else:
-            problem = 'no bag of it can be used' if failed else _said(future.exception())
-            outcomes.append(ArmOutcome(left.arm, refused=left.refused, problem=problem))
-    return True
+            problem = 'no bag of it can be used' if failed else _reason(error)
+            self.outcomes.append(ArmOutcome(left.arm, refused=left.refused, problem=problem))
+
+    def _read(self, group: Group, arm: str) -> bool:
+        """Return whether a group can be read while nothing else of its arm is."""
+        future = self._submit(take, group, self._job(arm), 1, retries=RETRIES)
+        ended: Future = next(as_completed([future], raise_errors=False))
+        return bool(ended.status != 'error')
 
 
-def _fetched(future: Future) -> ArmOutcome | None:
-    """Return what became of an arm; None where its tasks failed, which its future then says."""
-    try:
-        outcome: ArmOutcome = future.result()
-    except Exception:
-        # Also of an arm that had finished, where its worker ended and it could not be redone.
-        return None
-    return outcome
-
-
-def _submitted(client: Client, arm: _Waiting, job: Future, tally: Tally) -> _UnderWay:
-    """Submit the tasks of an arm: groups of bags, their tree and its fit, their noise, the end."""
-
-    def submit(task: Callable[..., Any], *arguments: Any, **options: Any) -> Future:
-        return client.submit(task, *arguments, pure=False, **options)
-
-    count = sum(len(group) for group in arm.groups)
-    prepared = [submit(take, group, job, count, retries=RETRIES) for group in arm.groups]
-    for group, future in zip(arm.groups, prepared, strict=True):
-        tally.watch(group, future)
-    root = submit(rooted, _tree(submit, merged, [submit(branch, one) for one in prepared]), job)
-    products = [submit(noise, one, root, job, retries=RETRIES) for one in prepared]
-    last = submit(finish, arm.arm, root, _tree(submit, summed, products), job, retries=RETRIES)
-    return _UnderWay(arm, prepared, root, products, last)
-
-
-def _tree(
-    submit: Callable[..., Future], join: Callable[..., Any], leaves: list[Future]
-) -> list[Future]:
-    """Join results, a few at a time, until few are left."""
-    level = leaves
-    while len(level) > FAN_IN:
-        starts = range(0, len(level), FAN_IN)
-        level = [submit(join, level[start : start + FAN_IN]) for start in starts]
-    return level
-
-
-def _without_failed(
-    tasks: _UnderWay, client: Client, job: Future
-) -> tuple[_Waiting, list[Refused]]:
-    """
-    Return what is left of an arm whose tasks have failed, and the bags that are given up.
-
-    A group that has failed is shared out, bag by bag, to find the one to blame. What waits for a
-    task fails with it, so noise is asked of only where all bags were read. What was on a worker
-    that another bag ended is held to have ended it as well, and is read once more by itself.
-
-    """
-    arm = tasks.arm
-    for futures in (tasks.prepared, tasks.noise if tasks.root.status == 'finished' else []):
-        if any(future.status == 'error' for future in futures):
-            break
-    else:
-        hit = isinstance(tasks.last.exception(), KilledWorker) and arm.hit < _HIT
-        return (replace(arm, hit=arm.hit + 1) if hit else arm), []
-    groups: list[Group] = []
-    failed: list[Refused] = []
-    hit = False
-    for group, future in zip(arm.groups, futures, strict=True):
-        if future.status != 'error':
-            groups.append(group)
-        elif len(group) > 1:
-            groups.extend((bag,) for bag in group)
-        elif isinstance(future.exception(), KilledWorker) and _read(client, group, job):
-            groups.append(group)
-            hit = True
-        else:
-            failed.append(Refused(group[0], _said(future.exception()), failed=True))
-    hits = arm.hit + (hit and arm.hit < _HIT)
-    left = replace(arm, groups=tuple(groups), refused=(*arm.refused, *failed), hit=hits)
-    return left, failed
-
-
-def _read(client: Client, group: Group, job: Future) -> bool:
-    """Return whether a group can be read while nothing else of its arm is, as far as is known."""
-    future = client.submit(take, group, job, 1, pure=False, retries=RETRIES)
-    ended: Future = next(as_completed([future], raise_errors=False))
-    return bool(ended.status != 'error')
-
-
-def _taken(bag: BagFile, job: Job, bags_of_arm: int) -> PreparedBag:
-    store = Store(job.out)
-    known = find_summary(store, bag, job)
-    if known is not None:
-        return PreparedBag(known)
-    prepared = prepare(bag, job, bags_of_arm)
-    if isinstance(prepared.summary, Refused):
-        write_refused(store, prepared.summary, job)
-    else:
-        write_summary(store, prepared.summary, job)
-    return prepared
-
-
-def _said(error: BaseException | None) -> str:
+def _reason(error: BaseException | None) -> str:
     if isinstance(error, KilledWorker):
         return (
             f'{error.allowed_failures + 1} workers ended while they read it, of too little '

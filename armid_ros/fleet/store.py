@@ -100,7 +100,7 @@ class Store:
         """
         Put a file in its place, whole or not at all.
 
-        A local file is written beside its place and moved there; an object store shows an object
+        A local file is written next to its place and moved there; an object store shows an object
         when all of it has arrived.
 
         """

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A fleet over time: series of its results, what has changed, and who is told.
+A fleet over time: series of its results, changes and alarms.
 
     watch/arms.parquet      one row an arm: its health, and how sure that is
     watch/changes.parquet   one row a change that an arm is named for
@@ -12,29 +12,34 @@ A fleet over time: series of its results, what has changed, and who is told.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 import datetime
 import itertools
 import json
 from typing import Any
 
+from armid_ros.changes.histories import (
+    HistoryChange,
+    judge,
+    Judged,
+    named,
+    unlike_siblings,
+    wear,
+)
+from armid_ros.changes.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.errors import FleetError
 from armid_ros.estimate import ParameterName
-from armid_ros.fleet.changes import HistoryChange, judge, Judged, named, unlike_siblings, wear
-from armid_ros.fleet.identify import kind_arm
 from armid_ros.fleet.kinds import document
+from armid_ros.fleet.plan import kind_arm
 from armid_ros.fleet.results import table_of
-from armid_ros.fleet.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.fleet.store import Store
 from armid_ros.identification.assess.comparison import ParameterChange, unit_factors
-from armid_ros.motion import FloatArray
 from armid_ros.report.compare_report import tell_units
 from armid_ros.report.families import full_label
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-from scipy import stats
 
 #: Share of healthy arms among those named, in the long run.
 ALPHA = 0.05
@@ -44,23 +49,24 @@ _WIDE = 1.96
 RESIDUAL = 'residual'
 _DAY_NS = 86_400 * 1e9
 
-_CHANGE = [
-    ('arm', pa.string()),
-    ('kind', pa.string()),  # step, trend or units
-    ('name', pa.string()),
-    ('joint', pa.string()),
-    ('unit', pa.string()),
-    ('last_day', pa.string()),  # last bag before a step; first bag of a trend
-    ('first_day', pa.string()),  # first bag after a step; last bag of a trend
-    ('bag', pa.string()),  # that bag
-    ('level', pa.float64()),  # before
-    ('size', pa.float64()),  # of a step, or of a trend in a month
-    ('std', pa.float64()),
-    ('p', pa.float64()),  # of this series
-    ('adjusted_p', pa.float64()),  # of the arm, over all arms
-    ('text', pa.string()),
-]
-CHANGES = pa.schema(_CHANGE)
+CHANGES = pa.schema(
+    [
+        ('arm', pa.string()),
+        ('kind', pa.string()),  # step, trend or units
+        ('name', pa.string()),
+        ('joint', pa.string()),
+        ('unit', pa.string()),
+        ('last_day', pa.string()),  # last bag before a step; first bag of a trend
+        ('first_day', pa.string()),  # first bag after a step; last bag of a trend
+        ('bag', pa.string()),  # that bag
+        ('level', pa.float64()),  # before
+        ('size', pa.float64()),  # of a step, or of a trend in a month
+        ('std', pa.float64()),
+        ('p', pa.float64()),  # of this series
+        ('adjusted_p', pa.float64()),  # of the arm, over all arms
+        ('text', pa.string()),
+    ]
+)
 WEAR = pa.schema(
     [
         ('arm', pa.string()),
@@ -104,7 +110,7 @@ class WatchedArm:
     bags : tuple of dict
         A row of the table ``bags`` each, in order of time, without triangles.
     judged : Judged
-        What the tests say.
+        Results of the tests.
     named : tuple of HistoryChange
         What it is named for.
     unlike : tuple of str and float
@@ -168,7 +174,7 @@ class Watch:
     alpha: float
 
 
-def watch(store: Store, alpha: float = ALPHA) -> Watch:
+def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     """
     Look at the results of a fleet over time.
 
@@ -178,52 +184,107 @@ def watch(store: Store, alpha: float = ALPHA) -> Watch:
         There are no results.
 
     """
-    kind_of: Mapping[str, str] = document(store).get('arms', {})
+    facts = document(store)
+    kind_of: Mapping[str, str] = facts.get('arms', {})
     if not kind_of:
         raise FleetError(f'{store.url}: holds no fleet; run `armid fleet identify` first')
-    bags = _bags(store)
-    series = _series(table_of(store, 'parameters'), bags)
+    bags: dict[str, list[dict[str, Any]]] = {}
+    for row in table_of(store, 'bags').drop_columns(['triangle']).to_pylist():
+        bags.setdefault(str(row['arm']), []).append(row)
+    for rows in bags.values():
+        rows.sort(key=lambda row: (row['start_ns'], row['bag']))
     refused: dict[str, list[dict[str, Any]]] = {}
     table = store.data_set('refused')
     for row in [] if table is None else table.to_pylist():
         refused.setdefault(str(row['arm']), []).append(row)
     by_kind: dict[str, list[ParameterHistory]] = {}
-    for one in series:
+    for one in _series(table_of(store, 'parameters'), bags):
         by_kind.setdefault(kind_of.get(one.arm, ''), []).append(one)
-    compared = {kind: without_days(group) for kind, group in by_kind.items()}
-    spread = {kind: spreads(group) for kind, group in compared.items()}
-    judged = _judged(compared, spread)
-    unlike = {kind: unlike_siblings(group) for kind, group in by_kind.items()}
-    own, beside = (_by_arm(some) for some in (series, itertools.chain(*compared.values())))
-    arms = [
-        WatchedArm(
-            one.arm,
-            kind_of.get(one.arm, ''),
-            tuple(own[one.arm]),
-            tuple(beside[one.arm]),
-            tuple(bags.get(one.arm, ())),
-            one,
-            named(one, alpha),
-            _furthest(unlike[kind_of.get(one.arm, '')], own[one.arm]),
-            tuple(refused.get(one.arm, ())),
-            _units(own[one.arm], bags.get(one.arm, ())),
+    wearing: set[str] = set()
+    for key, kind in facts['kinds'].items():
+        arm = kind_arm(store, kind, key)
+        wearing.update(one.name for one in arm.parameters[len(arm.robot.rigid_parameters) :])
+    spread: dict[str, Mapping[tuple[str, str], Spread]] = {}
+    kinds, arms = [], []
+    own: dict[str, list[ParameterHistory]] = {}
+    compared: dict[str, list[ParameterHistory]] = {}
+    unlike: dict[tuple[str, str, str], float] = {}
+    for key, group in by_kind.items():
+        without = without_days(group)
+        spread[key] = spreads(without)
+        kinds.append((without, spread[key]))
+        unlike |= unlike_siblings(group)
+        for one, other in zip(group, without, strict=True):
+            own.setdefault(one.arm, []).append(one)
+            compared.setdefault(one.arm, []).append(other)
+    for judged in judge(kinds):
+        name = judged.arm
+        distances = {
+            one: unlike[name, *one.parameter] for one in own[name] if one.name != RESIDUAL
+        }
+        furthest = max(distances, key=lambda one: abs(distances[one]), default=None)
+        arms.append(
+            WatchedArm(
+                name,
+                kind_of.get(name, ''),
+                tuple(own[name]),
+                tuple(compared[name]),
+                tuple(bags.get(name, ())),
+                judged,
+                named(judged, alpha),
+                ('', 0.0)
+                if furthest is None
+                else (parameter_label(*furthest.parameter), distances[furthest]),
+                tuple(refused.get(name, ())),
+                _units(own[name], bags.get(name, ())),
+            )
         )
-        for one in judged
-    ]
     arms.sort(key=lambda arm: arm.units is None)
-    return Watch(tuple(arms), spread, _beside_the_body(store), alpha)
+    return Watch(tuple(arms), spread, frozenset(wearing), alpha)
+
+
+def arm_of(found: Watch, name: str) -> WatchedArm:
+    """
+    Return an arm by its name.
+
+    Raises
+    ------
+    FleetError
+        There is none of this name.
+
+    """
+    by_name = {arm.arm: arm for arm in found.arms}
+    if name not in by_name:
+        known = ', '.join(sorted(by_name)[:5])
+        raise FleetError(f"there is no arm '{name}'; there are {known} ...")
+    return by_name[name]
 
 
 def write_watch(store: Store, found: Watch) -> None:
     """Write tables and alarms."""
     changes = [row for arm in found.arms for row in change_rows(arm)]
-    tables = {
-        'changes': pa.Table.from_pylist(changes, CHANGES),
-        'wear': pa.Table.from_pylist(list(wear_rows(found)), WEAR),
-        'arms': pa.Table.from_pylist([_arm_row(arm) for arm in found.arms], ARMS),
-    }
-    for name, table in tables.items():
-        store.write_table(f'watch/{name}.parquet', table)
+    arms = []
+    for arm in found.arms:
+        errors = [e for row in arm.bags if (e := row['relative_error_percent'])]
+        arms.append(
+            {
+                'arm': arm.arm,
+                'health': arm.health,
+                'bags': len(arm.bags),
+                'refused': len(arm.refused),
+                'adjusted_p': arm.judged.adjusted,
+                'relative_error_percent': float(np.median(errors)) if errors else None,
+                'unlike': arm.unlike[0],
+                'unlike_by': arm.unlike[1],
+            }
+        )
+    wear = [row for arm in found.arms for row in wear_rows(found, arm)]
+    for name, rows, schema in (
+        ('changes', changes, CHANGES),
+        ('wear', wear, WEAR),
+        ('arms', arms, ARMS),
+    ):
+        store.write_table(f'watch/{name}.parquet', pa.Table.from_pylist(rows, schema))
     store.write('alarms.jsonl', ''.join(json.dumps(row) + '\n' for row in changes))
 
 
@@ -256,29 +317,28 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
     return rows
 
 
-def wear_rows(found: Watch) -> Iterator[dict[str, Any]]:
-    """Yield the slope of every parameter that is none of a rigid body, of every arm."""
-    for arm in found.arms:
-        for series in arm.compared:
-            if series.name not in found.wearing or len(series.values) < 2:
-                continue
-            slope, std = wear(series, found.spread[arm.kind][series.parameter])
-            if np.isfinite(std):
-                yield {
-                    'arm': arm.arm,
-                    'name': series.name,
-                    'joint': series.joint,
-                    'unit': series.unit,
-                    'per_month': slope,
-                    'lower': slope - _WIDE * std,
-                    'upper': slope + _WIDE * std,
-                }
+def wear_rows(found: Watch, arm: WatchedArm) -> Iterator[dict[str, Any]]:
+    """Yield the slope of every parameter of an arm that is none of a rigid body."""
+    for series in arm.compared:
+        if series.name not in found.wearing or len(series.values) < 2:
+            continue
+        slope, std = wear(series, found.spread[arm.kind][series.parameter])
+        if np.isfinite(std):
+            yield {
+                'arm': arm.arm,
+                'name': series.name,
+                'joint': series.joint,
+                'unit': series.unit,
+                'per_month': slope,
+                'lower': slope - _WIDE * std,
+                'upper': slope + _WIDE * std,
+            }
 
 
 def sentence(change: HistoryChange) -> str:
     """Say what has changed, when, and by how much with a 95 % interval."""
     series = change.series
-    what = _what(series)
+    what = parameter_label(*series.parameter)
     if series.name == RESIDUAL:
         lower, upper = (
             100.0 * np.expm1(change.size + sign * _WIDE * change.std) for sign in (-1.0, 1.0)
@@ -299,33 +359,13 @@ def day_text(days: float) -> str:
     return moment.date().isoformat()
 
 
-def _what(series: ParameterHistory) -> str:
-    if series.name == RESIDUAL:
-        return f'residual torque of {series.joint}'
-    if series.name.isidentifier() and '_' in series.name:
-        return f'{series.name.replace("_", " ")} of {series.joint}'
-    return full_label(ParameterName(series.name, series.joint, ''))
-
-
-def _beside_the_body(store: Store) -> frozenset[str]:
-    """Return the names of the parameters that effects have."""
-    names: set[str] = set()
-    for key, facts in document(store)['kinds'].items():
-        arm = kind_arm(store, facts, key)
-        rigid = len(arm.robot.rigid_parameters)
-        names.update(parameter.name for parameter in arm.parameters[rigid:])
-    return frozenset(names)
-
-
-def _judged(
-    by_kind: Mapping[str, Sequence[ParameterHistory]],
-    spread: Mapping[str, Mapping[tuple[str, str], Spread]],
-) -> list[Judged]:
-    """Judge all arms together, each by the spread of its own kind."""
-    judged = [one for kind, group in by_kind.items() for one in judge(group, spread[kind])]
-    adjusted = stats.false_discovery_control([one.p for one in judged]) if judged else []
-    both = [replace(one, adjusted=float(q)) for one, q in zip(judged, adjusted, strict=True)]
-    return sorted(both, key=lambda one: (one.adjusted, one.p, one.arm))
+def parameter_label(name: str, joint: str) -> str:
+    """Return what a series is of, as in 'viscous coefficient of elbow'."""
+    if name == RESIDUAL:
+        return f'residual torque of {joint}'
+    if name.isidentifier() and '_' in name:
+        return f'{name.replace("_", " ")} of {joint}'
+    return full_label(ParameterName(name, joint, ''))
 
 
 def _units(
@@ -363,88 +403,33 @@ def _units(
     return None
 
 
-def _by_arm(series: Iterable[ParameterHistory]) -> dict[str, list[ParameterHistory]]:
-    own: dict[str, list[ParameterHistory]] = {}
-    for one in series:
-        own.setdefault(one.arm, []).append(one)
-    return own
-
-
-def _bags(store: Store) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows of all bags, by arm and in order of time."""
-    table = table_of(store, 'bags').drop_columns(['triangle'])
-    bags: dict[str, list[dict[str, Any]]] = {}
-    for row in table.to_pylist():
-        bags.setdefault(str(row['arm']), []).append(row)
-    for rows in bags.values():
-        rows.sort(key=lambda row: (row['start_ns'], row['bag']))
-    return bags
-
-
 def _series(
     parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
 ) -> list[ParameterHistory]:
     """Return every parameter of every arm over time, and the logarithm of its residuals."""
     found = []
-    for arm, rows in sorted(bags.items()):
-        days = np.array([row['start_ns'] / _DAY_NS for row in rows])
-        place = {row['bag']: k for k, row in enumerate(rows)}
-        found += _residuals(arm, days, rows)
-        own = parameters.filter(pc.equal(pc.cast(parameters['arm'], pa.string()), arm))
-        at = np.array([place.get(bag, -1) for bag in own['bag'].to_pylist()], dtype=np.intp)
-        keys = list(
-            zip(*(own[name].to_pylist() for name in ('name', 'joint', 'unit')), strict=True)
-        )
-        numbers: dict[str, FloatArray] = {
-            name: own[name].to_numpy(zero_copy_only=False) for name in ('value', 'std')
-        }
-        groups: dict[tuple[str, str, str], list[int]] = {}
-        for row, key in enumerate(keys):
-            if at[row] >= 0:
-                groups.setdefault(key, []).append(row)
-        for key, members in groups.items():
-            order = np.array(sorted(members, key=lambda row: int(at[row])))
-            found.append(
-                ParameterHistory(
-                    arm, *key, days[at[order]], numbers['value'][order], numbers['std'][order]
-                )
-            )
+    for arm, own in sorted(bags.items()):
+        fitted = [row for row in own if row['residual_std']]
+        days = np.array([row['start_ns'] / _DAY_NS for row in fitted])
+        logs = np.log(np.maximum([row['residual_std'] for row in fitted], 1e-300))
+        for j, joint in enumerate(fitted[0]['joints'] if fitted else ()):
+            none = np.zeros(len(fitted))
+            found.append(ParameterHistory(arm, RESIDUAL, joint, '', days, logs[:, j], none))
+    # parameters in the order of bags, by parameter
+    rows = [row for _, own in sorted(bags.items()) for row in own]
+    days = np.array([row['start_ns'] / _DAY_NS for row in rows])
+    place = pc.index_in(parameters['bag'], value_set=pa.array([row['bag'] for row in rows]))
+    table = parameters.append_column('place', place).filter(pc.is_valid(place)).sort_by('place')
+    table = table.set_column(
+        table.column_names.index('arm'), 'arm', pc.cast(table['arm'], pa.string())
+    )
+    keys, numbers = ('arm', 'name', 'joint', 'unit'), ('place', 'value', 'std')
+    groups = table.group_by(keys, use_threads=False).aggregate([(one, 'list') for one in numbers])
+    for arm, name, joint, unit, *lists in zip(
+        *(groups[one].to_pylist() for one in keys),
+        *(groups[f'{one}_list'] for one in numbers),
+        strict=True,
+    ):
+        at, values, std = (one.values.to_numpy(zero_copy_only=False) for one in lists)
+        found.append(ParameterHistory(arm, name, joint, unit, days[at], values, std))
     return found
-
-
-def _residuals(
-    arm: str, days: FloatArray, rows: Sequence[dict[str, Any]]
-) -> list[ParameterHistory]:
-    fitted = [k for k, row in enumerate(rows) if row['residual_std']]
-    if not fitted:
-        return []
-    logs = np.log(np.maximum([rows[k]['residual_std'] for k in fitted], 1e-300))
-    joints = rows[fitted[0]]['joints']
-    return [
-        ParameterHistory(arm, RESIDUAL, joint, '', days[fitted], logs[:, j], np.zeros(len(fitted)))
-        for j, joint in enumerate(joints)
-    ]
-
-
-def _furthest(
-    unlike: Mapping[tuple[str, str, str], float], series: Sequence[ParameterHistory]
-) -> tuple[str, float]:
-    distances = {one: unlike[one.arm, *one.parameter] for one in series if one.name != RESIDUAL}
-    if not distances:
-        return '', 0.0
-    furthest = max(distances, key=lambda one: abs(distances[one]))
-    return _what(furthest), distances[furthest]
-
-
-def _arm_row(arm: WatchedArm) -> dict[str, Any]:
-    errors = [row['relative_error_percent'] for row in arm.bags if row['relative_error_percent']]
-    return {
-        'arm': arm.arm,
-        'health': arm.health,
-        'bags': len(arm.bags),
-        'refused': len(arm.refused),
-        'adjusted_p': arm.judged.adjusted,
-        'relative_error_percent': float(np.median(errors)) if errors else None,
-        'unlike': arm.unlike[0],
-        'unlike_by': arm.unlike[1],
-    }

@@ -3,8 +3,8 @@
 """
 Diagnosis of an arm while it moves.
 
-A `SampleWindow` keeps what came, `LiveDiagnosis` decides when to ask and what is believed of the
-arm, `Assistant` answers in a process of its own. Nothing here knows ROS.
+A `SampleWindow` keeps what came, `LiveDiagnosis` decides when to ask and which model of the
+arm holds, `Assistant` answers in a process of its own. Nothing here knows ROS.
 
 """
 

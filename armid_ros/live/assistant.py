@@ -117,10 +117,10 @@ class InProcess:
 
     def _done(self, job: Job) -> Result:
         if isinstance(job, DiagnosisRequest):
-            said, diagnosis = answer(job)
+            found, diagnosis = answer(job)
             if diagnosis is not None:
                 self._last = job, diagnosis
-            return said
+            return found
         if self._last is None:
             raise IdentificationError('nothing has been diagnosed so far')
         request, diagnosis = self._last

@@ -45,7 +45,7 @@ class LiveSettings:
         Questions in a row that have to agree on a name.
     learning : float
         Motion in which nothing is wrong yet, from which the model's own misfit is taken where
-        neither a baseline nor a misfit is known [s]; 0: the model is asked for all that it lacks.
+        neither a baseline nor a misfit is known [s]; 0: all that the model lacks is looked for.
     material : float
         Share of a joint's torque below which a cause does not matter.
 
@@ -71,7 +71,7 @@ class LiveSettings:
 @dataclass(frozen=True)
 class Belief:
     """
-    What is believed of the arm.
+    The model of the arm, and what is proposed.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class LiveDiagnosis:
     Parameters
     ----------
     arm : ArmModel
-        The model as it is believed to be.
+        The present model.
     settings : LiveSettings, optional
         When to ask.
     baseline : tuple of Recording
@@ -119,7 +119,7 @@ class LiveDiagnosis:
     settings : LiveSettings
         When to ask; may be replaced.
     belief : Belief
-        What is believed of the arm.
+        The model of the arm, and what is proposed.
     window : SampleWindow
         What came.
     latest : Answer or None
@@ -194,7 +194,7 @@ class LiveDiagnosis:
             self._begin, self._changed = -np.inf, False
             self._outdate()
         if self.learning and self._holds(self.settings.learning):
-            # keep the motion so far, which tells the misfit of the model
+            # keep the motion so far, from which the misfit of the model is computed
             began = self.window.end - self.settings.learning
             motion = self.window.recording(began, 'the motion in which nothing was wrong')
             self._healthy, self._learned = Healthy(self.belief.accepted, motion), True
@@ -231,7 +231,7 @@ class LiveDiagnosis:
         Returns
         -------
         bool
-            Whether another model is believed now.
+            Whether the model is another one now.
 
         """
         outdated, self._under_way, self._outdated = self._outdated, False, False

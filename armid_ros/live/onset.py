@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.arm import ArmModel
+from armid_ros.changes.statistic import tail, two_means
 from armid_ros.identification.rows.signals import (
     conditioning,
     decimate,
@@ -15,7 +16,6 @@ from armid_ros.identification.rows.signals import (
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
-import scipy.stats
 
 #: Stretches whose residual power is compared [s]: longer than what the residual remembers.
 _BLOCK = 0.5
@@ -36,7 +36,7 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     Parameters
     ----------
     arm : ArmModel
-        The model as it is believed to be.
+        The present model.
     recording : Recording
         Motion with torques, without a gap.
 
@@ -50,24 +50,18 @@ def onset(arm: ArmModel, recording: Recording) -> float | None:
     power = _block_powers(arm, recording)
     times, logs = power[:, 0], np.log(np.maximum(power[:, 1:], 1e-300))
     count = len(logs)
-    splits = range(_FEWEST, count)
-    if not splits:
+    if count <= _FEWEST:
         return None
     # the F ratio of two means against one for every joint
-    ratios = np.empty((len(splits), logs.shape[1]))
-    for ratio, split in zip(ratios, splits, strict=True):
-        before, after = logs[:split], logs[split:]
-        within = ((before - before.mean(axis=0)) ** 2).sum(axis=0)
-        within += ((after - after.mean(axis=0)) ** 2).sum(axis=0)
-        between = (before.mean(axis=0) - after.mean(axis=0)) ** 2 * split * (count - split) / count
-        ratio[:] = between * (count - 2) / np.maximum(within, 1e-300)
-    tried = len(splits) * logs.shape[1]
-    limit = scipy.stats.f.isf(_ERROR_RATE / tried, 1, count - 2)
-    best = int(np.argmax(ratios.max(axis=1)))
-    if ratios[best].max() <= limit:
+    low, high, std = two_means(logs, np.ones_like(logs))
+    between = ((high - low) / std)[_FEWEST - 1 :] ** 2
+    within = ((logs - logs.mean(axis=0)) ** 2).sum(axis=0) - between
+    ratios = (between * (count - 2) / np.maximum(within, 1e-300)).max(axis=1)
+    best = int(np.argmax(ratios))
+    if tail(ratios[best], 1, count - 2) * len(ratios) * logs.shape[1] >= _ERROR_RATE:
         return None
     edge = recording.duration - (times[-1] + _BLOCK)  # what the filter needs of the end
-    return float(times[splits[best]] + _BLOCK + edge)
+    return float(times[_FEWEST + best] + _BLOCK + edge)
 
 
 def _block_powers(arm: ArmModel, recording: Recording) -> FloatArray:

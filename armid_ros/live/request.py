@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked of a window of samples, and what is answered."""
+"""The diagnosis of a window of samples: request and answer."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class Healthy:
 @dataclass(frozen=True)
 class DiagnosisRequest:
     """
-    What is asked.
+    A window to be diagnosed.
 
     Attributes
     ----------
     arm : ArmModel
-        The model as it is believed to be.
+        The present model.
     window : Recording
         What came lately.
     baseline : tuple of Recording
@@ -68,18 +68,18 @@ class DiagnosisRequest:
     misfit : Misfit or None
         Residual of the model when it was identified, where there is no baseline.
     shortest : float
-        A window shorter than this tells too little [s].
+        Shortest window that is diagnosed [s].
     material : float
         Share of a joint's torque below which a cause does not matter.
     seed : int
         Of the diagnosis.
     end : float
-        When the last sample of the window was, in the time of who asks [s].
+        When the last sample of the window was, in the time of the request [s].
     healthy : Healthy or None
-        Motion that tells the misfit, where neither of them is known.
+        Motion to compute the misfit from, where neither of them is known.
     of_one_arm : bool
         Whether all of the window is since the arm changed last. What a wrong model leaves comes
-        and goes with the motion, so that no further change can be told by it.
+        and goes with the motion, so that it hides any further change.
 
     """
 
@@ -108,7 +108,7 @@ class GapOfJoint:
 @dataclass(frozen=True)
 class Answer:
     """
-    What a window tells.
+    The diagnosis of a window.
 
     Attributes
     ----------
@@ -126,11 +126,11 @@ class Answer:
     window : Recording
         What was looked at: the part of the window since the arm changed last.
     end : float
-        When its last sample was, in the time of who asked [s].
+        When its last sample was, in the time of the request [s].
     seconds : float
         Processor time that it took [s].
     changed : bool
-        Whether the arm changed in the window that was asked about.
+        Whether the arm changed in the window.
 
     """
 
@@ -159,7 +159,7 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
     """
     begun, arm, window = time.process_time(), request.arm, request.window
 
-    def said(
+    def answered(
         verdict: str, summary: str, findings: Sequence[Finding] = (), patched: ArmModel = arm
     ) -> Answer:
         spent = time.process_time() - begun
@@ -182,7 +182,7 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
             window = replace(window, t=window.t - (window.t[0] if len(window) else 0.0))
         if window.duration < request.shortest:
             text = f'the arm changed {window.duration:.0f} s ago: more motion is needed'
-            return said(WAITING, text), None
+            return answered(WAITING, text), None
         rng, misfit = np.random.default_rng(request.seed), request.misfit
         if request.healthy is not None and not request.baseline:
             # what the model left before, in the band in which the window is looked at
@@ -196,5 +196,5 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
             rng=np.random.default_rng(request.seed),
         )
     except ArmidError as error:
-        return said('bad_data', str(error)), None
-    return said(found.verdict, found.summary, found.findings, found.arm), found
+        return answered('bad_data', str(error)), None
+    return answered(found.verdict, found.summary, found.findings, found.arm), found

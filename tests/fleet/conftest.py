@@ -3,7 +3,9 @@
 """A small fleet in bags, and a cluster of two processes to work on it."""
 
 from armid_ros.fleet.cluster import connected
-from armid_ros.fleet.identify import FleetSettings, identify_fleet, plan_fleet
+from armid_ros.fleet.job import FleetSettings
+from armid_ros.fleet.plan import plan_fleet
+from armid_ros.fleet.run import identify_fleet
 import pytest
 
 from benchmarks.fleet import EFFECTS, generate, ROBOT

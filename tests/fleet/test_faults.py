@@ -171,9 +171,10 @@ def arm_the_trap():
 
 
 def test_a_bag_that_ends_its_workers_is_given_up_and_the_others_are_used(bags, tmp_path):
-    with connected(None, 2) as client:
-        client.register_worker_callbacks(arm_the_trap)
-        outcome = identified(client, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), FIXED)
+    with dask.config.set({'distributed.scheduler.allowed-failures': 1}):
+        with connected(None, 2) as client:
+            client.register_worker_callbacks(arm_the_trap)
+            outcome = identified(client, find_bags([f'{bags}/*/*']), URDF, str(tmp_path), FIXED)
     (refused,) = outcome.refused
     assert (outcome.done, refused.failed) == (8, True)
     assert refused.bag.url.endswith('arm_0001/2026-01-02')

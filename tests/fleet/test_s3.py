@@ -5,7 +5,7 @@
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.cluster import connected
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.watch import watch, write_watch
+from armid_ros.fleet.watch import watch_fleet, write_watch
 import fsspec
 from moto.server import ThreadedMotoServer
 import pytest
@@ -64,6 +64,6 @@ def test_results_in_an_object_store_are_watched_there(bucket):
     store = Store(f'{bucket}/results')
     with connected(None, 1) as client:
         identified(client, find_bags([f'{bucket}/bags/*/*']), URDF, store.url, FIXED)
-    write_watch(store, watch(store))
+    write_watch(store, watch_fleet(store))
     assert store.read('alarms.jsonl') == b''
     assert len(store.read_table('watch/arms.parquet')) == 2

@@ -8,12 +8,12 @@ import shutil
 from urllib.parse import quote
 
 from armid_ros.errors import FleetError
-from armid_ros.fleet.bag_reports import asked_bags, write_reports
+from armid_ros.fleet.bag_reports import bags_to_report, write_reports
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.diagnose import cases, diagnose_fleet
-from armid_ros.fleet.pages import write_arm_page, write_pages
+from armid_ros.fleet.pages import write_pages
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.watch import change_rows, watch, write_watch
+from armid_ros.fleet.watch import change_rows, watch_fleet, write_watch
 import pyarrow as pa
 from pyarrow import parquet
 import pytest
@@ -31,7 +31,7 @@ def lived(cluster, tmp_path_factory):
     store = Store(str(folder / 'results'))
     bags = find_bags([f'{folder}/bags/*/*'])
     identified(cluster, bags, URDF, store.url, SETTINGS)
-    found = watch(store)
+    found = watch_fleet(store)
     write_watch(store, found)
     truth = json.loads((folder / 'bags' / 'truth.json').read_text())
     return store, found, truth
@@ -54,7 +54,7 @@ def test_currents_beside_torques_are_named_as_that(lived, tmp_path, days):
                 gain = {'waist': 13.3, 'shoulder': 11.1, 'elbow': 10.6}[row['joint']]
                 row |= {'value': row['value'] / gain, 'std': row['std'] / gain}
             parquet.write_table(pa.Table.from_pylist(rows), file)
-    first = watch(Store(str(tmp_path / 'copy'))).arms[0]
+    first = watch_fleet(Store(str(tmp_path / 'copy'))).arms[0]
     (row,) = change_rows(first)
     assert (first.arm, first.health, row['kind']) == (arm, 'changed', 'units')
     assert row['first_day'] == '2026-01-05'
@@ -139,9 +139,9 @@ def test_the_diagnosis_names_what_happened_with_the_arms_own_past_as_baseline(li
 def test_the_report_of_any_bag_is_made_when_it_is_asked_for_and_linked(lived):
     store, found, _ = lived
     arm = next(arm for arm in found.arms if not arm.named)
-    (url,) = asked_bags(found, arm.arm, ['2026-01-02'])
+    _, (url,) = bags_to_report(found, arm.arm, ['2026-01-02'])
     (report,) = write_reports(store, arm, [url])
-    write_arm_page(store, found, arm)
+    write_pages(store, found, [arm])
     page = store.read(f'pages/{arm.arm}.html').decode()
     assert f'href="../{quote(report)}"' in page
     assert store.read(report) is not None
@@ -150,9 +150,9 @@ def test_the_report_of_any_bag_is_made_when_it_is_asked_for_and_linked(lived):
 def test_a_bag_that_is_not_there_is_said_with_the_latest_ones(lived):
     _, found, _ = lived
     with pytest.raises(FleetError, match=r"'never'.*2026-01-08"):
-        asked_bags(found, found.arms[0].arm, ['never'])
+        bags_to_report(found, found.arms[0].arm, ['never'])
 
 
 def test_a_folder_without_results_is_said(tmp_path):
     with pytest.raises(FleetError, match='armid fleet identify'):
-        watch(Store(str(tmp_path)))
+        watch_fleet(Store(str(tmp_path)))

@@ -15,7 +15,7 @@ What a model leaves of the torque of a joint is held against what the other leav
 has a change that neither model describes.
 
 Where both have their covariance, the effects of each joint and the links are looked at as a whole
-too: parameters that are hard to tell apart can differ together beyond doubt and none of them
+too: parameters that are strongly correlated can differ together beyond doubt and none of them
 alone. A change of the links is held against that of a load on one of them.
 
 """
@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from armid_ros.changes.statistic import beyond_chance, quadratic_form, tail
 from armid_ros.errors import ModelError
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import (
@@ -37,7 +38,6 @@ from armid_ros.identification.assess.load_change import find_load, residual_chan
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.motion import FloatArray
 import numpy as np
-from scipy.stats import chi2, f, norm, t
 
 #: Probability that the list of changes has a chance find in it.
 CHANCE = 0.05
@@ -72,7 +72,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     groups = _groups(shared) if joint else []
     residuals = residual_changes(before.fit, after.fit)
     chance = CHANCE / sum((True, bool(groups), bool(residuals)))
-    single = _beyond_chance(_single_chances(*sides), chance)
+    single = beyond_chance(_single_chances(*sides), chance)
     freedom = sum(one.freedom for one in sides)
     together = [
         _group_chance(difference[g], covariance[np.ix_(g, g)], scatter[:, g], freedom)
@@ -83,7 +83,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
         ParameterChange(name, row[0], row[1], row[2], row[3], one)
         for name, row, one in zip(shared, rows, single, strict=True)
     )
-    sure = _beyond_chance(together, chance)
+    sure = beyond_chance(together, chance)
     found = tuple(
         GroupChange('' if own[0].rigid else own[0].joint, own, p_value, one)
         for own, p_value, one in zip(
@@ -92,7 +92,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     )
     rigid = [k for k, name in enumerate(shared) if name.rigid]
     moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
-    left = _beyond_chance([one.p_value for one in residuals], chance)
+    left = beyond_chance([one.p_value for one in residuals], chance)
     without = dict.fromkeys((*before.without_std, *after.without_std))
     load = None
     if joint and moved:
@@ -126,7 +126,7 @@ def _require_two_of_one_robot(before: ParameterFile, after: ParameterFile) -> No
         )
         raise ModelError(
             f'{before.source} and {after.source} are of different robots, {before.robot} and '
-            f'{after.robot}: {how}; what changed can be said of one robot only'
+            f'{after.robot}: {how}; name two results of one robot'
         )
     same = before.values == after.values and before.without_std == after.without_std
     if same and (before.values or before.without_std):
@@ -141,8 +141,8 @@ def _nothing_shared(before: ParameterFile, after: ParameterFile) -> str:
     for one in (before, after):
         if not one.values and one.without_std:
             return (
-                f'{one.source} has no standard deviation of any parameter, so no change can be '
-                'told from chance; name a result of identify'
+                f'{one.source} has no standard deviation of any parameter, so changes cannot be '
+                'tested; name a result of identify'
             )
     return (
         f'{before.source} and {after.source} have no identified parameter in common; '
@@ -205,17 +205,15 @@ class _Side:
         return cls(values, std, scatter, freedom, freedoms)
 
 
-def _single_chances(before: _Side, after: _Side) -> list[float]:
+def _single_chances(before: _Side, after: _Side) -> FloatArray:
     """Return how likely each difference is by chance, with freedoms of a sum (Welch)."""
     size, std = np.abs(after.values - before.values), np.hypot(before.std, after.std)
     same = size <= _ROUNDING * np.abs(before.values)
     safe = np.where(std > 0.0, std, 1.0)
     shares = [((side.std / safe) ** 4) / side.freedoms for side in (before, after)]
     with np.errstate(over='ignore', divide='ignore'):  # infinitely many deviations have no chance
-        missed, freedom = size / safe, 1.0 / (shares[0] + shares[1])
-    known = np.isfinite(freedom)
-    chances = 2.0 * np.where(known, t.sf(missed, np.where(known, freedom, 1.0)), norm.sf(missed))
-    return [float(p) for p in np.where(std > 0.0, chances, same)]
+        chances = tail((size / safe) ** 2, 1, 1.0 / (shares[0] + shares[1]))
+    return np.where(std > 0.0, chances, same)
 
 
 def _group_chance(
@@ -226,9 +224,7 @@ def _group_chance(
         return 1.0
     squares, rank = _squares(difference[np.newaxis], covariance)
     inflation = _inflation(covariance, scatter)
-    if inflation <= 1.0:
-        return float(chi2.sf(squares, rank))
-    return float(f.sf(squares / rank / inflation, rank, rank * freedom))
+    return float(tail(squares / inflation, rank, np.inf if inflation <= 1.0 else rank * freedom))
 
 
 def _inflation(covariance: FloatArray, scatter: FloatArray) -> float:
@@ -242,18 +238,6 @@ def _inflation(covariance: FloatArray, scatter: FloatArray) -> float:
 def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
     """Return the sum of the squares of rows (K, p) over a covariance, and its rank."""
     std = np.sqrt(np.diag(covariance))
-    sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
-    kept = sizes > _ROUNDING * sizes[-1]
     with np.errstate(over='ignore'):
-        along = (rows / std) @ axes[:, kept]
-        return float(np.sum(along**2 / sizes[kept])), int(kept.sum())
-
-
-def _beyond_chance(chances: Sequence[float], allowed: float) -> list[bool]:
-    """Tell which are beyond chance, with a probability of one chance find among all (Holm)."""
-    beyond = [False] * len(chances)
-    for tried, index in enumerate(np.argsort(chances)):
-        if chances[index] > allowed / (len(chances) - tried):
-            break
-        beyond[int(index)] = True
-    return beyond
+        squares, rank = quadratic_form(rows / std, covariance / np.outer(std, std), _ROUNDING)
+        return float(squares.sum()), int(rank.max())

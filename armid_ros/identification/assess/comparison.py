@@ -87,7 +87,7 @@ class GroupChange:
 
 #: 'deviation': a file has no standard deviation of it, or of what it groups. 'motion': the other
 #: motion does not show it. 'effect': the other model has no such effect there. 'grouping': the
-#: other data do not tell the links apart in this way.
+#: other data group the parameters of links differently.
 Why = Literal['deviation', 'motion', 'effect', 'grouping']
 
 

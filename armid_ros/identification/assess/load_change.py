@@ -21,12 +21,12 @@ from math import isfinite
 import re
 from typing import Any
 
+from armid_ros.changes.statistic import tail
 from armid_ros.identification.assess.grade_limits import FREEDOM
 from armid_ros.identification.known_fit import KnownFit
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.linalg
-from scipy.stats import chi2, f
 
 #: Parameters of a link as base parameters name them, without its number.
 _SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
@@ -127,7 +127,7 @@ def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | Non
     along = left.T @ white
     rest = float(white @ white - along @ along)
     freedom = len(white) - len(sizes)
-    p_value = float(chi2.sf(rest, freedom)) if freedom > 0 else 0.0
+    p_value = float(tail(rest, freedom)) if freedom > 0 else 0.0
     if p_value < _REFUSED or np.linalg.norm(right[:, 0]) < 1.0 - 1e-6:
         return None
     values = (right.T @ (along / sizes)) / scale
@@ -190,9 +190,11 @@ def residual_changes(
     found = []
     for joint in (one for one in before.rms if one in after.rms):
         ratio = _ratio(before, after, joint)
-        with np.errstate(over='ignore'):
+        with np.errstate(over='ignore', divide='ignore'):
             square = np.square(ratio)
-        p_value = 2.0 * min(float(f.sf(square, *freedoms)), float(f.cdf(square, *freedoms)))
+            more = tail(square * freedoms[0], *freedoms)
+            less = tail(freedoms[1] / square, *freedoms[::-1])
+        p_value = 2.0 * min(float(more), float(less))
         errors = before.errors.get(joint), after.errors.get(joint)
         left = before.rms[joint], after.rms[joint]
         found.append(ResidualChange(joint, *left, *errors, ratio, min(p_value, 1.0)))

@@ -5,7 +5,7 @@ The likelihood ratio of a change, against what was known before and what noise u
 
 What was known before a window is theta0 with the information A = R^T R. The rows W of the window,
 of unit noise, give M = W^T W and c = W^T tau. That theta = theta0 + D delta from then on, theta0
-being as uncertain as it was, is said by
+being as uncertain as it was, has
 
     S = D^T A (A + M)^-1 M D    and    s = D^T A (A + M)^-1 (c - M theta0)
 
@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from armid_ros.changes.statistic import quadratic_form
 from armid_ros.identification.online.background import Pieces
 from armid_ros.identification.online.recursive import Learned, WeightedSample
 from armid_ros.motion import FloatArray
@@ -33,7 +34,7 @@ from scipy.linalg import lapack
 
 #: Eigenvalues of an information below this share of the largest are nothing [-].
 _NOTHING = 1e-9
-#: A change of which the window leaves more than this share open is not told by it [-].
+#: A change of which the window leaves more than this share open is not determined by it [-].
 _HIDDEN = 1e-6
 
 
@@ -52,8 +53,8 @@ class Block:
         c = W^T tau.
     before : Learned
         What was known when it began.
-    asked : Learned
-        What the estimator that is asked for its parameters knew then.
+    narrow : Learned
+        What the estimator without nuisance parameters knew then.
     samples : tuple of WeightedSample
         What it was made of, to learn from it once more.
 
@@ -64,7 +65,7 @@ class Block:
     information: FloatArray
     right: FloatArray
     before: Learned
-    asked: Learned
+    narrow: Learned
     samples: tuple[WeightedSample, ...]
 
     @cached_property
@@ -106,7 +107,7 @@ def projecting(block: Block, directions: FloatArray) -> Pieces[Projected]:
 @dataclass(frozen=True, eq=False)
 class ScoreStatistics:
     """
-    What a window says of Q possible changes.
+    The statistics of Q possible changes in a window.
 
     Attributes
     ----------
@@ -126,15 +127,7 @@ class ScoreStatistics:
     def ratios(self, sets: npt.NDArray[np.intp]) -> FloatArray:
         """Return twice the log of the likelihood ratio of G sets of p changes, (G, p): (G,)."""
         information = self.information[sets[:, :, np.newaxis], sets[:, np.newaxis, :]]
-        if sets.shape[1] == 1:  # a number is its own eigenvalue, and most changes are numbers
-            size, squares = information[:, :, 0], self.score[sets] ** 2
-        else:
-            size, vectors = np.linalg.eigh(information)
-            squares = np.einsum('gpk,gp->gk', vectors, self.score[sets]) ** 2
-        kept = size > _NOTHING * np.maximum(size[:, -1:], 0.0)
-        return np.asarray(
-            np.sum(np.divide(squares, size, where=kept, out=np.zeros_like(size)), axis=1)
-        )
+        return quadratic_form(self.score[sets], information, _NOTHING)[0]
 
     def size(self, some: slice) -> tuple[FloatArray, FloatArray]:
         """
@@ -147,8 +140,8 @@ class ScoreStatistics:
         information = self.information[some, some]
         covariance = np.linalg.pinv(information, hermitian=True)
         values = np.asarray(covariance @ self.score[some])
-        told = np.einsum('pq,qp->p', covariance, information)  # 1, where all of it is seen
-        hidden = np.flatnonzero(told < 1.0 - _HIDDEN)
+        shown = np.einsum('pq,qp->p', covariance, information)  # 1, where all of it is seen
+        hidden = np.flatnonzero(shown < 1.0 - _HIDDEN)
         covariance[hidden, hidden] = np.inf
         return values, np.asarray(covariance)
 

@@ -56,7 +56,7 @@ _CORRECTION = 0.3
 @dataclass(frozen=True)
 class ChangeSettings:
     """
-    How readily a change is believed.
+    The threshold of a change.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class ChangeSearch:
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
         """
-        Take in a block of rows, and say whether a change is clear by now.
+        Take in a block of rows, and return the change that is clear by now.
 
         Parameters
         ----------

@@ -63,14 +63,14 @@ class _Stretch:
     """Samples that were not searched so far; those of a block, or what an interruption left."""
 
     begin: float
-    asked: Learned
+    narrow: Learned
     end: float | None = None
     samples: list[Narrow | None] = field(default_factory=list)
 
 
 class ChangeWatch:
     """
-    Lets an estimator learn, and tells when what it learns has changed.
+    Lets an estimator learn, and detects changes of what it learns.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class ChangeWatch:
     candidates : sequence of ChangeCandidate
         What may change.
     settings : ChangeSettings
-        How readily a change is believed.
+        The threshold of a change.
     work : Background
         Does what takes long.
 
@@ -103,7 +103,7 @@ class ChangeWatch:
         self._estimator = estimator
         self._nuisance = nuisance
         self._wider = estimator.with_more(() if nuisance is None else nuisance.parameters)
-        self._asked = len(estimator.parameters)
+        self._own = len(estimator.parameters)
         self._work = work
         self._search = ChangeSearch(
             candidates,
@@ -136,7 +136,7 @@ class ChangeWatch:
         Parameters
         ----------
         settings : ChangeSettings or None
-            How readily a change is believed; None believes in none.
+            The threshold of a change; None looks for none.
         forgetting : float
             Of what is learned.
 
@@ -180,7 +180,7 @@ class ChangeWatch:
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
         """Return directions in the parameters of the estimator in those of the wider one."""
-        more = len(self._wider.parameters) - self._asked
+        more = len(self._wider.parameters) - self._own
         return np.vstack([directions, np.zeros((more, directions.shape[1]))])
 
     def _hand_over(self, end: float | None) -> None:
@@ -263,7 +263,9 @@ class ChangeWatch:
         if weights.any():
             self._left.append(squares / float(np.sum(weights)))
         yield
-        return Block(stretch.begin, end, information, right, before, stretch.asked, tuple(samples))
+        return Block(
+            stretch.begin, end, information, right, before, stretch.narrow, tuple(samples)
+        )
 
     @property
     def _residual_scale_of_all(self) -> float:
@@ -292,7 +294,7 @@ class ChangeWatch:
         again = copy(self._estimator)
         for estimator, known, directions in (
             (self._wider, last.before, self._among_all(reopened)),
-            (again, last.asked, reopened),
+            (again, last.narrow, reopened),
         ):
             estimator.restore(known)
             estimator.reopen(directions)
@@ -307,7 +309,7 @@ class ChangeWatch:
 
     def _learn_both(self, again: RecursiveLeastSquares, samples: Sequence[WeightedSample]) -> Job:
         yield from self._learn(self._wider, samples)
-        own = [sample._replace(rows=sample.rows[:, : self._asked]) for sample in samples]
+        own = [sample._replace(rows=sample.rows[:, : self._own]) for sample in samples]
         yield from self._learn(again, own)
 
     def _louder(self, blocks: Sequence[Block], free: int) -> Pieces[float]:

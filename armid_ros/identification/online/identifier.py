@@ -33,7 +33,7 @@ __all__ = ['OnlineIdentifier', 'OnlineSample', 'OnlineSettings']
 #: Time constants of the row filter until its start, or a joint's rest, is forgotten, to 3e-3.
 _FORGOTTEN = 10.0
 #: A joint that is slower [rad/s or m/s] for longer than this [s], which is longer than a reversal
-#: takes, is at rest: where dry friction may hold it, its torque says nothing and is not used.
+#: takes, is at rest: where dry friction may hold it, its torque shows nothing and is not used.
 _REST_VELOCITY, _REST_TIME = 0.01, 0.1
 #: Successive samples that may be damaged by chance; what lasts longer is real.
 _LONGEST_DAMAGE = 10
@@ -129,7 +129,7 @@ class OnlineIdentifier:
             if not effect.instantaneous:
                 raise IdentificationError(
                     f'{effect.name} depends on the motion before, which single samples do not '
-                    'tell; identify it from a recording'
+                    'show; identify it from a recording'
                 )
         self.arm = arm
         self.settings = settings
@@ -189,7 +189,7 @@ class OnlineIdentifier:
         q, tau : array_like, shape (n,)
             Measured position [rad or m] and torque [N m or N], in the order of the robot.
         dq : array_like, shape (n,), or None
-            Measured velocity; not used unless the settings say so.
+            Measured velocity; not used unless `measured_velocity` is set.
 
         Returns
         -------

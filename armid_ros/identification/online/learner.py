@@ -3,9 +3,9 @@
 """
 What an online identifier learns from one row after the other, in two steps.
 
-A row has to say at once what the estimate before it predicts. That it is learned from may wait for
-the next sample, which as a rule brings no row: so no sample has to do both. Whoever asks for what
-is learned does not notice, for it is learned then at the latest.
+The prediction of a row by the estimate before it is needed at once. Learning from it may wait for
+the next sample, which as a rule brings no row: so no sample has to do both. An estimate that is
+read includes it, for it is learned then at the latest.
 
 """
 
@@ -57,7 +57,7 @@ class OnlineSettings:
     measured_velocity : bool
         Differentiate the measured velocity instead of the position.
     changes : ChangeSettings or None
-        How readily a change of the arm is believed; None does not look for any.
+        The threshold of a change of the arm; None does not look for any.
 
     """
 

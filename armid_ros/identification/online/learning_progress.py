@@ -60,7 +60,7 @@ class Unlearned:
     uncertainty: float
 
     def __str__(self) -> str:
-        """Say what is unknown and how to move, in words of a person beside the robot."""
+        """Return what is unknown and how to move, in plain words."""
         words = list(dict.fromkeys(_word(p) for p in self.parameters))
         advice = list(dict.fromkeys(_ADVICE.get(word, _OTHER_ADVICE) for word in words))
         return f'{self.joint or "the arm"} ({", ".join(words)}): {" and ".join(advice)}'
@@ -68,7 +68,7 @@ class Unlearned:
 
 class LearningProgress:
     """
-    Looks at estimates now and then, and says what the motion between them did not teach.
+    Looks at estimates now and then, and finds what the motion between them did not teach.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Friction that arms have and nobody asked for.
+Friction that arms have and that is not identified, as nuisance parameters.
 
 What a model lacks bends the parameters that are identified, and comes and goes with the motion: a
 search for changes would take it for one, or the torques of a fast motion, which bent inertias
 predict wrongly, for the size of another. It is the same in every motion though, so it is learned
-beside them: viscous and Coulomb friction, if the model does not have them, friction in proportion
-to the load, and a curve over velocity, which is a sum of humps at low velocities.
+together with them: viscous and Coulomb friction, if the model does not have them, friction in
+proportion to the load, and a curve over velocity, which is a sum of humps at low velocities.
 
 """
 

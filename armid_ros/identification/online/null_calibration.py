@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from armid_ros.changes.statistic import limits, MEDIAN_SQUARE
 from armid_ros.identification.online.background import Job, Pieces
 from armid_ros.motion import FloatArray
 import numpy as np
-from scipy import special, stats
+from scipy import stats
 
 #: Windows that are remembered: ten minutes of four a second.
 _MEMORY = 2400
@@ -26,7 +27,7 @@ _EVERY = 8
 _SHARE = 0.05
 #: The usual size is measured by what so many exceed.
 _TAIL = 0.05
-#: What so many of all statistics exceed tells whether large ones are more frequent than in noise.
+#: Quantile of all statistics that shows whether large ones are more frequent than in noise.
 _RARE = 0.01
 #: Standard deviation of the logarithms of usual sizes, at the least.
 _LEAST_SPREAD = 0.1
@@ -46,8 +47,6 @@ _AT_A_TIME = 4_000
 _BLOCKS = 240
 #: Blocks before the assumption is given up.
 _FEWEST_BLOCKS = 16
-#: Median of the square of a standard normal variable.
-_MEDIAN = float(stats.chi2(1).median())
 
 
 class History:
@@ -95,7 +94,7 @@ class NullCalibration:
 
     By their mean, in which what one in twenty exceeds counts as that and no more, over the later
     three quarters of what was seen and ten minutes at most: so what came while little was known,
-    or before a change was noticed, soon has no part in it. A few windows tell a factor only
+    or before a change was noticed, soon has no part in it. A few windows determine a factor only
     roughly; those of other statistics, of the same arm and motion, are much the same, and each is
     drawn towards their mean as far as it is less certain than they are different (Efron and
     Morris 1975). Where large ones come more often than the mean suggests, as where the model lacks
@@ -243,12 +242,10 @@ class NullCalibration:
             return known[2]
         judged = self._freedom > 0.0
         sizes, freedom = self._sizes[judged], self._freedom[judged]
-        # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
-        share = special.betaincinv(0.5 * freedom, 0.5 * sizes, chance)
-        limits = np.full(len(self._sizes), np.inf)
-        limits[judged] = freedom * (1.0 - share) / share
-        self._limits = self._freedom, chance, limits
-        return limits
+        found = np.full(len(self._sizes), np.inf)
+        found[judged] = limits(chance, sizes, freedom)
+        self._limits = self._freedom, chance, found
+        return found
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:
@@ -301,5 +298,5 @@ class ResidualScale:
         ordered, counts = np.sort(values, axis=0), np.sum(~np.isnan(values), axis=0)
         columns = np.arange(values.shape[1])
         medians = (ordered[(counts - 1) // 2, columns] + ordered[counts // 2, columns]) / 2.0
-        value[known] = np.sqrt(medians / _MEDIAN)
+        value[known] = np.sqrt(medians / MEDIAN_SQUARE)
         self._value = np.maximum(value, self._least)

@@ -152,7 +152,7 @@ class RecursiveLeastSquares:
         self._root = np.asfortranarray(np.eye(len(self._start)) / square_root.PRIOR_STD)
         self._right = np.asfortranarray(self._start[:, np.newaxis] / square_root.PRIOR_STD)
         self._squares = 0.0
-        # the first P observations fit exactly and say nothing of the noise
+        # the first P observations fit exactly and do not show the noise
         self._freedom = -float(len(self._start))
         self._values = square_root.solved(self._root, self._right)
 
@@ -295,7 +295,7 @@ class RecursiveLeastSquares:
 
     @property
     def noise_is_relative(self) -> bool:
-        """Whether the noise is known up to a factor only, which the residuals tell."""
+        """Whether the noise is known up to a factor only, which is taken from the residuals."""
         return self._scale
 
     @property

@@ -57,7 +57,7 @@ class _Bands:
 
 class RobustCovariance:
     """
-    Sums up windows of rows, and says what covariance their residuals give an estimate.
+    Sums up windows of rows, and computes the covariance of an estimate from their residuals.
 
     Parameters
     ----------
@@ -180,8 +180,8 @@ class RobustCovariance:
         """
         Return the covariance of an estimate, shape (P, P); None before the second window.
 
-        Few windows tell the noise only roughly: its deviations are those of normal distributions
-        with intervals as wide as Student's.
+        Few windows determine the noise only roughly: its deviations are those of normal
+        distributions with intervals as wide as Student's.
 
         Parameters
         ----------

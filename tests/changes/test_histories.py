@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changes of arms over time: found where there are, and rarely where there are none."""
 
-from armid_ros.fleet.changes import judge, largest_change, MONTH, named, wear
-from armid_ros.fleet.scatter import ParameterHistory, spreads, without_days
+from armid_ros.changes.histories import judge, largest_change, MONTH, named, wear
+from armid_ros.changes.scatter import ParameterHistory, spreads, without_days
 import numpy as np
 import pytest
 
@@ -32,9 +32,14 @@ def changed(series, shift):
     return ParameterHistory(**{**vars(series), 'values': series.values + shift})
 
 
+def judged(series):
+    """Return what the tests of arms of one kind say, the least probable first."""
+    return judge([(series, spreads(series))])
+
+
 def names(series, alpha=0.05):
     """Return the arms that are named."""
-    return {one.arm for one in judge(series) if named(one, alpha)}
+    return {one.arm for one in judged(series) if named(one, alpha)}
 
 
 @pytest.mark.long
@@ -46,7 +51,7 @@ def test_a_thousand_healthy_arms_are_rarely_accused():
 def test_a_step_is_found_with_its_arm_parameter_place_and_size():
     series = fleet(np.random.default_rng(1), 50)
     series[8 * 7 + 3] = changed(series[8 * 7 + 3], np.where(np.arange(10) >= 6, 0.1, 0.0))
-    (first, *_) = judge(series)
+    (first, *_) = judged(series)
     change = named(first, 0.05)[0]
     assert (first.arm, change.series.parameter) == ('arm_7', PARAMETERS[3])
     assert (change.kind, change.index) == ('step', 6)
@@ -56,7 +61,7 @@ def test_a_step_is_found_with_its_arm_parameter_place_and_size():
 def test_wear_is_a_trend_with_its_slope():
     series = fleet(np.random.default_rng(2), 50)
     series[0] = changed(series[0], 0.02 * np.arange(10.0))
-    change = next(one for one in judge(series) if one.arm == 'arm_0').changes[0]
+    change = next(one for one in judged(series) if one.arm == 'arm_0').changes[0]
     assert change.kind == 'trend'
     assert abs(change.size - 0.02 * MONTH) < 3 * change.std
 
@@ -110,7 +115,7 @@ def test_a_step_beyond_all_probability_is_named_before_smaller_ones():
     late = np.arange(20) >= 9
     series[1] = changed(series[1], np.where(late, 30.0, 0.0))
     series[2] = changed(series[2], np.where(late, 60.0, 0.0))
-    (first, *_) = judge(series)
+    (first, *_) = judged(series)
     assert [change.series.joint for change in named(first, 0.05)[:2]] == ['joint_2', 'joint_1']
 
 

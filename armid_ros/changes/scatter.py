@@ -12,7 +12,7 @@ Three things are not as simple, and are learned as well:
 
 - Arms differ in their scatter. The variance of an arm is its own, moderated by that of all arms as
   far as these agree (Smyth 2004).
-- Scatter lasts for days. Steps and trends of healthy arms are then larger than neighbours tell, by
+- Scatter lasts for days. Steps and trends of healthy arms are then larger than by neighbours, by
   a factor that is the median of their squares over that of chi squared (genomic control; Devlin
   and Roeder 1999). Most arms have to be healthy for that, no more.
 - Few series know these factors only roughly; they are then drawn towards one.
@@ -25,20 +25,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
+from armid_ros.changes.statistic import MEDIAN_SQUARE, two_means
 from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, special, stats
+from scipy import optimize, special
 
 #: Bags below which a series is not tested.
 FEWEST = 4
-#: Median of a squared standard normal variable.
-_MEDIAN = float(stats.chi2.ppf(0.5, 1))
 #: Bags that one is compared with, itself among them, and how many deviations make it an odd one.
 _WINDOW, _ODD = 5, 3.0
 #: Degrees of freedom of a variance from the median of n squares, over n.
 _EFFICIENCY = 0.37
-#: Series of white noise by which is learned how well one tells its own variance.
+#: Series of white noise from which the error of a single variance is computed.
 _DRAWN = 4000
 #: Siblings with a bag on a day, of which the day's effect is taken.
 _SIBLINGS = 8
@@ -98,8 +97,8 @@ class Spread:
     alike : float
         Degrees of freedom of what the variances of arms have in common.
     steps, trends : float
-        By how much steps and trends of healthy arms are larger than differences of neighbours
-        tell, in deviations.
+        By how much steps and trends of healthy arms are larger than by
+        differences of neighbours, in deviations.
 
     """
 
@@ -148,26 +147,22 @@ class Splits:
 
 def splits(series: ParameterHistory, spread: Spread) -> Splits:
     """Return the steps and the trend of a series, in deviations of neighbours."""
-    variance, freedom = _variance(series, spread)
+    variance, freedom = variances(series, spread)
+    std = np.sqrt(variance)
+    # values that are odd among their neighbours are moved to the edge of the noise
+    windows = np.lib.stride_tricks.sliding_window_view(
+        series.values, min(_WINDOW, len(series.values))
+    )
+    nearest = np.clip(np.arange(len(std)) - _WINDOW // 2, 0, len(windows) - 1)
+    middle = np.median(windows, axis=1)[nearest]
+    x = np.clip(series.values, middle - _ODD * std, middle + _ODD * std)
     weights = 1.0 / variance
-    x = _bounded(series.values, np.sqrt(variance))
-    before, after = np.cumsum(weights)[:-1], np.cumsum(weights[::-1])[::-1][1:]
-    low = np.cumsum(weights * x)[:-1] / before
-    high = np.cumsum((weights * x)[::-1])[::-1][1:] / after
-    line = _line(series.days, x, weights)
-    return Splits(low, high, np.sqrt(1.0 / before + 1.0 / after), *line, freedom)
-
-
-def line_through(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the slope of a series in a day, and its standard deviation."""
-    variance, _ = _variance(series, spread)
-    slope, std, _ = _line(series.days, series.values, 1.0 / variance)
-    return slope, std * spread.trends
+    return Splits(*two_means(x, weights), *line(series.days, x, weights), freedom)
 
 
 def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
     """Return by how much estimates of each parameter differ beyond what they state."""
-    found = {parameter: _spread(group) for parameter, group in _by_parameter(series).items()}
+    found = {parameter: _spread(group) for parameter, group in by_parameter(series).items()}
     names: dict[str, list[ParameterHistory]] = {}
     for one in series:
         names.setdefault(one.name, []).append(one)
@@ -189,15 +184,16 @@ def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
 
     """
     changed: dict[int, ParameterHistory] = {}
-    for group in _by_parameter(series).values():
+    for group in by_parameter(series).values():
         for one, values in zip(group, _polished(group), strict=True):
             changed[id(one)] = replace(one, values=values)
     return [changed[id(one)] for one in series]
 
 
-def _by_parameter(
+def by_parameter(
     series: Sequence[ParameterHistory],
 ) -> dict[tuple[str, str], list[ParameterHistory]]:
+    """Return the series of all arms of each parameter, by name and joint."""
     groups: dict[tuple[str, str], list[ParameterHistory]] = {}
     for one in series:
         groups.setdefault(one.parameter, []).append(one)
@@ -243,7 +239,7 @@ def _spread(group: Sequence[ParameterHistory]) -> Spread:
         return Spread(0.0, freedom)
 
     def excess(extra: float) -> float:
-        return float(np.median(squares / np.maximum(stated + 2.0 * extra, 1e-300))) - _MEDIAN
+        return float(np.median(squares / np.maximum(stated + 2.0 * extra, 1e-300))) - MEDIAN_SQUARE
 
     most = float(np.max(squares)) + 1e-300
     extra = 0.0
@@ -275,12 +271,12 @@ def _ratio(series: ParameterHistory, spread: Spread) -> float:
     """Return the variance of a series over the usual one."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
-    return max(float(np.median(squares)) / _MEDIAN, 1e-100)
+    return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
 
 
 @cache
 def _freedom(bags: int) -> float:
-    """Return the degrees of freedom of the variance that so many bags tell, from white noise."""
+    """Return the degrees of freedom of the variance of so many bags, from white noise."""
     noise = np.random.default_rng(0).normal(size=(_DRAWN, bags))
     medians = np.median(np.diff(noise, axis=1) ** 2, axis=1)
     return _inverse_trigamma(_robust_scale(np.log(medians)) ** 2)
@@ -303,7 +299,7 @@ def _inverse_trigamma(value: float) -> float:
     return 2.0 * float(optimize.brentq(lambda x: _trigamma(x) - value, 0.5, 0.5 * _ALIKE))
 
 
-def _variance(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
+def variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, float]:
     """Return the variance of every value, shape (K,), and its degrees of freedom."""
     usual = np.maximum(series.std**2 + spread.std**2, 1e-300)
     if len(series.values) < FEWEST or spread.alike >= _ALIKE:
@@ -316,7 +312,7 @@ def _variance(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, flo
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return by how much steps and trends are larger than neighbours tell, in deviations."""
+    """Return by how much steps and trends are larger than by neighbours, in deviations."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < FEWEST:
@@ -329,21 +325,13 @@ def _lasting(
         return 1.0, 1.0
     weight = len(steps) / (len(steps) + _EXPECTED)
     step, trend = (
-        max(1.0, float(np.median(squares)) / _MEDIAN) ** (0.5 * weight)
+        max(1.0, float(np.median(squares)) / MEDIAN_SQUARE) ** (0.5 * weight)
         for squares in (steps, trends)
     )
     return step, trend
 
 
-def _bounded(x: FloatArray, std: FloatArray) -> FloatArray:
-    """Return a series with odd values moved to the edge of the noise about their neighbours."""
-    windows = np.lib.stride_tricks.sliding_window_view(x, min(_WINDOW, len(x)))
-    nearest = np.clip(np.arange(len(x)) - _WINDOW // 2, 0, len(windows) - 1)
-    middle = np.median(windows, axis=1)[nearest]
-    return np.asarray(np.clip(x, middle - _ODD * std, middle + _ODD * std))
-
-
-def _line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
+def line(days: FloatArray, x: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
     """Return slope, its standard deviation, and the value at the beginning."""
     total = weights.sum()
     middle, mean = weights @ days / total, weights @ x / total

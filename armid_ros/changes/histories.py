@@ -21,7 +21,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from armid_ros.fleet.scatter import FEWEST, line_through, ParameterHistory, splits, Spread, spreads
+from armid_ros.changes.scatter import (
+    by_parameter,
+    FEWEST,
+    line,
+    ParameterHistory,
+    splits,
+    Spread,
+    variances,
+)
+from armid_ros.changes.statistic import tail
 import numpy as np
 from scipy import stats
 
@@ -36,7 +45,7 @@ _SMALLEST = 1e-300
 @dataclass(frozen=True)
 class HistoryChange:
     """
-    The most that is to be said of a series.
+    The largest step of a series, or its trend.
 
     Attributes
     ----------
@@ -67,7 +76,7 @@ class HistoryChange:
 @dataclass(frozen=True)
 class Judged:
     """
-    What is to be said of an arm.
+    The test of an arm.
 
     Attributes
     ----------
@@ -89,17 +98,16 @@ class Judged:
 
 
 def judge(
-    series: Sequence[ParameterHistory], spread: Mapping[tuple[str, str], Spread] | None = None
+    kinds: Sequence[tuple[Sequence[ParameterHistory], Mapping[tuple[str, str], Spread]]],
 ) -> list[Judged]:
     """
-    Test all series of arms of one kind.
+    Test all series of all arms.
 
     Parameters
     ----------
-    series : sequence of ParameterHistory
-        All parameters of all arms, without what siblings share on a day.
-    spread : mapping, optional
-        As of ``spreads``, which is the default.
+    kinds : sequence of (sequence of ParameterHistory, mapping)
+        Of each kind of arm all parameters of all arms, without what siblings share on a day, and
+        their spreads, as of ``spreads``.
 
     Returns
     -------
@@ -107,17 +115,17 @@ def judge(
         One an arm, the least probable first.
 
     """
-    spread = spreads(series) if spread is None else spread
-    by_arm: dict[str, list[HistoryChange]] = {}
-    for one in series:
-        found = by_arm.setdefault(one.arm, [])
-        if len(one.values) >= FEWEST:
-            found.append(largest_change(one, spread[one.parameter]))
     arms = []
-    for arm, changes in by_arm.items():
-        changes.sort(key=lambda change: (change.p, -abs(change.size) / change.std))
-        p = min(1.0, len(changes) * changes[0].p) if changes else 1.0
-        arms.append((arm, tuple(changes), p))
+    for series, spread in kinds:
+        by_arm: dict[str, list[HistoryChange]] = {}
+        for one in series:
+            found = by_arm.setdefault(one.arm, [])
+            if len(one.values) >= FEWEST:
+                found.append(largest_change(one, spread[one.parameter]))
+        for arm, changes in by_arm.items():
+            changes.sort(key=lambda change: (change.p, -abs(change.size) / change.std))
+            p = min(1.0, len(changes) * changes[0].p) if changes else 1.0
+            arms.append((arm, tuple(changes), p))
     adjusted = stats.false_discovery_control([p for _, _, p in arms]) if arms else []
     judged = [Judged(*arm, float(q)) for arm, q in zip(arms, adjusted, strict=True)]
     return sorted(judged, key=lambda one: (one.adjusted, one.p, one.arm))
@@ -148,8 +156,8 @@ def largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
     """Return the slope of a series and its standard deviation, in a month."""
-    slope, std = line_through(series, spread)
-    return slope * MONTH, std * MONTH
+    slope, std, _ = line(series.days, series.values, 1.0 / variances(series, spread)[0])
+    return slope * MONTH, std * spread.trends * MONTH
 
 
 def unlike_siblings(series: Sequence[ParameterHistory]) -> dict[tuple[str, str, str], float]:
@@ -159,11 +167,8 @@ def unlike_siblings(series: Sequence[ParameterHistory]) -> dict[tuple[str, str, 
     Distance of its median from that of all arms, over the spread of arms, both robust.
 
     """
-    groups: dict[tuple[str, str], list[ParameterHistory]] = {}
-    for one in series:
-        groups.setdefault(one.parameter, []).append(one)
     found = {}
-    for parameter, group in groups.items():
+    for parameter, group in by_parameter(series).items():
         levels = np.array([np.median(one.values) for one in group])
         middle = np.median(levels)
         size = 1.4826 * float(np.median(np.abs(levels - middle)))
@@ -173,4 +178,4 @@ def unlike_siblings(series: Sequence[ParameterHistory]) -> dict[tuple[str, str, 
 
 
 def _p(score: float, freedom: float, tried: int) -> float:
-    return min(1.0, 2.0 * tried * max(float(stats.t.sf(score, freedom)), _SMALLEST))
+    return min(1.0, tried * max(float(tail(score**2, 1, freedom)), _SMALLEST))

@@ -1,0 +1,109 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""One test for all changes: a quadratic form, its tail probability, and corrections for many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy import special, stats
+
+#: Median of a squared standard normal variable [-].
+MEDIAN_SQUARE = float(stats.chi2(1).median())
+
+
+def quadratic_form(
+    score: FloatArray, information: FloatArray, tolerance: float
+) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """
+    Return s^T S^+ s, and the rank of S.
+
+    Parameters
+    ----------
+    score : ndarray, shape (..., p)
+        Scores s.
+    information : ndarray, shape (..., p, p)
+        Their covariance S, symmetric.
+    tolerance : float
+        Share of the largest eigenvalue below which an eigenvalue counts as zero.
+
+    Returns
+    -------
+    squares, rank : ndarray, shape (...)
+        Twice the logarithm of the likelihood ratio, and its degrees of freedom.
+
+    """
+    if score.shape[-1] == 1:  # a number is its own eigenvalue
+        sizes, along = information[..., 0], score
+    else:
+        sizes, vectors = np.linalg.eigh(information)
+        along = np.einsum('...pk,...p->...k', vectors, score)
+    kept = sizes > tolerance * np.maximum(sizes[..., -1:], 0.0)
+    with np.errstate(over='ignore'):
+        parts = np.divide(along**2, sizes, where=kept, out=np.zeros_like(along))
+    return np.asarray(parts.sum(axis=-1)), np.asarray(kept.sum(axis=-1))
+
+
+def tail(
+    square: npt.ArrayLike, rank: npt.ArrayLike, freedom: npt.ArrayLike = np.inf
+) -> FloatArray:
+    """
+    Return the probability of a quadratic form as large without a change.
+
+    Parameters
+    ----------
+    square : array_like
+        Quadratic form in units of the noise.
+    rank : array_like
+        Its degrees of freedom.
+    freedom : array_like
+        Degrees of freedom of the noise; infinite where its size is known: chi-square.
+
+    """
+    known = np.isfinite(freedom)
+    ratio = np.asarray(square) / rank
+    fisher = stats.f.sf(ratio, rank, np.where(known, freedom, 1.0))
+    return np.asarray(np.where(known, fisher, stats.chi2.sf(square, rank)))
+
+
+def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
+    """Return the quadratic forms that are exceeded with a small chance without a change."""
+    # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
+    share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
+    return np.asarray(freedom * (1.0 - share) / share)
+
+
+def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """
+    Return the means of a series before and after every place at which it may be cut.
+
+    Parameters
+    ----------
+    x : ndarray, shape (K, ...)
+        Values.
+    weights : ndarray, shape (K, ...)
+        Inverse variances.
+
+    Returns
+    -------
+    low, high, std : ndarray, shape (K - 1, ...)
+        Means before and after, and the standard deviation of their difference.
+
+    """
+    before, after = np.cumsum(weights, axis=0)[:-1], np.cumsum(weights[::-1], axis=0)[::-1][1:]
+    low = np.cumsum(weights * x, axis=0)[:-1] / before
+    high = np.cumsum((weights * x)[::-1], axis=0)[::-1][1:] / after
+    return low, high, np.sqrt(1.0 / before + 1.0 / after)
+
+
+def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
+    """Return which are changes, with at most this probability of a false one (Holm 1979)."""
+    beyond = [False] * len(chances)
+    for tried, index in enumerate(np.argsort(chances)):
+        if chances[index] > allowed / (len(chances) - tried):
+            break
+        beyond[int(index)] = True
+    return beyond
