@@ -26,7 +26,7 @@ LAYERS = (
     ('effects',),
     ('model',),
     ('robots',),
-    ('estimate',),
+    ('changes', 'estimate'),
     ('motion',),
     ('files',),
     ('plug_ins',),
