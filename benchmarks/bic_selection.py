@@ -22,8 +22,9 @@ from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.diagnosis.search.candidates import Causes
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation
+from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.recording import Recording
 import numpy as np

@@ -359,13 +359,9 @@ def diagnose(
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
-    if misfit is None and isinstance(arm, IdentificationResult):
-        misfit = arm.misfit
-    elif misfit is None and _is_written(arm):
-        misfit = read_misfit(arm, model)
-    signals = SignalSettings(cutoff, decimation)
+    misfit = misfit or _misfit_of(arm, model)
     settings = DiagnosisSettings(
-        signals=signals,
+        signals=SignalSettings(cutoff, decimation),
         material=material,
         everything=everything,
         partner=partner,
@@ -390,9 +386,15 @@ def diagnose(
         settings,
         None if before else misfit,
     )
-    if residual is None:
-        return found
-    return found.with_residual(rng if isinstance(rng, int) else 0)
+    seed = rng if isinstance(rng, int) else 0
+    return found if residual is None else found.with_residual(seed)
+
+
+def _misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
+    """Return what a model left when it was identified, where that is known."""
+    if isinstance(arm, IdentificationResult):
+        return arm.misfit
+    return read_misfit(arm, model) if _is_written(arm) else None
 
 
 def _since(

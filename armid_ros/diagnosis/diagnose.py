@@ -161,11 +161,9 @@ def diagnose(
             return _said(found, notes, asked)
     chosen = _explainer(asked, misfit).chosen()
     result = _said(chosen, notes, asked)
-    if settings.spans and chosen.look is not None and _hardly_explained(result, settings):
-        spans = acting_spans(chosen.look, settings.thresholds)
-        within = _within(spans, asked, recordings, baseline, misfit)
-        if within is not None:
-            return within
+    within = _within(result, chosen, asked, recordings, baseline, misfit)
+    if within is not None:
+        return within
     return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
 
 
@@ -177,13 +175,18 @@ def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
 
 
 def _within(
-    spans: Sequence[Span],
+    result: Diagnosis,
+    chosen: Chosen,
     asked: _Request,
     recordings: Sequence[Recording],
     baseline: Sequence[Recording],
     misfit: Misfit | None,
 ) -> Diagnosis | None:
     """Diagnose the seconds in which a cause acts alone; None if that explains no more."""
+    settings, look = asked.settings, chosen.look
+    if not settings.spans or look is None or not _hardly_explained(result, settings):
+        return None
+    spans = acting_spans(look, settings.thresholds)
     cut = [_cut(*each) for each in zip(spans, [*recordings, *asked.validate], strict=False)]
     shorter, unseen = (
         [one for one in part if one is not None]
@@ -197,11 +200,11 @@ def _within(
         validate=unseen,
         baseline=baseline,
         misfit=misfit,
-        settings=replace(asked.settings, spans=False),
+        settings=replace(settings, spans=False),
         rng=asked.rng,
         progress=asked.tell,
     )
-    if not found.findings or _hardly_explained(found, asked.settings):
+    if not found.findings or _hardly_explained(found, settings):
         return None
     return found.acting_in([one for one in spans if one.stop > one.start])
 
@@ -290,8 +293,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
     hardly = unseen is not None and not names.shares.predicted
     explanation, notes = names.explanation, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
     found = findings(explanation, names.shares, arm, asked.rng)
-    refitted = measured.as_it_is(explanation)
-    as_it_is = measured.patched(explanation) if found else refitted
+    as_it_is = measured.patched(explanation) if found else measured.as_it_is(explanation)
     worse = measured.harmed(explanation)
     floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
     left, resting = measured.beside(explanation), measured.resting(explanation)
@@ -329,7 +331,7 @@ def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
         data=tuple(evidence.data),
         floors=floors,
         not_visible=_not_visible(explanation, settings),
-        refitted=refitted is not None,
+        refitted=explanation.refitted,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),

@@ -10,7 +10,6 @@ from importlib.util import find_spec
 import time
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.cli import options as command_line
 from armid_ros.cli import parameters as options
 from armid_ros.cli.terminal import print_rows, progress, say
 from armid_ros.errors import FleetError
@@ -76,6 +75,7 @@ def fleet() -> None:
 @contextmanager
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
     """Hold a folder of results while a command runs, and show how far it is."""
+    from armid_ros.cli.options import hold
     from armid_ros.fleet.kinds import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
 
@@ -83,7 +83,7 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
     try:
         with progress(doing) as tick:
             if store.local is not None:
-                command_line.hold(store.local, SCHEMA)
+                hold(store.local, SCHEMA)
             yield store, tick
     except StoreError as error:
         raise FleetError(f'{error}; is --out a folder that can be read and written?') from error
@@ -143,6 +143,7 @@ def identify(
     **settings: Any,
 ) -> None:
     """Identify every arm of a fleet from its bags."""
+    from armid_ros.cli.options import read_settings
     from armid_ros.fleet.bags import find_bags
     from armid_ros.fleet.cluster import connected
     from armid_ros.fleet.job import FleetSettings
@@ -158,7 +159,7 @@ def identify(
         joints=joints or '',
         weighted=method == 'wls',
         signals=SignalSettings(cutoff, decimation),
-        reading=command_line.read_settings(),
+        reading=read_settings(),
         **settings,
     )
     start = time.monotonic()

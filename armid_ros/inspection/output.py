@@ -26,7 +26,10 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
         'schema': SCHEMA,
         'source': found.recording.source,
         'topic': found.recording.topic,
-        'topics': [asdict(topic) for topic in found.topics],
+        'topics': [
+            {'name': t.name, 'type_name': t.type_name, 'count': t.count, 'joints': list(t.joints)}
+            for t in found.topics
+        ],
         'samples': len(found.recording),
         'sampling': asdict(found.sampling),
         'joints': [asdict(joint) for joint in found.joints],

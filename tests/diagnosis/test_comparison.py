@@ -7,9 +7,10 @@ from dataclasses import replace
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.candidates import Causes
-from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import EQUAL, odds, usual_spread, without
 from armid_ros.diagnosis.search.priors import log_prior, SIZES, THERE
+from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np

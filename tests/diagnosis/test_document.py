@@ -49,7 +49,7 @@ def test_every_field_of_the_schema_is_there(document):
     assert document['verdict'] == 'named'
     assert set(document) == {
         *('schema', 'verdict', 'summary', 'effects', 'minor', 'suspected', 'baseline', 'where'),
-        *('gap', 'filters', 'candidates', 'not_visible', 'detectable', 'model'),
+        *('gap', 'filters', 'candidates', 'not_visible', 'detectable', 'model', 'spans'),
     }
     assert document['baseline'] == 'noise'
     assert set(document['gap']['before']) == {'shoulder', 'elbow'}

@@ -10,11 +10,12 @@ The data and the library are the same for both; what differs is the one step tha
 from dataclasses import dataclass, replace
 
 from armid_ros.diagnosis import diagnose, DiagnosisSettings
+from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.candidates import Causes
-from armid_ros.diagnosis.search.choice import rows_over_noise
-from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import CauseInformation
+from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.effects import Action, CATALOGUE, Effect, Quantity
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def shaken(recordings, size, seed):
 def significant(arm, data, sigma, names):
     """Return the most significant of some effects by chi squared, if it is at 5 % of them all."""
     nuisance = Nuisance.of(
-        rows_over_noise(Evidence.over_noise(data, sigma)), arm, np.random.default_rng(0)
+        Rows.over_noise(Evidence.over_noise(data, sigma)), arm, np.random.default_rng(0)
     )
     under = nuisance.marginal(Setting(True, 0.0, 0.0, 1.0, 1.0))
     kinds = tuple(CATALOGUE[name] for name in names)

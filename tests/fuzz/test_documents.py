@@ -68,7 +68,7 @@ def excitation(folder):
     series = FourierTrajectory(
         ('a', 'b'), 4.0, np.zeros(2), np.full((2, 3), 0.1), np.full((2, 3), 0.2)
     )
-    run = Excitation(series, 2, 1.0, np.array([0.1, 0.2]))
+    run = Excitation(series, 2, 1.0)
     save_excitation(run, folder / 'whole_run.yaml')
     save_excitation(run, folder / 'whole_run.csv')
     return {suffix: (folder / f'whole_run{suffix}').read_text() for suffix in ('.yaml', '.csv')}

@@ -20,8 +20,9 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
-from armid_ros.diagnosis.search.nuisance import Marginal, Nuisance
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.priors import HOW_OFTEN, log_prior
+from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.effects import Effect, Kind, Shape
 from armid_ros.effects.gravity import with_exact_vector
 from armid_ros.effects.unexplained import Unexplained

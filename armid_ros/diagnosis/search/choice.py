@@ -37,8 +37,9 @@ from armid_ros.diagnosis.search.explanation import (
     Explanation,
     NOISE,
 )
-from armid_ros.diagnosis.search.nuisance import Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.posterior import JointFit
+from armid_ros.diagnosis.search.setting import Setting
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects.friction import friction_level
 from armid_ros.motion import FloatArray

@@ -18,7 +18,7 @@ from itertools import product
 
 from armid_ros.diagnosis.search.candidates import Causes, line_search
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.nuisance import LASTING, Marginal, Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
     allowed,
     CauseFit,
@@ -27,6 +27,7 @@ from armid_ros.diagnosis.search.odds import (
     OWN_SPREADS,
     usual_spread,
 )
+from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray

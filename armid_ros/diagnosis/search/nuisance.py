@@ -25,6 +25,7 @@ from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.discrepancy import Discrepancy
 from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.setting import Marginal, MotionDiscrepancy, Setting
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -36,89 +37,12 @@ _HELD = 1e-12
 #: Share by which a described value of an effect, or a torque where a model was never tried, may be
 #: off. Values of the laboratory are off by up to 0.1, friction of an arm by 0.2 in a day.
 _DESCRIBED = 0.25
-#: Rows of one independent row without a baseline.
-LASTING = 2.0
 #: Fewest rows of a correlation, the largest that is none, and the largest lag [rows].
 _FEW, _UNCORRELATED, _LAGS = 60, 0.05, 20
 
 
 @dataclass(frozen=True)
-class Setting:
-    """
-    Whether the body is free, and amplitudes.
-
-    Attributes
-    ----------
-    free : bool
-        Whether the body is fitted anew; what has no given values always is.
-    shared, own : float
-        Standard deviations of d0 and d_k.
-    noise : float
-        That of e_k, over the unit of the rows.
-    lasting : float
-        Rows that make one independent row.
-    prior : float
-        Log prior probability.
-
-    """
-
-    free: bool
-    shared: float
-    own: float
-    noise: float
-    lasting: float
-    prior: float = 0.0
-
-    @property
-    def precision(self) -> float:
-        """Precision of a row."""
-        return 1.0 / (self.lasting * self.noise**2)
-
-
-@dataclass(frozen=True)
-class MotionDiscrepancy:
-    """What the discrepancy d_k of one recording leaves: see `Nuisance.marginal`."""
-
-    inverse: FloatArray
-    aim: FloatArray
-    regressed: FloatArray
-
-
-@dataclass(frozen=True)
-class Marginal:
-    """
-    The nuisance parameters under one setting.
-
-    Attributes
-    ----------
-    setting : Setting
-        The setting.
-    used : ndarray of int, shape (u,)
-        Which parameters are fitted.
-    root : ndarray, shape (u, u)
-        R of their covariance R'R.
-    values : ndarray, shape (u,)
-        Their means.
-    evidence : float
-        Log evidence.
-    loss : float
-        Half of the weighted squares that are left.
-    motions : mapping of int to MotionDiscrepancy
-        The discrepancy of each recording.
-
-    """
-
-    setting: Setting
-    used: npt.NDArray[np.intp]
-    root: FloatArray
-    values: FloatArray
-    evidence: float
-    loss: float
-    motions: dict[int, MotionDiscrepancy]
-
-
-@dataclass(frozen=True)
-class Term:
+class CauseTerm:
     """
     A cause among the nuisance columns.
 
@@ -163,7 +87,7 @@ class Nuisance:
         Weighted residual of the model.
     fixed : tuple of (ndarray, shape (q, q), ndarray, shape (q,))
         Products of these columns with each other and with the residual.
-    accepted : tuple of Term
+    accepted : tuple of CauseTerm
         Causes that were found.
 
     """
@@ -177,7 +101,7 @@ class Nuisance:
     columns: tuple[FloatArray, ...]
     residual: tuple[FloatArray, ...]
     fixed: tuple[tuple[FloatArray, FloatArray], ...]
-    accepted: tuple[Term, ...] = ()
+    accepted: tuple[CauseTerm, ...] = ()
 
     @classmethod
     def of(
@@ -292,7 +216,7 @@ class Nuisance:
         self, cause: Cause, size: float, acts: npt.NDArray[np.bool_] | None = None
     ) -> Nuisance:
         """Return the same with one more cause, which acts on the day in question by default."""
-        term = Term(cause, size, self.rows.today if acts is None else acts)
+        term = CauseTerm(cause, size, self.rows.today if acts is None else acts)
         return replace(self, accepted=(*self.accepted, term))
 
     def without(self, name: int) -> Nuisance:

@@ -21,8 +21,9 @@ from armid_ros.diagnosis.data.days import Rows
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.candidates import cause_of, value_unit
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
-from armid_ros.diagnosis.search.nuisance import LASTING, Marginal, Nuisance, Setting
+from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.patch import Patch, patch_columns
+from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
 from armid_ros.estimate import Estimate
 from armid_ros.motion import FloatArray
 import numpy as np

@@ -10,8 +10,8 @@ from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.comparison import Look, Ranked
-from armid_ros.diagnosis.search.nuisance import Marginal
 from armid_ros.diagnosis.search.odds import CauseInformation, odds
+from armid_ros.diagnosis.search.setting import Marginal
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np

@@ -74,8 +74,8 @@ def residual_map_section(residual: Residual) -> ContentSection:
             Paragraph(
                 'No effect of the catalogue explains the residual of these joints. A Gaussian '
                 'process over position, velocity and load has learned it. model.yaml has it as '
-                f'the effect learned_torque, {TABLE_FILE} as a table. It is zero where there were '
-                'no data. Shares are of the squared residual in cross-validation, and in held-out '
+                f'an effect, {TABLE_FILE} as a table. It is zero where there were no data. '
+                'Shares are of the squared residual in cross-validation, and in held-out '
                 'recordings close to the data.'
             ),
             DataTable(heads, rows, (0, 5)),
