@@ -38,6 +38,7 @@ from armid_ros.diagnosis.verdict.naming import findings, not_named
 from armid_ros.diagnosis.verdict.remaining_misfit import RemainingMisfit
 from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
+from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
@@ -194,16 +195,19 @@ def _within(
     )
     if not shorter or all(one.whole for one in spans):
         return None
-    found = diagnose(
-        asked.given,
-        shorter,
-        validate=unseen,
-        baseline=baseline,
-        misfit=misfit,
-        settings=replace(settings, spans=False),
-        rng=asked.rng,
-        progress=asked.tell,
-    )
+    try:
+        found = diagnose(
+            asked.given,
+            shorter,
+            validate=unseen,
+            baseline=baseline,
+            misfit=misfit,
+            settings=replace(settings, spans=False),
+            rng=asked.rng,
+            progress=asked.tell,
+        )
+    except IdentificationError:  # too short for the filters, or without motion
+        return None
     if not found.findings or _hardly_explained(found, settings):
         return None
     return found.acting_in([one for one in spans if one.stop > one.start])

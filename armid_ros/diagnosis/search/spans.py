@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 #: Time between change points that are tried [s], and the shortest span [s].
-_STEP, _SHORTEST = 0.25, 2.0
+_STEP, _SHORTEST = 0.25, 3.0
 #: Change points of the first pass, and passes in which each is moved.
 _COARSE, _PASSES = 9, 2
 
