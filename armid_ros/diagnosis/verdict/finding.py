@@ -264,7 +264,7 @@ class Diagnosis:
     def acting_in(self, spans: Sequence[Span]) -> Diagnosis:
         """Return the same of causes that act for a part of the time."""
         seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
-        summary = f'In {", ".join(seconds)}: {self.summary}'
+        summary = f'In {", ".join(seconds)}: {self.summary} Other seconds were not diagnosed.'
         return replace(self, summary=summary, spans=tuple(spans))
 
     @property
