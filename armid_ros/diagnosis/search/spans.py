@@ -37,10 +37,8 @@ class Span:
 
     Attributes
     ----------
-    recording : int
-        Number of the recording of the day in question.
     source : str
-        Its name.
+        The recording.
     start, stop : float
         First and last second [s]; none if it does not act there.
     whole : bool
@@ -48,7 +46,6 @@ class Span:
 
     """
 
-    recording: int
     source: str
     start: float
     stop: float
@@ -188,5 +185,5 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
         name = Path(next(part.source for part in rows.data if part.fold == k)).name
         whole = b - a == len(edges) - 1
         start, stop = (float(t[min(edges[x], len(t) - 1)]) for x in (a, b))
-        result.append(Span(number, name or f'recording {number + 1}', start, stop, whole))
+        result.append(Span(name or f'recording {number + 1}', start, stop, whole))
     return tuple(result)

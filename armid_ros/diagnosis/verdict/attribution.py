@@ -85,9 +85,11 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
 
     """
     folds = _left_out(explanation)
-    if unseen is None:
-        return folds
-    order = folds.order
+    return folds if unseen is None else _predicted(explanation, folds.order, unseen)
+
+
+def _predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
+    """Predict held-out data with the first name, the first two, and so on, fitted to the data."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -95,7 +97,7 @@ def attribute(explanation: Explanation, unseen: Evidence | None) -> Attribution:
     taken = np.zeros((len(order), len(squares[0])))
     for position, k in enumerate(order):
         taken[k] = squares[position] - squares[position + 1]
-    return Attribution(order, squares[0], taken, predicted=True)
+    return Attribution(tuple(order), squares[0], taken, predicted=True)
 
 
 def _left_out(explanation: Explanation) -> Attribution:
@@ -227,10 +229,10 @@ def shares_of(
     explanation: Explanation, unseen: Evidence | None, settings: DiagnosisSettings
 ) -> Attribution:
     """Return shares of held-out data, or of folds where held-out data hardly show the names."""
-    left_out = attribute(explanation, None)
+    left_out = _left_out(explanation)
     if unseen is None:
         return left_out
     names = range(len(explanation.steps))
-    seen = attribute(explanation, unseen)
+    seen = _predicted(explanation, left_out.order, unseen)
     shown = seen.share(names) > settings.thresholds.headline * left_out.share(names)
     return replace(seen, folds=left_out) if shown or not names else left_out

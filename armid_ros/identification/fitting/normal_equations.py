@@ -21,8 +21,6 @@ import scipy.linalg
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
-#: Squares of a column that are this share of those of the largest one are rounding.
-NO_COLUMN = 1e-20
 
 
 @dataclass(frozen=True)
