@@ -28,8 +28,6 @@ class Traits:
         What a positive value means, where the name does not say it.
     weighs : bool
         Whether it is described by its mass, the first quantity, and where it is.
-    familiar : bool
-        Whether an engineer knows it by its curve; the demo hides one of these.
     usual : bool
         Whether it is fitted by default: nearly every arm has it.
     everywhere : bool
@@ -55,7 +53,6 @@ class Traits:
     look_at: str = ''
     sign: str = ''
     weighs: bool = False
-    familiar: bool = False
     usual: bool = False
     everywhere: bool = False
     friction: bool = False
@@ -74,7 +71,6 @@ TRAITS = {
         shown_by='hard stops, or a payload at two poses',
         look_at='the zero of the encoder, at a mark or a stop of the joint',
         sign='the joint is at its reading plus that',
-        familiar=True,
     ),
     'joint_elasticity': Traits(
         shown_by='a sweep of frequency through the resonance',
@@ -97,7 +93,6 @@ TRAITS = {
         shown_by='the same motion with and without a known payload',
         look_at='the scale of the torque in the driver, of the sensor or of the motor constant',
         sign='readings are 1 plus that times the torque',
-        familiar=True,
     ),
     'torque_drift': Traits(
         shown_by='the same static hold, repeated for half an hour',
@@ -123,7 +118,6 @@ TRAITS = {
     'viscous_friction': Traits(
         shown_by='constant velocities, slow to fast, in both directions',
         look_at='the grease, its temperature, the seals and the bearings',
-        familiar=True,
         usual=True,
         everywhere=True,
         nuisance=((),),
@@ -134,7 +128,6 @@ TRAITS = {
     'coulomb_friction': Traits(
         shown_by='slow constant velocity in both directions',
         look_at='the brake, the seals and the bearings, and whether it moves freely by hand',
-        familiar=True,
         usual=True,
         everywhere=True,
         nuisance=((),),
@@ -150,13 +143,11 @@ TRAITS = {
     'quadratic_friction': Traits(
         shown_by='constant velocities up to the limit',
         look_at='what moves through air, oil or grease',
-        familiar=True,
         friction=True,
     ),
     'stribeck_friction': Traits(
         shown_by='constant velocities from 0.01 to 1 rad/s in both directions',
         look_at='the kind, the age and the temperature of the grease',
-        familiar=True,
         nuisance=((0.03, 2.0), (0.1, 2.0), (0.3, 2.0)),
         friction=True,
     ),
@@ -181,7 +172,6 @@ TRAITS = {
     'load_dependent_friction': Traits(
         shown_by='the same motion with and without a known payload',
         look_at='the wear, the grease and the alignment of the gear',
-        familiar=True,
         nuisance=((),),
         friction=True,
     ),
@@ -203,7 +193,6 @@ TRAITS = {
         shown_by='the same motion with and without the tool',
         look_at='the hand, the gripper, the tool, a part or a cable that it carries',
         weighs=True,
-        familiar=True,
         comes_and_goes=True,
     ),
     'link_inertia': Traits(
@@ -223,14 +212,12 @@ TRAITS = {
     'torque_offset': Traits(
         shown_by='static holds over the range of positions',
         look_at='the zero of the torque sensor, with the joint unloaded',
-        familiar=True,
         usual=True,
         everywhere=True,
     ),
     'joint_spring': Traits(
         shown_by='static holds over the range, with and without a payload',
         look_at='cables, hoses and springs along the joint',
-        familiar=True,
     ),
     'soft_limit': Traits(
         shown_by='slow motion into and out of the end of the range',

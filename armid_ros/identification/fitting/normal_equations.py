@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Normal equations of which data do not tell every direction, and what they vary by without a part.
+Normal equations that are singular, and how much values vary without each recording.
 
 Noise makes values as uncertain as their covariance. What a model gets wrong differs from motion
 to motion, and other motions give other values: recordings that are left out show by how much.
@@ -11,7 +11,6 @@ to motion, and other motions give other values: recordings that are left out sho
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.motion import FloatArray
@@ -21,63 +20,6 @@ import scipy.linalg
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
-
-
-@dataclass(frozen=True)
-class NormalEquations:
-    """
-    What is known of values: a normal distribution in information form.
-
-    Attributes
-    ----------
-    matrix : ndarray, shape (f, f)
-        Inverse of the covariance; singular where some values are free.
-    vector : ndarray, shape (f,)
-        Matrix times mean.
-
-    """
-
-    matrix: FloatArray
-    vector: FloatArray
-
-    @classmethod
-    def none(cls, size: int) -> NormalEquations:
-        """Return that nothing is known of so many values."""
-        return cls(np.zeros((size, size)), np.zeros(size))
-
-    @classmethod
-    def of_rows(cls, x: FloatArray, y: FloatArray) -> NormalEquations:
-        """Return what rows over their noise tell, x (S, f) and y (S,)."""
-        return cls(x.T @ x, x.T @ y)
-
-    def among(self, kept: Sequence[int]) -> NormalEquations:
-        """Return what is known of some of the values, the others being zero."""
-        index = list(kept)
-        return NormalEquations(self.matrix[np.ix_(index, index)], self.vector[index])
-
-    def and_zeros(self, more: FloatArray) -> NormalEquations:
-        """Return the same with more values behind, known to be zero with a precision (p,)."""
-        size, whole = len(self.vector), len(self.vector) + len(more)
-        matrix, vector = np.diag(np.concatenate([np.zeros(size), more])), np.zeros(whole)
-        matrix[:size, :size], vector[:size] = self.matrix, self.vector
-        return NormalEquations(matrix, vector)
-
-    def solution(self) -> tuple[FloatArray, FloatArray]:
-        """Return means and standard deviations, each (f,); zero where nothing is told."""
-        basis = informative_basis(self.matrix)
-        return basis @ (basis.T @ self.vector), np.sqrt(np.sum(basis**2, axis=1))
-
-    def after(self, change: FloatArray) -> NormalEquations:
-        """Return what is known of what is still to be added to values (f,)."""
-        return replace(self, vector=self.vector - self.matrix @ change)
-
-    def __add__(self, other: NormalEquations) -> NormalEquations:
-        """Return what two independent sources tell together."""
-        return NormalEquations(self.matrix + other.matrix, self.vector + other.vector)
-
-    def __sub__(self, other: NormalEquations) -> NormalEquations:
-        """Return what is known without one of the sources."""
-        return NormalEquations(self.matrix - other.matrix, self.vector - other.vector)
 
 
 def informative_basis(products: FloatArray) -> FloatArray:
@@ -101,7 +43,7 @@ def informative_basis(products: FloatArray) -> FloatArray:
     if not failed and len(scaled):
         inverse, _ = scipy.linalg.lapack.dtrtri(lower, lower=True)
         # the smallest eigenvalue is at least one over the trace of the inverse, and the largest
-        # at most the trace of the products: every direction is told
+        # at most the trace of the products: every direction is determined
         if np.sum(inverse**2) * np.trace(scaled) * UNINFORMATIVE <= 1.0:
             return np.asarray(scale[:, np.newaxis] * inverse.T)
     values, vectors = np.linalg.eigh(scaled)
@@ -141,46 +83,13 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     return np.asarray(basis @ (basis.T @ aim))
 
 
-def jackknife(
-    values: FloatArray, std: FloatArray, held_values: FloatArray, held_std: FloatArray
-) -> FloatArray:
-    """
-    Return the variance of least-squares values whatever the colour of the noise, shape (p,).
-
-    What a value changes by without a part counts by what the other parts tell of it: where noise
-    is white the mean of this is its variance, also where one part tells most of a value, as where
-    a joint moves in that part alone. A value that the others do not tell counts nothing.
-
-    Parameters
-    ----------
-    values, std : ndarray, shape (p,)
-        Fitted to all parts, and deviations as far as white noise goes.
-    held_values, held_std : ndarray, shape (K, p)
-        The same without each part; deviations are zero where nothing tells a value.
-
-    References
-    ----------
-    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
-    Statistics 14, 1986.
-
-    """
-    return np.asarray(np.sum(changes(values, std, held_values, held_std) ** 2, axis=0))
-
-
-def changes(
-    values: FloatArray, std: FloatArray, held_values: FloatArray, held_std: FloatArray
-) -> FloatArray:
-    """Return what values change by without each part, (K, p), whose squares `jackknife` sums."""
-    seen = held_std > 0.0
-    told = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
-    return np.asarray(told * (held_values - values))
-
-
 def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
     """
     Return the changes of values without each recording, of which squares sum up to a variance.
 
-    A change counts by what the others tell of the value; see `jackknife`.
+    A change counts by what the other recordings determine of the value: for white noise the
+    squares then sum up to the variance of least squares, also where one recording determines most
+    of a value. A value that the others do not determine has no change.
 
     Parameters
     ----------
@@ -194,19 +103,37 @@ def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArr
     Returns
     -------
     ndarray, shape (K, r)
-        For each of K recordings; empty for a single one, zero where one alone tells a value.
+        For each of K recordings; empty for a single one.
+
+    References
+    ----------
+    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
+    Statistics 14, 1986.
 
     """
-    parts: dict[str, NormalEquations] = {}
+    parts: dict[str, FloatArray] = {}
     first = 0
     for part in problem:
         weight = weights[first : first + len(part.target)]
         first += len(part.target)
         columns, target = weighted_rows([part], weight)
-        own = NormalEquations.of_rows(columns, target - columns @ values)
-        parts[part.source] = parts[part.source] + own if part.source in parts else own
+        own = columns.T @ np.column_stack([columns, target - columns @ values])
+        parts[part.source] = parts.get(part.source, np.zeros_like(own)) + own
     if len(parts) < 2:
         return np.zeros((0, len(values)))
-    whole = sum(parts.values(), start=NormalEquations.none(len(values)))
-    held = [(whole - recording).solution() for recording in parts.values()]
-    return changes(*whole.solution(), *np.array(held).transpose(1, 0, 2))
+    products = np.array(list(parts.values()))
+    whole = products.sum(axis=0)
+    change, std = _solution(whole)
+    result = []
+    for own in products:
+        held_change, held_std = _solution(whole - own)
+        seen = held_std > 0.0
+        share = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
+        result.append(share * (held_change - change))
+    return np.array(result)
+
+
+def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return means and deviations, (p,), of normal equations (p, p + 1), zero if not seen."""
+    basis = informative_basis(products[:, :-1])
+    return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))

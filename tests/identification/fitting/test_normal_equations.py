@@ -4,8 +4,6 @@
 
 from armid_ros.identification.fitting.normal_equations import (
     informative_basis,
-    informative_solution,
-    NormalEquations,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -41,38 +39,3 @@ def test_a_direction_is_told_by_columns_that_differ_in_more_than_rounding(apart,
     assert basis.shape == (2, told)
     fitted = columns @ (basis @ (basis.T @ (columns.T @ (first + second))))
     np.testing.assert_allclose(fitted, first + (told - 1) * second, atol=1e-5)
-
-
-def rows(rng, count, size=3):
-    return rng.normal(size=(count, size)), rng.normal(size=count)
-
-
-def test_sources_that_are_independent_add_up_and_can_be_taken_away():
-    rng = np.random.default_rng(4)
-    (x, y), (more, z) = rows(rng, 20), rows(rng, 30)
-    first, second = NormalEquations.of_rows(x, y), NormalEquations.of_rows(more, z)
-    both = NormalEquations.of_rows(np.vstack([x, more]), np.concatenate([y, z]))
-    for one, other in ((first + second, both), (both - second, first)):
-        np.testing.assert_allclose(one.matrix, other.matrix, atol=1e-12)
-        np.testing.assert_allclose(one.vector, other.vector, atol=1e-12)
-
-
-def test_what_is_still_to_be_added_is_the_rest_of_the_solution():
-    rng = np.random.default_rng(5)
-    known, change = NormalEquations.of_rows(*rows(rng, 20)), rng.normal(size=3)
-    rest = known.after(change)
-    np.testing.assert_allclose(
-        change + informative_solution(rest.matrix, rest.vector),
-        informative_solution(known.matrix, known.vector),
-    )
-
-
-def test_more_values_are_zero_as_surely_as_they_are_known_to_be():
-    rng = np.random.default_rng(6)
-    known = NormalEquations.of_rows(*rows(rng, 20))
-    more = known.and_zeros(np.array([2.0, 0.0]))
-    solution = informative_solution(more.matrix, more.vector)
-    expected = informative_solution(known.matrix, known.vector)
-    np.testing.assert_allclose(solution, [*expected, 0.0, 0.0], atol=1e-12)
-    assert more.matrix[3, 3] == 2.0
-    np.testing.assert_array_equal(more.among(range(3)).matrix, known.matrix)
