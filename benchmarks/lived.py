@@ -34,7 +34,7 @@ import numpy as np
 
 from benchmarks.hidden_effects import table
 from benchmarks.lived_questions import score_of_question
-from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, score
+from benchmarks.lived_scoring import breakdown, LivedJudged, LivedTruth, probabilities, score
 from benchmarks.looks import look, results_of
 from benchmarks.plain_ranking import plain_ranking
 from benchmarks.two_days import Answer, ask, identification_of
@@ -162,6 +162,7 @@ def main() -> None:
     parser.add_argument('--plain', action='store_true', help='ask the plain ranking instead')
     parser.add_argument('--each', type=int, help='ask with so many recordings of each day')
     parser.add_argument('--out', type=Path, help='file for all answers, as JSON')
+    parser.add_argument('--probabilities', type=Path, help='file for those of names, as JSON')
     parser.add_argument('--processes', type=int, default=2)
     options = parser.parse_args()
     for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
@@ -184,6 +185,9 @@ def main() -> None:
             print(breakdown(judged))
         if record is not None:
             record['results'] = results_of(metrics)
+    if options.probabilities:
+        pairs = json.dumps(probabilities(judged), default=_plain)
+        options.probabilities.write_text(f'{pairs}\n', encoding='utf-8')
     if options.out:
         answers = [asdict(one) for one in judged]
         options.out.write_text(json.dumps(answers, indent=1, default=_plain), encoding='utf-8')

@@ -242,6 +242,20 @@ def felt_directions(chain: Chain) -> FloatArray:
     return np.asarray(felt.T @ felt)
 
 
+def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
+    """Return the probability of each first name, lowest first, and whether it is right."""
+    first = [(j.answer.headline[0].probability, j.first) for j in judged if j.answer.headline]
+    return sorted(pair for pair in first if np.isfinite(pair[0]))
+
+
+def reliability(
+    pairs: Sequence[tuple[float, bool]], least: int = 20
+) -> list[tuple[float, float, int]]:
+    """Return mean probability, share of right names and count of bins of so many or more."""
+    bins = np.array_split(np.array(pairs, dtype=float).reshape(-1, 2), max(len(pairs) // least, 1))
+    return [(*own.mean(axis=0).tolist(), len(own)) for own in bins if len(own)]
+
+
 def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     """Compute all metrics."""
     free = [j for j in judged if not j.truth.name]
@@ -258,6 +272,7 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
     seconds = [j.answer.seconds for j in judged if np.isfinite(j.answer.seconds)]
     shares = [abs(j.share_error) for j in stated]
     answered = [j for j in judged if not j.answer.error]
+    gaps = [abs(p - right) for p, right, _ in reliability(probabilities(judged))]
     too_many = [j.too_many for j in answered if not j.truth.name or j.truth.in_catalogue]
     return (
         rate('cause named first', seen, lambda j: j.first, least=0.90),
@@ -271,6 +286,7 @@ def score(judged: Sequence[LivedJudged]) -> tuple[Metric, ...]:
         rate('nothing happened, silent', free, lambda j: silent(j.answer), least=0.95),
         rate('same day again, silent', again, lambda j: silent(j.again), least=0.95),
         rate('outside the catalogue, said so', outside, lambda j: j.admitted, least=0.90),
+        number('reliability, largest gap', np.max, gaps, 'at most 0.07', lambda x: x <= 0.07),
         rate('share within 5 points', shares, lambda e: e <= 0.05),
         number('  error, median', np.median, shares, 'at most 0.05', lambda x: x <= 0.05),
         number('parameter error, median', np.median, [e for e, _ in errors], '', None),

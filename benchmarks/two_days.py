@@ -47,6 +47,8 @@ class Named:
         Share of the held-out gap that it takes; nan if it is not said.
     share_interval : (float, float)
         Its interval.
+    probability : float
+        That it is the cause; nan if it is not said.
 
     """
 
@@ -56,6 +58,7 @@ class Named:
     parameters: tuple[tuple[str, str, float, float], ...] = ()
     share: float = np.nan
     share_interval: tuple[float, float] = (np.nan, np.nan)
+    probability: float = np.nan
 
     @property
     def names(self) -> set[str]:
@@ -209,6 +212,7 @@ def _named(effect: dict[str, Any]) -> Named:
         ),
         share=_number(effect.get('share')),
         share_interval=(_number(low), _number(high)),
+        probability=_number(effect.get('probability')),
     )
 
 

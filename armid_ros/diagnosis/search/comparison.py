@@ -27,6 +27,7 @@ from armid_ros.diagnosis.search.odds import (
     OWN_SPREADS,
     usual_spread,
 )
+from armid_ros.diagnosis.search.priors import UNLISTED
 from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import Effect
@@ -252,6 +253,7 @@ class CauseComparison:
         others = [one for one in telling if one is not winner]
         behind = np.array([-winner.ahead(one, levels) for one in others])
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
+        total -= np.log1p(-UNLISTED)
         rated = [replace(winner, probability=float(np.exp(-total)))]
         for one, odds_to_winner in zip(others, behind, strict=True):
             if odds_to_winner > -levels.tie:
