@@ -245,7 +245,8 @@ def felt_directions(chain: Chain) -> FloatArray:
 def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
     """Return the probability of each first name, lowest first, and whether it is right."""
     first = [(j.answer.headline[0].probability, j.first) for j in judged if j.answer.headline]
-    return sorted(pair for pair in first if np.isfinite(pair[0]))
+    known = [pair for pair in first if np.isfinite(pair[0])]
+    return sorted(known, key=lambda pair: pair[0])
 
 
 def reliability(

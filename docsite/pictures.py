@@ -10,6 +10,7 @@ Those of the demo are written by ``armid demo``.
 from __future__ import annotations
 
 from dataclasses import replace
+import json
 import os
 from pathlib import Path
 import sys
@@ -23,9 +24,13 @@ from matplotlib.figure import Figure
 import numpy as np
 from scipy import signal, stats
 
+from benchmarks.lived_scoring import reliability as bins
 from docsite.desk import FRICTION, lay_out
 
 IMAGES = Path(__file__).parents[1] / 'docs' / 'images'
+RESULTS = Path(__file__).parents[1] / 'benchmarks' / 'results'
+#: Text beside a point.
+TEXT = {'textcoords': 'offset points', 'va': 'center', 'fontsize': 8}
 BLUE, ORANGE, GREY = '#0072b2', '#e69f00', '#8c9196'
 #: Fit to a column of text, and sharp on a screen of two dots per point.
 WIDTH, DPI = 7.0, 120
@@ -127,10 +132,29 @@ def exo_cycle() -> Figure:
     return figure
 
 
+def reliability() -> Figure:
+    """Draw how often first names of the diagnosis are right, over their probability."""
+    found = json.loads((RESULTS / 'probabilities.json').read_text(encoding='utf-8'))
+    figure = Figure(figsize=(WIDTH, 3.2), layout='constrained')
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color=GREY, lw=1, label='calibrated')
+    for mean, right, count in bins(found):
+        low, high = stats.binomtest(round(right * count), count).proportion_ci(method='wilson')
+        axes.plot([mean, mean], [low, high], color=BLUE, lw=1)
+        axes.plot(mean, right, 'o', color=BLUE)
+        axes.annotate(f'{count} names', (mean, right), (-8, 0), ha='right', **TEXT)
+    axes.set(xlabel='probability of the first name', ylabel='share of names that are right')
+    axes.set(xlim=(0.4, 1.0), ylim=(0.4, 1.02))
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.legend(frameon=False, loc='lower right')
+    return figure
+
+
 PICTURES = {
     'candidates.png': candidates,
     'deviations.png': deviations,
     'exo_cycle.png': exo_cycle,
+    'reliability.png': reliability,
 }
 
 

@@ -185,9 +185,11 @@ def _within(
 ) -> Diagnosis | None:
     """Diagnose the seconds in which a cause acts alone; None if that explains no more."""
     settings, look = asked.settings, chosen.look
-    if not settings.spans or look is None or not _hardly_explained(result, settings):
+    if not settings.spans or look is None:
         return None
-    spans = acting_spans(look, settings.thresholds)
+    if result.findings and not _hardly_explained(result, settings):
+        return None
+    spans = acting_spans(look, chosen.usual, settings.thresholds)
     cut = [_cut(*each) for each in zip(spans, [*recordings, *asked.validate], strict=False)]
     shorter, unseen = (
         [one for one in part if one is not None]

@@ -46,6 +46,9 @@ def test_a_friction_that_has_grown_is_not_said_to_warm_up(bench):
 
 
 @pytest.mark.long
+@pytest.mark.xfail(
+    strict=True, reason='the discrepancy of one motion takes up what leans on it for half a second'
+)
 def test_who_leans_on_an_arm_now_and_then_is_seen(bench):
     """For half a second of each recording, beside a misfit of a fifth of the torque."""
     rng = np.random.default_rng(5)

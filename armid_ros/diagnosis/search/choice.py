@@ -175,7 +175,8 @@ class Explainer:
         second = count_recordings(prepared.data) + count_recordings(self.unseen)
         untested = _ONE_EACH if found.steps and first == second == 1 else ''
         notes = (untested,) if untested else ()
-        return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
+        own = result.first, result.usual
+        return Chosen(found, misfit, OWN_MISFIT, notes, untested, *own)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
         """Explain what has changed in a model that stays as given."""

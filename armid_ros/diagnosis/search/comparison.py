@@ -251,7 +251,8 @@ class CauseComparison:
             return None
         winner = min(able, key=lambda one: able[0].ahead(one, levels))
         others = [one for one in telling if one is not winner]
-        behind = np.array([-winner.ahead(one, levels) for one in others])
+        # One that is ahead is not beyond doubt itself: it is as likely as the winner at the most.
+        behind = np.array([min(-winner.ahead(one, levels), 0.0) for one in others])
         total = np.logaddexp.reduce(np.append(behind, 0.0)) + np.logaddexp(0.0, -winner.odds)
         total -= np.log1p(-UNLISTED)
         rated = [replace(winner, probability=float(np.exp(-total)))]

@@ -20,6 +20,7 @@ from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.comparison import Look
+from armid_ros.diagnosis.search.odds import POPULATION_SPREAD
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
 from armid_ros.diagnosis.search.trial import Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
@@ -142,6 +143,8 @@ class Chosen:
         recordings do. Where they do not, names have to take most of the gap.
     look : Look or None
         What all causes were worth at first.
+    usual : float
+        Usual spread of values between recordings.
 
     """
 
@@ -151,6 +154,7 @@ class Chosen:
     notes: tuple[str, ...] = ()
     untested: str = ''
     look: Look | None = None
+    usual: float = POPULATION_SPREAD
 
     @property
     def measured(self) -> bool:

@@ -137,13 +137,12 @@ class CauseInformation:
         """Return the number of values."""
         return len(self.vector) // len(self.today)
 
-    def of_baseline(self) -> CauseInformation:
-        """Return what the recordings of the first day tell."""
-        kept = np.flatnonzero(np.repeat(~self.today, self.size))
+    def of_day(self, today: bool) -> CauseInformation:
+        """Return the information of one of the days, today or before."""
+        of_it = self.today == today
+        kept = np.flatnonzero(np.repeat(of_it, self.size))
         matrix = self.matrix[np.ix_(kept, kept)]
-        return replace(
-            self, matrix=matrix, vector=self.vector[kept], today=self.today[~self.today]
-        )
+        return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
 
     def apart(self, spread: float) -> list[FloatArray]:
         """Return the root of the covariance of what values differ by between recordings."""
@@ -191,7 +190,7 @@ def odds(
     known = under
     if isinstance(known, Marginal):
         known = CauseInformation.of(cause, nuisance, known, by_day=not spreads.any())
-    p, before = known.size, bool(np.any(~nuisance.rows.today))
+    p, before = known.size, not np.all(known.today)
     asked = np.kron(known.today.astype(float)[:, np.newaxis], np.eye(p))
     prior = -0.5 * np.log((spreads + 1.0) / (usual + 1.0)) ** 2
     prior -= np.logaddexp.reduce(prior)
@@ -263,7 +262,7 @@ def usual_spread(causes: Sequence[Cause], nuisance: Nuisance, under: Marginal) -
     for cause in causes:
         if cause.effect.traits.external:
             continue
-        known = CauseInformation.of(cause, nuisance, under).of_baseline()
+        known = CauseInformation.of(cause, nuisance, under).of_day(today=False)
         found = []
         for spread in _USUAL_SPREADS:
             square, aim, total = known.matrix, known.vector, 0.0

@@ -20,9 +20,9 @@ ELSEWHERE = -1.5
 OUTSIDE = -4.0
 #: Of each place in the catalogue, which goes from the common to the rare.
 RARER = -0.05
-#: Probability that a law outside of the catalogue acts and resembles the best cause: 3 of 43
-#: development arms.
-UNLISTED = 0.07
+#: Probability that a law outside of the catalogue acts and resembles the best cause: 6 of 70
+#: names of development arms.
+UNLISTED = 0.09
 #: Of each shape that the data choose.
 SHAPE = -3.0
 #: Standard deviations of values over the unit of a cause, all as likely.

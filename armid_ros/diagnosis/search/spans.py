@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, pairwise
 from pathlib import Path
+from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.comparison import Look, Ranked
-from armid_ros.diagnosis.search.odds import odds
+from armid_ros.diagnosis.search.odds import CauseInformation, odds, OWN_SPREADS
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -26,8 +27,10 @@ import numpy.typing as npt
 
 #: Time between change points that are tried [s], and the shortest span [s].
 _STEP, _SHORTEST = 0.25, 3.0
-#: Change points of the first pass, and passes in which each is moved.
-_COARSE, _PASSES = 9, 2
+#: Change points of the first pass, passes in which each is moved, and causes for which it is.
+_COARSE, _PASSES, _REFINED = 9, 2, 3
+#: First and last edge of the span of each recording.
+Spans: TypeAlias = Mapping[int, tuple[int, int]]
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ class _Timed:
             found[k] = _up_to(first), _up_to(second), _up_to(third)
         return found
 
-    def within(self, spans: Mapping[int, tuple[int, int]]) -> Ranked:
+    def within(self, spans: Spans) -> Ranked:
         """Return the cause that acts between two edges of each recording."""
         cause, nuisance = self.ranked.cause, self.look.nuisance
         products, own, aim = list(cause.products), list(cause.own), list(cause.aim)
@@ -111,16 +114,26 @@ class _Timed:
             if b - a < count - 1:
                 tried += float(np.log(0.5 * count * (count - 1)))
         timed: Cause = replace(cause, products=tuple(products), own=tuple(own), aim=tuple(aim))
-        fit = odds(timed, nuisance, self.ranked.under)
+        # What was there before acts throughout: spans are compared with one and the same null.
+        known = CauseInformation.of(timed, nuisance, self.ranked.under, by_day=True)
+        fit = odds(timed, nuisance, known.of_day(today=True))
         return replace(self.ranked, cause=timed, fit=fit, data=fit.factor - tried)
 
-    def best(self) -> tuple[Ranked, dict[int, tuple[int, int]]]:
-        """Return the likeliest spans: of coarse pairs of edges, then moved edge by edge."""
-        spans = {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
-        found = self.within(spans)
+    def whole(self) -> Ranked:
+        """Return the cause that acts throughout."""
+        return self.within({k: (0, len(edges) - 1) for k, edges in self.edges.items()})
+
+    def coarse(self) -> tuple[Ranked, Spans]:
+        """Return the likeliest spans of coarse pairs of edges."""
+        spans: Spans = {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
+        found = self.whole()
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
             found, spans = self._better(found, spans, k, [(0, 0), *combinations(coarse, 2)])
+        return found, spans
+
+    def refined(self, found: Ranked, spans: Spans) -> tuple[Ranked, Spans]:
+        """Return spans with each edge moved to where the cause is likeliest."""
         for _ in range(_PASSES):
             for k, edges in self.edges.items():
                 near = (len(edges) - 1) // (_COARSE - 1)
@@ -134,10 +147,10 @@ class _Timed:
     def _better(
         self,
         found: Ranked,
-        spans: dict[int, tuple[int, int]],
+        spans: Spans,
         recording: int,
         tried: Iterable[tuple[int, int]],
-    ) -> tuple[Ranked, dict[int, tuple[int, int]]]:
+    ) -> tuple[Ranked, Spans]:
         """Return the likeliest of spans that are tried for one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
         for a, b in tried:
@@ -154,7 +167,7 @@ def _up_to(parts: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros((1, *parts.shape[1:])), np.cumsum(parts, axis=0)])
 
 
-def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
+def acting_spans(look: Look, usual: float, thresholds: Thresholds) -> tuple[Span, ...]:
     """
     Return the seconds in which the likeliest cause acts.
 
@@ -162,8 +175,11 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     ----------
     look : Look
         What causes that act throughout explain.
+    usual : float
+        Usual spread of values between recordings.
     thresholds : Thresholds
-        By how much a cause has to be likelier if it acts for a part of the time.
+        By how much a cause has to be likelier if it acts for a part of the time, and than that
+        its values differ between recordings only.
 
     Returns
     -------
@@ -174,12 +190,17 @@ def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     if not look.ranking:
         return ()
     timed = [_Timed(one, look) for one in look.ranking]
-    found = [(*one.best(), one) for one in timed]
+    coarse = sorted(((*one.coarse(), one) for one in timed), key=lambda one: -one[0].worth)
+    found = [(*own.refined(one, near), own) for one, near, own in coarse[:_REFINED]]
     best, spans, own = max(found, key=lambda one: one[0].worth)
-    if best.ahead(look.ranking[0], thresholds) <= thresholds.alarm:
+    throughout = max((one.whole() for one in timed), key=lambda one: one.worth)
+    nuisance = look.nuisance
+    known = CauseInformation.of(best.cause, nuisance, best.under).of_day(today=True)
+    there = odds(best.cause, nuisance, known, usual, OWN_SPREADS).factor
+    lead = best.ahead(throughout, thresholds)
+    if min(lead, there) <= thresholds.alarm:
         return ()
-    rows = look.nuisance.rows
-    result = []
+    rows, result = nuisance.rows, []
     for number, (k, (a, b)) in enumerate(spans.items()):
         edges, t = own.edges[k], own.times[k]
         name = Path(next(part.source for part in rows.data if part.fold == k)).name
