@@ -9,7 +9,6 @@ import sys
 LIBRARY = {
     '__init__',
     '__main__',
-    'bic_selection',
     'browser',
     'change_information',
     'leg_pair_in_mujoco',

@@ -87,7 +87,7 @@ def test_a_provisional_name_is_held_against_the_next_best(bench):
     alone = replace(found.explanation, steps=(replace(step, rivals=()),))
     run = next_run(replace(found, verdict='partial', explanation=alone), np.random.default_rng(1))
     assert {pair.name for pair in run.separations} == {'quadratic_friction'}
-    ranking = [t.effect.name for t in step.ranking]
+    ranking = [t.effect.name for t in found.explanation.survey.ranking]
     assert {pair.rival for pair in run.separations} <= set(ranking) - {'quadratic_friction'}
 
 

@@ -229,8 +229,8 @@ def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
     doubts: dict[tuple[str, str], Doubt] = {}
     for named, step in pairs:
         others = [t.effect for t in step.rivals]
-        if not others and diagnosis.verdict == 'partial':
-            others = [t.effect for t in step.ranking if t.gain > 0.0]
+        if not others and diagnosis.verdict == 'partial' and explanation.survey is not None:
+            others = [t.effect for t in explanation.survey.ranking if t.gain > 0.0]
             others = [effect for effect in others if effect.name not in found][:_RUNNERS_UP]
         for other in others:
             if other.name in found:

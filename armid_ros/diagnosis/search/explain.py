@@ -21,8 +21,6 @@ import numpy as np
 
 #: Precision of a value of which nothing is known before.
 _UNKNOWN = 1e-12
-#: Causes of a look that are kept with a name.
-_KEPT = 10
 
 
 @dataclass(frozen=True)
@@ -98,9 +96,7 @@ def _name(step: Step, cause: Cause, values: FloatArray, arm: ArmModel) -> Name:
 
 def _step(one: Accepted, usual: float, material: float) -> Step:
     judge = Judge(one.look, usual, material)
-    ranking = tuple(judge.ranked(other) for other in one.look.ranking[:_KEPT])
-    rivals = tuple(judge.ranked(other) for other in one.tied)
-    return Step(judge.ranked(one.best), rivals, ranking)
+    return Step(judge.ranked(one.best), tuple(judge.ranked(other) for other in one.tied))
 
 
 def _matters(cause: Cause, values: FloatArray, result: Result, material: float) -> bool:

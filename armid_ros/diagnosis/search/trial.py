@@ -89,14 +89,11 @@ class Step:
         What it is worth.
     rivals : tuple of Trial
         Causes that the data do not exclude in its place, the likeliest first.
-    ranking : tuple of Trial
-        The best causes of the look in which it was found.
 
     """
 
     trial: Trial
     rivals: tuple[Trial, ...] = ()
-    ranking: tuple[Trial, ...] = ()
 
 
 @dataclass(frozen=True)

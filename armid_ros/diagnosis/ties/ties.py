@@ -357,7 +357,7 @@ def _as_one_cause(ties: Ties, explainer: Explainer, fitted: Fitted) -> tuple[Ste
     survey = survey_of(result, (), settings)
     trial = replace(judge.ranked(one), probability=1.0 / (1.0 + len(rivals)))
     survey = replace(survey, ranking=(trial, *survey.ranking))
-    return Step(trial, tuple(rivals), (trial,)), survey
+    return Step(trial, tuple(rivals)), survey
 
 
 def _with_names_of(found: Explanation, fitted: Fitted) -> Explanation:
