@@ -45,6 +45,7 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
+from armid_ros.report.notation import printed
 from armid_ros.report.sections.diagnosed import named_rows
 from armid_ros.residual import (
     learn_residual,
@@ -249,7 +250,7 @@ class DiagnosisResult(ShownModel):
         """Return the verdict, named values that are not zero, minor effects and notes."""
         rows = named_rows(self.core.findings, certain=True)
         return Summary(
-            self.core.summary.replace('+-', '±'),
+            printed(self.core.summary),
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,

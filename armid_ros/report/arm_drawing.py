@@ -36,7 +36,7 @@ OBSTACLE = 'var(--line)'
 #: What is smaller stands for a link without a body and cannot be seen [m].
 _POINT = 1e-3
 #: Height of a line of text, width of a letter, length of the arrow of gravity [px].
-_LINE, _LETTER, _ARROW = 16.0, 8.5, 26.0
+_LINE, _LETTER, _ARROW = 16.0, 9.5, 26.0
 #: Poses that a single drawing is tried in.
 _POSES = 12
 #: Joint range beyond which a joint counts as endless [rad or m].

@@ -13,7 +13,7 @@ from armid_ros.diagnosis.verdict.document import detectable
 from armid_ros.diagnosis.verdict.words import by_cause, names_and_places, share_in_words
 from armid_ros.identification.assess.verification import ForwardValidation
 from armid_ros.recording import Recording
-from armid_ros.report.notation import counted, percent, probability, robot_label
+from armid_ros.report.notation import counted, percent, printed, probability, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.data_quality import data_quality_section
@@ -162,7 +162,7 @@ def diagnosis_report(
     if residual is not None:
         sections.append(residual_map_section(residual))
     sections.append(
-        next_steps_section([*map(_printed, extras.steps(diagnosis)), *_of_maps(residual)])
+        next_steps_section([*map(printed, extras.steps(diagnosis)), *_of_maps(residual)])
     )
     if diagnosis.minor:
         sections.append(minor_section(diagnosis.minor, everything, patched))
@@ -215,14 +215,9 @@ def _verdict(
             f'Driven by the recorded torques, the patched model has larger position errors than '
             f'before in {", ".join(worse)}; see Forward validation.'
         )
-    summary = _printed(with_names(diagnosis.summary, names))
+    summary = printed(with_names(diagnosis.summary, names))
     badge = 'cause found' if diagnosis.verdict == 'named' else diagnosis.verdict.replace('_', ' ')
     return VerdictSection(badge, tone, [summary], notes)
-
-
-def _printed(text: str) -> str:
-    """Return a sentence of the terminal as it is printed."""
-    return text.replace('+-', '±')
 
 
 def _of_maps(residual: Residual | None) -> list[str]:

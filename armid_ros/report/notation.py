@@ -18,6 +18,11 @@ def pretty(unit: str) -> str:
     return unit.replace('^2', '²').replace('^3', '³')
 
 
+def printed(text: str) -> str:
+    """Return a sentence of a document, which is ASCII, as it is printed."""
+    return pretty(text.replace('+-', '±'))
+
+
 #: What is no number, or one that stands for none.
 DASH = '\N{EN DASH}'
 #: No quantity of an arm in SI units is as large.
