@@ -48,7 +48,7 @@ class Named:
     share_interval : (float, float)
         Its interval.
     probability : float
-        That it is the cause; nan if it is not said.
+        That it is the cause; nan if not stated.
 
     """
 
