@@ -45,18 +45,18 @@ class ReadWaypoints:
     tau: FloatArray | None
 
 
-def joint_trajectory_cdr(motion: Waypoints, *, stamp_ns: int = 0, frame_id: str = '') -> bytes:
+#: Topic of the message in a bag, and when it counts as recorded [ns].
+_TOPIC, _LOG_TIME = '/joint_trajectory', 10**9
+
+
+def joint_trajectory_cdr(motion: Waypoints) -> bytes:
     """
     Serialise a motion as one trajectory_msgs/JointTrajectory.
 
     Parameters
     ----------
     motion : Motion or other Waypoints
-        What to do over time; time_from_start is its time.
-    stamp_ns : int
-        When to start [ns]; 0 means now.
-    frame_id : str
-        Of the header.
+        What to do over time; time_from_start is its time, and the stamp 0 means now.
 
     """
     store = get_typestore(Stores.ROS2_JAZZY)
@@ -79,11 +79,10 @@ def joint_trajectory_cdr(motion: Waypoints, *, stamp_ns: int = 0, frame_id: str 
                 ),
             )
         )
-    seconds, nanoseconds = divmod(stamp_ns, 10**9)
     message = types[JOINT_TRAJECTORY](
         header=types['std_msgs/msg/Header'](
-            stamp=types['builtin_interfaces/msg/Time'](sec=seconds, nanosec=nanoseconds),
-            frame_id=frame_id,
+            stamp=types['builtin_interfaces/msg/Time'](sec=0, nanosec=0),
+            frame_id='',
         ),
         joint_names=list(motion.joints),
         points=points,
@@ -95,9 +94,7 @@ def write_joint_trajectory(
     path: str | Path,
     motion: Waypoints,
     *,
-    topic: str = '/joint_trajectory',
     robot_description: str | None = None,
-    log_time_ns: int = 10**9,
 ) -> None:
     """
     Write a reference motion as a bag with one JointTrajectory message.
@@ -108,12 +105,8 @@ def write_joint_trajectory(
         The bag directory to be made; it must not exist.
     motion : Motion or other Waypoints
         What to do; its torque, if it has one, is effort on top of what follows it.
-    topic : str
-        Topic of the message.
     robot_description : str, optional
         URDF to be written to /robot_description.
-    log_time_ns : int
-        When the message counts as recorded [ns].
 
     Raises
     ------
@@ -121,13 +114,12 @@ def write_joint_trajectory(
         The bag exists already.
 
     """
-    cdr = joint_trajectory_cdr(motion)
     with whole_bag(path) as writer:
         if robot_description is not None:
             writer.add_topic('/robot_description', STRING, qos=[LATCHED])
-            writer.write('/robot_description', string_cdr(robot_description), log_time_ns)
-        writer.add_topic(topic, JOINT_TRAJECTORY, qos=[LATCHED])
-        writer.write(topic, cdr, log_time_ns)
+            writer.write('/robot_description', string_cdr(robot_description), _LOG_TIME)
+        writer.add_topic(_TOPIC, JOINT_TRAJECTORY, qos=[LATCHED])
+        writer.write(_TOPIC, joint_trajectory_cdr(motion), _LOG_TIME)
 
 
 def read_joint_trajectory(

@@ -91,19 +91,17 @@ def write_joint_states(
     q: npt.ArrayLike | None,
     dq: npt.ArrayLike | None = None,
     tau: npt.ArrayLike | None = None,
-    *,
-    frame_id: str = '',
 ) -> None:
     """
     Write joint measurements to a topic of a bag, logged at their stamps.
 
-    Parameters are those of ``joint_state_cdr``.
+    Parameters are those of ``joint_state_cdr``, but for ``frame_id``, which is empty.
 
     """
     stamps = np.asarray(stamps_ns, np.int64)
     writer.add_topic(topic, JOINT_STATE)
     at = 0
-    for rows in _encoded(tuple(joints), stamps, (q, dq, tau), frame_id):
+    for rows in _encoded(tuple(joints), stamps, (q, dq, tau), ''):
         writer.write_many(topic, rows, stamps[at : at + len(rows)])
         at += len(rows)
 
