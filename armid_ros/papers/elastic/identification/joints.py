@@ -86,8 +86,6 @@ def fit_springs(
     robot: Robot,
     sides: Sequence[tuple[Recording, Recording]],
     rng: np.random.Generator,
-    *,
-    cutoff: float = CUTOFF,
 ) -> list[SpringEstimate]:
     """
     Fit a spring, free play and a motor to every joint of an arm.
@@ -100,8 +98,6 @@ def fit_springs(
         Motors at the joints and links, sampled together.
     rng : numpy.random.Generator
         Draws the blocks that intervals come from.
-    cutoff : float
-        Of the low-pass filter of all signals, below the resonances [Hz].
 
     Raises
     ------
@@ -109,7 +105,7 @@ def fit_springs(
         If no stretch is long enough, or a joint hardly moves.
 
     """
-    stretches = [piece for pair in sides for piece in _stretches(*pair, cutoff)]
+    stretches = [piece for pair in sides for piece in _stretches(*pair)]
     if not stretches:
         raise IdentificationError(
             f'springs: there is no stretch of {_SHORTEST:g} s without a pause in the recordings'
@@ -127,18 +123,18 @@ def fit_springs(
             for (motor, link), load in zip(stretches, loads, strict=True)
         ]
         try:
-            fit = fit_transmission(records, rng, cutoff=cutoff)
+            fit = fit_transmission(records, rng)
         except IdentificationError as error:
             raise IdentificationError(f"joint '{joint}': {error}") from None
-        own = _motor([motor for motor, _ in stretches], loads, j, cutoff)
+        own = _motor([motor for motor, _ in stretches], loads, j)
         found.append(SpringEstimate(joint, fit, own, float(inertia[j])))
     return found
 
 
-def _stretches(motors: Recording, links: Recording, cutoff: float) -> list[tuple[Motion, Motion]]:
+def _stretches(motors: Recording, links: Recording) -> list[tuple[Motion, Motion]]:
     """Return filtered motions of both sides without pauses; the torque is the motors'."""
     period = motors.period
-    sections = butter(4, cutoff, fs=1.0 / period, output='sos')
+    sections = butter(4, CUTOFF, fs=1.0 / period, output='sos')
 
     def smooth(at: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
         even = np.column_stack([np.interp(at, times, column) for column in values.T])
@@ -164,16 +160,14 @@ def _motion(joints: tuple[str, ...], t: FloatArray, q: FloatArray) -> Motion:
     return Motion(joints, t, q, dq, np.gradient(dq, t, axis=0))
 
 
-def _motor(
-    motors: Sequence[Motion], loads: Sequence[FloatArray], joint: int, cutoff: float
-) -> FloatArray | None:
+def _motor(motors: Sequence[Motion], loads: Sequence[FloatArray], joint: int) -> FloatArray | None:
     """Fit rotor inertia, friction and offset to the motor torque minus the load."""
     tables, torques = [], []
     for motor, load in zip(motors, loads, strict=True):
         if motor.tau is None:
             return None
         inner = slice(len(motor) // 20, -(len(motor) // 20) - 1)
-        sections = butter(4, cutoff, fs=1.0 / (motor.t[1] - motor.t[0]), output='sos')
+        sections = butter(4, CUTOFF, fs=1.0 / (motor.t[1] - motor.t[0]), output='sos')
         signs = sosfiltfilt(sections, direction(motor.dq), axis=0)
         columns = [motor.ddq, motor.dq, signs, np.ones_like(motor.q)]
         tables.append(np.column_stack([column[inner, joint] for column in columns]))

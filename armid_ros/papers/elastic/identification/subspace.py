@@ -27,6 +27,8 @@ from scipy.signal import lfilter
 ComplexArray = npt.NDArray[np.complex128]
 #: What an input does between samples: stay ('zero') or go straight to the next one ('first').
 Hold = Literal['zero', 'first']
+#: Samples of the past, and of the future, that are related.
+_HORIZON = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +91,6 @@ def identify_subspace(
     dt: float,
     order: int,
     hold: Sequence[Hold],
-    *,
-    horizon: int = 24,
 ) -> StateSpace:
     """
     Identify a linear system of given order from sampled experiments.
@@ -105,8 +105,6 @@ def identify_subspace(
         Number of states r.
     hold : sequence of {'zero', 'first'}
         What each input does between samples.
-    horizon : int
-        Samples of the past, and of the future, that are related.
 
     Raises
     ------
@@ -115,7 +113,7 @@ def identify_subspace(
         sampled system.
 
     """
-    _require_data(experiments, order, hold, horizon)
+    _require_data(experiments, order, hold)
     u_scale, y_scale = (
         np.sqrt(np.mean(np.concatenate([getattr(e, name) for e in experiments]) ** 2, axis=0))
         for name in ('u', 'y')
@@ -123,12 +121,12 @@ def identify_subspace(
     if not (np.all(u_scale > 0.0) and np.all(y_scale > 0.0)):
         raise IdentificationError('subspace identification: an input or an output is always zero')
     scaled = [Signals(e.u / u_scale, e.y / y_scale) for e in experiments]
-    a, c = _observable(scaled, order, horizon)
+    a, c = _observable(scaled, order)
     eigenvalues, vectors = np.linalg.eig(a)
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
             f'subspace identification: order {order} gives poles that no sampled system has; '
-            'take more data, a longer horizon or another order'
+            'take more data or another order'
         )
     poles = np.log(eigenvalues.astype(complex)) / dt
     modal = c @ vectors
@@ -136,44 +134,40 @@ def identify_subspace(
     return StateSpace(poles, b / u_scale, y_scale[:, np.newaxis] * modal)
 
 
-def _require_data(
-    experiments: Sequence[Signals], order: int, hold: Sequence[Hold], horizon: int
-) -> None:
+def _require_data(experiments: Sequence[Signals], order: int, hold: Sequence[Hold]) -> None:
     if not experiments:
         raise IdentificationError('subspace identification: there is no experiment')
     m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
     if len(hold) != m:
         raise IdentificationError(f'subspace identification: {m} inputs, but {len(hold)} holds')
-    if order > p * (horizon - 1):
+    if order > p * (_HORIZON - 1):
         raise IdentificationError(
-            f'subspace identification: order {order} needs a horizon of more than '
-            f'{order // p + 1} samples'
+            f'subspace identification: order {order} is above {p * (_HORIZON - 1)}, the highest '
+            f'of {p} outputs'
         )
-    columns = sum(max(len(e.u) - 2 * horizon + 1, 0) for e in experiments)
-    if columns < 4 * horizon * (m + p):
+    columns = sum(max(len(e.u) - 2 * _HORIZON + 1, 0) for e in experiments)
+    if columns < 4 * _HORIZON * (m + p):
         raise IdentificationError(
-            f'subspace identification: {columns} samples after the first {2 * horizon} of each '
-            f'experiment are too few; {4 * horizon * (m + p)} are needed'
+            f'subspace identification: {columns} samples after the first {2 * _HORIZON} of each '
+            f'experiment are too few; {4 * _HORIZON * (m + p)} are needed'
         )
 
 
-def _observable(
-    experiments: Sequence[Signals], order: int, horizon: int
-) -> tuple[FloatArray, FloatArray]:
+def _observable(experiments: Sequence[Signals], order: int) -> tuple[FloatArray, FloatArray]:
     """Return state and output matrix of a sampled system."""
     m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
-    triangle = np.empty((0, 2 * horizon * (m + p)))
+    triangle = np.empty((0, 2 * _HORIZON * (m + p)))
     for e in experiments:
-        if len(e.u) >= 2 * horizon:
-            u, y = _hankel(e.u, 2 * horizon), _hankel(e.y, 2 * horizon)
+        if len(e.u) >= 2 * _HORIZON:
+            u, y = _hankel(e.u, 2 * _HORIZON), _hankel(e.y, 2 * _HORIZON)
             block = np.hstack(
-                [u[:, m * horizon :], u[:, : m * horizon], y[:, : p * horizon],
-                 y[:, p * horizon :]]
+                [u[:, m * _HORIZON :], u[:, : m * _HORIZON], y[:, : p * _HORIZON],
+                 y[:, p * _HORIZON :]]
             )  # fmt: skip
             triangle = np.asarray(np.linalg.qr(np.vstack([triangle, block]), mode='r'))
     lower = triangle.T
-    past = slice(m * horizon, (2 * m + p) * horizon)
-    left, sizes, _ = np.linalg.svd(lower[(2 * m + p) * horizon :, past])
+    past = slice(m * _HORIZON, (2 * m + p) * _HORIZON)
+    left, sizes, _ = np.linalg.svd(lower[(2 * m + p) * _HORIZON :, past])
     gamma = left[:, :order] * np.sqrt(sizes[:order])
     a = np.linalg.lstsq(gamma[:-p], gamma[p:], rcond=None)[0]
     return a, gamma[:p]

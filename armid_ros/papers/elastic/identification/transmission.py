@@ -100,9 +100,7 @@ class TransmissionFit:
         return self.backlash[1] > 0.0 and abs(self.correlation) < 0.95
 
 
-def fit_transmission(
-    records: Sequence[TwoEncoders], rng: np.random.Generator, *, cutoff: float = CUTOFF
-) -> TransmissionFit:
+def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -> TransmissionFit:
     """
     Fit spring and free play to recordings of one joint.
 
@@ -112,8 +110,6 @@ def fit_transmission(
         Recordings; each has an offset and a slope of its encoders of its own.
     rng : numpy.random.Generator
         Draws the blocks that the intervals come from.
-    cutoff : float
-        Of the low-pass filter of all signals [Hz].
 
     Raises
     ------
@@ -121,7 +117,7 @@ def fit_transmission(
         If the joint moves too little for it.
 
     """
-    pieces = [_columns(record, cutoff) for record in records]
+    pieces = [_columns(record) for record in records]
     if sum(len(twist) for _, twist, _, _ in pieces) < 50:
         raise IdentificationError('the joint hardly moves: its stiffness cannot be found')
     table, twist, blocks = _joined(pieces)
@@ -150,9 +146,9 @@ def fit_transmission(
     )
 
 
-def _columns(record: TwoEncoders, cutoff: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Return columns, twist, times and the number of flank changes of one recording."""
-    sections = butter(4, cutoff, fs=1.0 / record.dt, output='sos')
+    sections = butter(4, CUTOFF, fs=1.0 / record.dt, output='sos')
     motor, link, torque = (
         sosfiltfilt(sections, x) for x in (record.motor, record.link, record.torque)
     )
@@ -160,7 +156,7 @@ def _columns(record: TwoEncoders, cutoff: float) -> tuple[FloatArray, FloatArray
     moving = np.abs(velocity) > _STANDING * np.abs(velocity).max()
     ends = round(0.3 / record.dt)
     moving[:ends] = moving[-ends:] = False
-    moving &= np.arange(len(moving)) % max(round(0.25 / cutoff / record.dt), 1) == 0
+    moving &= np.arange(len(moving)) % max(round(0.25 / CUTOFF / record.dt), 1) == 0
     flank = np.tanh(torque / (_MESHING * np.median(np.abs(torque))))
     beside = [] if record.carried else [np.sign(velocity), np.gradient(velocity, record.dt)]
     own = np.column_stack([torque, flank, velocity, *beside, motor, np.ones(len(motor))])

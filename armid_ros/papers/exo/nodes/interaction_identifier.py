@@ -74,10 +74,17 @@ class InteractionIdentifierNode(ArmidNode):
         ),
     )
 
-    def __init__(self, identifier: OnlineInteraction | None = None, **kwargs: Any) -> None:
-        """Take the identifier; by default that of the shipped leg pair."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Identify the ties of the shipped leg pair."""
         super().__init__('interaction_identifier', **kwargs)
-        self.identifier = identifier or self._make_identifier()
+        pair = leg_pair()
+        settings = InteractionSettings(
+            self.value('memory'),
+            self.value('period'),
+            self.value('slack_period'),
+            self.value('inertias'),
+        )
+        self.identifier = OnlineInteraction(pair.robot, pair.other, pair.ties, settings)
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         core = self.identifier
@@ -220,16 +227,6 @@ class InteractionIdentifierNode(ArmidNode):
         if self._epoch is None:
             self._epoch = stamp.sec
         return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec
-
-    def _make_identifier(self) -> OnlineInteraction:
-        pair = leg_pair()
-        settings = InteractionSettings(
-            self.value('memory'),
-            self.value('period'),
-            self.value('slack_period'),
-            self.value('inertias'),
-        )
-        return OnlineInteraction(pair.robot, pair.other, pair.ties, settings)
 
 
 def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
