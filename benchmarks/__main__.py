@@ -9,6 +9,7 @@ import sys
 LIBRARY = {
     '__init__',
     '__main__',
+    'bic_selection',
     'browser',
     'change_information',
     'leg_pair_in_mujoco',

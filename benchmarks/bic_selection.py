@@ -1,0 +1,91 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+What textbook model selection names: the baseline that a diagnosis has to beat.
+
+Forward selection by the Bayesian information criterion on all rows pooled, as if their errors were
+independent and alike: no noise floor, nothing held out, no replication. Library, filters, columns
+and what is free of the rigid body are those of the diagnosis.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.arm import ArmModel
+from armid_ros.arm.memoized_arm import memoized_arm
+from armid_ros.diagnosis.data.baseline import excited, refitted
+from armid_ros.diagnosis.data.days import Rows
+from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import trajectories
+from armid_ros.diagnosis.prepare import choose_filters
+from armid_ros.diagnosis.search.candidates import Causes
+from armid_ros.diagnosis.search.cause import Cause
+from armid_ros.diagnosis.search.nuisance import Nuisance
+from armid_ros.diagnosis.search.odds import CauseInformation
+from armid_ros.diagnosis.search.setting import Setting
+from armid_ros.diagnosis.settings import DiagnosisSettings
+from armid_ros.recording import Recording
+import numpy as np
+import scipy.linalg
+
+#: Columns of which what is free leaves less than this share add nothing.
+_LEAST_VISIBLE = 0.02
+#: Directions of a candidate with less than this share of its squares are left at zero.
+_DEPENDENT = 1e-6
+#: Standard deviation of values that are fitted freely, over their unit.
+_FREE = 1e3
+
+
+def bic_selection(
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    settings: DiagnosisSettings,
+    rng: np.random.Generator,
+) -> list[Cause]:
+    """
+    Return the candidates that lower the criterion, in the order in which they do.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The arm as described; its rigid body and known effects are free.
+    recordings : sequence of Recording
+        Data with torques.
+    settings : DiagnosisSettings
+        Library.
+    rng : numpy.random.Generator
+        Draws the states over which base parameters are found.
+
+    """
+    used = choose_filters(arm, recordings, (), settings, rng)
+    data = trajectories(recordings, used)
+    base, _ = excited(arm, arm.base_parameters(rng), data)
+    one = [np.ones(arm.robot.n_joints)] * len(data)
+    pooled_rows = Evidence.over_noise(data, one)
+    alike = np.sqrt(pooled_rows.power(pooled_rows.residuals(refitted(arm, base, data, one))))
+    rows = Rows.over_noise(Evidence.over_noise(data, [alike] * len(data)))
+    nuisance = Nuisance.of(rows, memoized_arm(arm), rng)
+    catalogue = Causes(settings.kinds, nuisance, False, frozenset())
+    pooled = Setting(True, 0.0, 0.0, 1.0, 1.0)
+    count = sum(nuisance.count)
+    chosen: list[Cause] = []
+    while True:
+        under = nuisance.marginal(pooled)
+        values = nuisance.means(under)
+        squares = sum(float(np.sum(nuisance.rest(values, k) ** 2)) for k in range(len(rows.today)))
+        best, cause = 0.0, None
+        for candidate in catalogue.causes(nuisance, under):
+            known = CauseInformation.of(candidate, nuisance, under, by_day=True)
+            if known.visible < _LEAST_VISIBLE:
+                continue
+            fitted = scipy.linalg.lstsq(known.matrix, known.vector, cond=_DEPENDENT)[0]
+            after = max(squares - float(fitted @ known.vector), 1e-300)
+            change = count * np.log(after / squares) + known.size * np.log(count)
+            if change < best:
+                best, cause = change, candidate
+        if cause is None:
+            return chosen
+        chosen.append(cause)
+        nuisance = nuisance.and_cause(cause, _FREE)
