@@ -252,7 +252,7 @@ def probabilities(judged: Sequence[LivedJudged]) -> list[tuple[float, bool]]:
 def reliability(
     pairs: Sequence[tuple[float, bool]], least: int = 20
 ) -> list[tuple[float, float, int]]:
-    """Return mean probability, share of right names and count of bins of so many or more."""
+    """Return mean probability, share of right names and count of bins of `least` or more."""
     bins = np.array_split(np.array(pairs, dtype=float).reshape(-1, 2), max(len(pairs) // least, 1))
     return [(*own.mean(axis=0).tolist(), len(own)) for own in bins if len(own)]
 

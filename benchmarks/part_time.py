@@ -20,7 +20,7 @@ import sys
 from armid_ros.diagnosis import diagnose, Diagnosis
 import numpy as np
 
-from benchmarks.lived import identification_of
+from benchmarks.two_days import identification_of
 from tests.hidden.lived.adapter import recording_of, robot_of
 from tests.hidden.lived.cases import lived_case, LivedCase
 from tests.hidden.lived.specification import specify

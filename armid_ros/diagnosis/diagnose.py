@@ -169,10 +169,9 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether a gap is open, or names take less than half of it."""
-    shares = [one.share for one in result.findings]
-    least = settings.thresholds.open_share
-    return result.verdict in OPEN or (bool(shares) and max(shares) <= least)
+    """Return whether nothing is named, a gap is open, or names take less than half of it."""
+    largest = max((one.share for one in result.findings), default=0.0)
+    return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
 
 def _within(
@@ -185,9 +184,7 @@ def _within(
 ) -> Diagnosis | None:
     """Diagnose the seconds in which a cause acts alone; None if that explains no more."""
     settings, look = asked.settings, chosen.look
-    if not settings.spans or look is None:
-        return None
-    if result.findings and not _hardly_explained(result, settings):
+    if not settings.spans or look is None or not _hardly_explained(result, settings):
         return None
     spans = acting_spans(look, chosen.usual, settings.thresholds)
     cut = [_cut(*each) for each in zip(spans, [*recordings, *asked.validate], strict=False)]
@@ -210,7 +207,7 @@ def _within(
         )
     except IdentificationError:  # too short for the filters, or without motion
         return None
-    if not found.findings or _hardly_explained(found, settings):
+    if _hardly_explained(found, settings):
         return None
     return found.acting_in([one for one in spans if one.stop > one.start])
 

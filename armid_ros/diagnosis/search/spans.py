@@ -119,14 +119,18 @@ class _Timed:
         fit = odds(timed, nuisance, known.of_day(today=True))
         return replace(self.ranked, cause=timed, fit=fit, data=fit.factor - tried)
 
-    def whole(self) -> Ranked:
-        """Return the cause that acts throughout."""
-        return self.within({k: (0, len(edges) - 1) for k, edges in self.edges.items()})
+    @cached_property
+    def throughout(self) -> Ranked:
+        """The cause that acts throughout."""
+        return self.within(self._whole)
+
+    @property
+    def _whole(self) -> Spans:
+        return {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
 
     def coarse(self) -> tuple[Ranked, Spans]:
         """Return the likeliest spans of coarse pairs of edges."""
-        spans: Spans = {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
-        found = self.whole()
+        found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
             found, spans = self._better(found, spans, k, [(0, 0), *combinations(coarse, 2)])
@@ -193,7 +197,7 @@ def acting_spans(look: Look, usual: float, thresholds: Thresholds) -> tuple[Span
     coarse = sorted(((*one.coarse(), one) for one in timed), key=lambda one: -one[0].worth)
     found = [(*own.refined(one, near), own) for one, near, own in coarse[:_REFINED]]
     best, spans, own = max(found, key=lambda one: one[0].worth)
-    throughout = max((one.whole() for one in timed), key=lambda one: one.worth)
+    throughout = max((one.throughout for one in timed), key=lambda one: one.worth)
     nuisance = look.nuisance
     known = CauseInformation.of(best.cause, nuisance, best.under).of_day(today=True)
     there = odds(best.cause, nuisance, known, usual, OWN_SPREADS).factor
