@@ -173,7 +173,7 @@ def print_rows(
         table.add_row(*(Text(_cell(row[head])) for head in heads))
     console.print(table)
     if left_out:
-        say(wrapped(f'no room in {console.width} columns for: {", ".join(left_out)}', ' ', '   '))
+        say(wrapped(f'left out at {console.width} columns: {", ".join(left_out)}', ' ', '   '))
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:

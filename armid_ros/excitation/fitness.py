@@ -17,7 +17,7 @@ from armid_ros.motion import Motion
 from armid_ros.robots import CollisionModel
 import numpy as np
 
-FIT, PARTLY, UNFIT = 'fit to run', 'not checked in all', 'not to be run'
+FIT, PARTLY, UNFIT = 'fit to run', 'partly checked', 'not to be run'
 #: Names that are listed before the rest is counted.
 _NAMED = 4
 

@@ -19,6 +19,8 @@ from armid_ros.fleet.store import opened
 SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 #: A date in a path: 2026-01-31, 2026_01_31 or 20260131.
 _DATE = re.compile(r'(?<!\d)(20\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)')
+#: A day [ns].
+DAY_NS = 86_400 * 10**9
 #: Bytes of an arm in the name of a folder or page; file systems take 255 together.
 LONGEST_NAME = 240
 _WILD = re.compile(r'[*?\[]')

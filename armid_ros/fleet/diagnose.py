@@ -101,7 +101,7 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
         if arm.named and arm.named[0].kind == 'trend':
             before, after = urls[: min(BEFORE, middle)], urls[-min(AFTER, len(urls) - middle) :]
         elif arm.named:
-            cut = urls.index(arm.bag_at(arm.named[0])['bag'])
+            cut = max(1, urls.index(arm.bag_at(arm.named[0])['bag']))
             before, after = urls[:cut], urls[cut:]
         if len(urls) >= 2:
             some.append(ArmCase(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER])))

@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 from armid_ros.changes.histories import HistoryChange
 from armid_ros.changes.scatter import ParameterHistory
-from armid_ros.fleet.bags import BagFile, file_name, folder_of
+from armid_ros.fleet.bags import BagFile, DAY_NS, file_name, folder_of
 from armid_ros.fleet.sections import (
     Curve,
     drawing,
@@ -210,7 +210,7 @@ def _cut(series: ParameterHistory, named: Sequence[HistoryChange]) -> int:
 def _curve(arm: WatchedArm, series: ParameterHistory) -> Curve:
     links = []
     for day in series.days:
-        nearest = min(arm.bags, key=lambda row: abs(row['start_ns'] / 86_400e9 - day))
+        nearest = min(arm.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
         links.append(f'#{BagFile(arm.arm, nearest["bag"]).name}')
     cut = _cut(series, arm.named)
     svg, ends = drawing(series.days, series.values, series.std, cut, links)

@@ -70,7 +70,8 @@ def plan_fleet(
     jobs: dict[str, Job] = {}
     for entry, some in bags_of.items():
         model = _model(entry, settings)
-        robot, effects = model.robot, _effects(model)
+        robot = model.robot
+        effects = [f'{effect.name}@{"+".join(effect.joints)}' for effect in model.effects]
         gravity, joints = [float(g) for g in robot.gravity], list(robot.joints)
         facts = json.dumps([robot.urdf, gravity, joints, effects])
         key = hashlib.sha256(facts.encode()).hexdigest()[:12]
@@ -119,7 +120,3 @@ def _model(entry: Entry, settings: FleetSettings) -> ArmModel:
     model = ArmModel.of(robot, effects=(entry.effects or settings.effects).replace(';', ','))
     require_linear(model, np.random.default_rng(settings.seed))
     return model
-
-
-def _effects(arm: ArmModel) -> list[str]:
-    return [f'{effect.name}@{"+".join(effect.joints)}' for effect in arm.effects]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import datetime
 
 from armid_ros.errors import ArmidError, IdentificationError
-from armid_ros.fleet.bags import BagFile
+from armid_ros.fleet.bags import BagFile, DAY_NS
 from armid_ros.fleet.job import filters_at, Job
 from armid_ros.fleet.merge import FleetEstimate, FleetFit, MergedBags, Refused
 from armid_ros.fleet.store import fetched
@@ -37,7 +37,7 @@ class BagSummary:
     day : str
         As 2026-01-31: that of its path, or of its first stamp.
     start_ns : int
-        Its first stamp [ns].
+        Its first stamp [ns], put on `day` where it is more than a day away.
     seconds : float
         From the first sample to the last [s].
     samples : int
@@ -183,10 +183,11 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
     if fit is not None:
         rows = (part for _, parts in pieces(path, job) for part in parts) if kept is None else kept
         own = fit.estimate(triangle, fit.noise(rows))
-    day = (
-        bag.day
-        or datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC).date().isoformat()
-    )
+    stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
+    day = bag.day or stamped.date().isoformat()
+    apart = datetime.date.fromisoformat(day) - stamped.date()
+    if abs(apart.days) > 1:  # the clock counts from its start; one day off is a time zone
+        start_ns += apart.days * DAY_NS
     motion = start_ns, seconds, samples, lowest, highest, top_speed
     summary = BagSummary(bag, day, *motion, triangle, own, notes)
     return PreparedBag(summary, None if kept is None else tuple(kept))

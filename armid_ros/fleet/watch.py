@@ -30,6 +30,7 @@ from armid_ros.changes.histories import (
 from armid_ros.changes.scatter import ParameterHistory, Spread, spreads, without_days
 from armid_ros.errors import FleetError
 from armid_ros.estimate import ParameterName
+from armid_ros.fleet.bags import DAY_NS
 from armid_ros.fleet.kinds import document
 from armid_ros.fleet.plan import kind_arm
 from armid_ros.fleet.results import table_of
@@ -47,7 +48,6 @@ ALPHA = 0.05
 _WIDE = 1.96
 #: What the series of residuals is called; it is the logarithm of their deviation.
 RESIDUAL = 'residual'
-_DAY_NS = 86_400 * 1e9
 
 CHANGES = pa.schema(
     [
@@ -147,7 +147,7 @@ class WatchedArm:
         """Return the row of the bag at a change: the first one after it, or so many from it."""
         at = change.index if change.kind == 'step' else len(change.series.days) - 1
         day = change.series.days[min(max(0, at + offset), len(change.series.days) - 1)]
-        return min(self.bags, key=lambda row: abs(row['start_ns'] / _DAY_NS - day))
+        return min(self.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,10 +340,9 @@ def sentence(change: HistoryChange) -> str:
     series = change.series
     what = parameter_label(*series.parameter)
     if series.name == RESIDUAL:
-        lower, upper = (
-            100.0 * np.expm1(change.size + sign * _WIDE * change.std) for sign in (-1.0, 1.0)
-        )
-        by = f'by {100.0 * np.expm1(change.size):+.0f} % ({lower:+.0f} to {upper:+.0f} %)'
+        reach = _WIDE * change.std
+        factor, lower, upper = np.exp(change.size + np.array([0.0, -reach, reach]))
+        by = f'by a factor of {factor:.3g} ({lower:.3g} to {upper:.3g})'
     else:
         by = f'by {change.size:+.3g} ± {_WIDE * change.std:.2g} {series.unit}'.rstrip()
     if change.kind == 'trend':
@@ -378,7 +377,7 @@ def _units(
         for day, value, std in zip(one.days, one.values, one.std, strict=True):
             of_bag.setdefault(float(day), {})[parameter] = value, std
     for before, after in itertools.pairwise(bags):
-        first, then = (of_bag.get(row['start_ns'] / _DAY_NS, {}) for row in (before, after))
+        first, then = (of_bag.get(row['start_ns'] / DAY_NS, {}) for row in (before, after))
         factors = unit_factors(
             [
                 ParameterChange(name, first[name][0], then[name][0], first[name][1], then[name][1])
@@ -393,8 +392,8 @@ def _units(
                 'name': 'torque',
                 'joint': '',
                 'unit': '',
-                'last_day': day_text(before['start_ns'] / _DAY_NS),
-                'first_day': day_text(after['start_ns'] / _DAY_NS),
+                'last_day': day_text(before['start_ns'] / DAY_NS),
+                'first_day': day_text(after['start_ns'] / DAY_NS),
                 'bag': after['bag'],
                 'level': 1.0,
                 'size': float(np.median(list(factors.values()))) - 1.0,
@@ -410,14 +409,14 @@ def _series(
     found = []
     for arm, own in sorted(bags.items()):
         fitted = [row for row in own if row['residual_std']]
-        days = np.array([row['start_ns'] / _DAY_NS for row in fitted])
+        days = np.array([row['start_ns'] / DAY_NS for row in fitted])
         logs = np.log(np.maximum([row['residual_std'] for row in fitted], 1e-300))
         for j, joint in enumerate(fitted[0]['joints'] if fitted else ()):
             none = np.zeros(len(fitted))
             found.append(ParameterHistory(arm, RESIDUAL, joint, '', days, logs[:, j], none))
     # parameters in the order of bags, by parameter
     rows = [row for _, own in sorted(bags.items()) for row in own]
-    days = np.array([row['start_ns'] / _DAY_NS for row in rows])
+    days = np.array([row['start_ns'] / DAY_NS for row in rows])
     place = pc.index_in(parameters['bag'], value_set=pa.array([row['bag'] for row in rows]))
     table = parameters.append_column('place', place).filter(pc.is_valid(place)).sort_by('place')
     table = table.set_column(

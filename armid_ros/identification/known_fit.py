@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from armid_ros.arm.misfit import misfit_of_block
 from armid_ros.files import finite
 from armid_ros.identification.assess.grade import by_error
-import numpy as np
 
 
 @dataclass(frozen=True)
@@ -72,17 +71,15 @@ def known_fit(document: Mapping[str, Any]) -> KnownFit | None:
         reason = _worst(errors, overall, f'{known.data} data')
         grade = by_error(max(errors.values(), default=overall))
         return KnownFit(grade, reason, known.rms, errors, as_diagnosed=True)
-    scores = document.get('validation') or [document.get('training')]
-    if not scores[0]:
+    training = document.get('training')
+    if not training:
         return None
-    held_out = bool(document.get('validation'))
-    rms, errors = (_pooled(scores, key) for key in ('rms', 'joint_relative_error_percent'))
-    count = len(scores) if held_out else len(scores[0].get('bags', ()))
-    overall = max(finite(one['relative_error_percent'], 'an error') for one in scores)
-    data = 'held out' if held_out else 'that it was fitted to'
-    reasons = document.get('reasons') or [_worst(errors, overall, f'data {data}')]
+    rms, errors = (_by_joint(training, key) for key in ('rms', 'joint_relative_error_percent'))
+    overall = finite(training['relative_error_percent'], 'an error')
+    reasons = document.get('reasons') or [_worst(errors, overall, 'data that it was fitted to')]
     grade = document.get('grade', by_error(max(errors.values(), default=overall)))
-    return KnownFit(str(grade), str(reasons[0]), rms, errors, max(count, 1))
+    count = max(len(training.get('bags', ())), 1)
+    return KnownFit(str(grade), str(reasons[0]), rms, errors, count)
 
 
 def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
@@ -94,14 +91,11 @@ def _worst(errors: Mapping[str, float], overall: float, data: str) -> str:
     return f'Torque error on {data}: {errors[joint]:.3g} %{where}.'
 
 
-def _pooled(scores: Sequence[Mapping[str, Any]], key: str) -> dict[str, float]:
-    """Return the root mean square over recordings of what each says of its joints."""
-    rows = [one.get(key) or {} for one in scores]
-    shared = [str(joint) for joint in rows[0] if all(joint in row for row in rows)]
-    pooled = {}
-    for joint in shared:
-        values = np.array([finite(row[joint], f'{key} of {joint}') for row in rows])
-        if np.any(values < 0.0):
+def _by_joint(score: Mapping[str, Any], key: str) -> dict[str, float]:
+    """Return what a score says of each joint; empty where it says nothing."""
+    values = {}
+    for joint, value in (score.get(key) or {}).items():
+        values[str(joint)] = finite(value, f'{key} of {joint}')
+        if values[str(joint)] < 0.0:
             raise ValueError(f'{key} of {joint} is negative')
-        pooled[joint] = float(np.linalg.norm(values) / np.sqrt(len(values)))
-    return pooled
+    return values

@@ -101,7 +101,7 @@ def excitation_report(
     )
     colours = [
         ('residual', 'the arm, bluer towards its end'),
-        ('predicted', 'way of its last body in a period'),
+        ('predicted', 'path of the last body in one period'),
     ]
     if any(colour == OBSTACLE for _, colour in poses.bodies):
         colours.append(('line', ', '.join(obstacle.name for obstacle in obstacles)))

@@ -3,13 +3,16 @@
 """A fleet identified on two processes is what each arm identified alone is."""
 
 from dataclasses import replace
+from datetime import datetime, UTC
 from pathlib import Path
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
-from armid_ros.fleet.bags import find_bags
+from armid_ros.fleet.bags import DAY_NS, find_bags
 from armid_ros.fleet.kinds import document, Entry
+from armid_ros.fleet.plan import plan_fleet
 from armid_ros.fleet.store import Store
+from armid_ros.fleet.summary import prepare
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
 from armid_ros.recording import read_recording
 import duckdb
@@ -94,6 +97,16 @@ def test_results_are_read_by_duckdb_pandas_and_polars(done):
     assert len(rows) == count and {arm for arm, _ in rows} == {f'arm_000{k}' for k in range(3)}
     assert len(polars.read_parquet(pattern, hive_partitioning=True)) == count
     assert count == 9 * 24
+
+
+def test_a_bag_whose_clock_began_at_zero_is_of_the_day_in_its_path(bags, tmp_path):
+    bag = find_bags([f'{bags}/*/*'])[0]
+    job = plan_fleet([bag], URDF, str(tmp_path), SETTINGS)[bag.arm]
+    stamped, dated = (
+        prepare(replace(bag, day=day), job).summary.start_ns for day in (bag.day, '2040-05-06')
+    )
+    assert datetime.fromtimestamp(1e-9 * dated, UTC).strftime('%F') == '2040-05-06'
+    assert (dated - stamped) % DAY_NS == 0
 
 
 def test_a_run_replaces_its_own_part_and_no_other(bags, cluster, tmp_path):
