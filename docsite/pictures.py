@@ -13,8 +13,10 @@ from dataclasses import replace
 import json
 import os
 from pathlib import Path
+import subprocess
 import sys
 from tempfile import TemporaryDirectory
+import textwrap
 
 import armid_ros as ar
 from armid_ros.papers.exo.plant.gait import read_gait
@@ -25,7 +27,7 @@ import numpy as np
 from scipy import signal, stats
 
 from benchmarks.lived_scoring import reliability as bins
-from docsite.desk import FRICTION, lay_out
+from docsite.desk import FRICTION, GAIN, lay_out
 
 IMAGES = Path(__file__).parents[1] / 'docs' / 'images'
 RESULTS = Path(__file__).parents[1] / 'benchmarks' / 'results'
@@ -150,10 +152,215 @@ def reliability() -> Figure:
     return figure
 
 
+def excitation() -> Figure:
+    """Draw the planned position of each joint between its limits."""
+    plan, robot = ar.design_excitation('my_arm.urdf', duration=20.0), ar.load_robot('my_arm.urdf')
+    drawn = plan.plot()
+    for axes, low, high in zip(drawn, robot.lower, robot.upper, strict=True):
+        axes.axhspan(low, high, color=GREY, alpha=0.15)
+    return _sized(drawn)
+
+
+def recording() -> Figure:
+    """Draw the torques of a recording."""
+    return _sized(ar.read_recording('monday', 'my_arm.urdf').plot())
+
+
+def currents() -> Figure:
+    """Draw a current of the log beside the torque that it is read as."""
+    log = np.genfromtxt('log.csv', delimiter=',', names=True)
+    run = ar.read_recording('log.csv', 'my_arm.urdf', effort='amps_{}', effort_scale=GAIN)
+    figure = Figure(figsize=(WIDTH, 3.0), layout='constrained')
+    panels = figure.subplots(2, 1, sharex=True)
+    panels[0].plot(1e-3 * log['t_ms'], log['amps_2'], color=GREY)
+    panels[1].plot(run.t, run.tau[:, 1], color=BLUE)
+    panels[0].set(ylabel='amps_2 [A]', xlim=(0.0, 10.0))
+    panels[1].set(ylabel='shoulder [N m]', xlabel='time [s]')
+    return _plain(figure)
+
+
+def comparison() -> Figure:
+    """Draw the difference of each parameter in its standard deviations."""
+    found = ar.compare('monday_result', 'friday_result').core.changes
+    size = [abs(one.deviations) for one in found]
+    figure = Figure(figsize=(WIDTH, 4.2), layout='constrained')
+    axes = figure.subplots()
+    names = [f'{one.parameter.name}, {one.parameter.joint}' for one in found]
+    axes.barh(names, size, color=[ORANGE if one.changed else GREY for one in found])
+    axes.set(xscale='log', xlabel='difference in standard deviations; orange: changed')
+    axes.tick_params(axis='y', labelsize=6)
+    axes.invert_yaxis()
+    return _plain(figure)
+
+
+def bodies() -> Figure:
+    """Draw the masses of links as described, and of a fit without and with bodies."""
+    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
+    axes, robot = figure.subplots(), ar.load_robot('my_arm.urdf')
+    for place, (label, colour, masses) in enumerate(
+        (
+            ('as described', GREY, robot.rigid_parameters[::10]),
+            ('least squares', ORANGE, _masses(physical=False)),
+            ('--physical', BLUE, _masses(physical=True)),
+        )
+    ):
+        axes.bar(
+            np.arange(robot.n_joints) + 0.25 * (place - 1), masses, 0.22, color=colour, label=label
+        )
+    axes.axhline(0.0, color='black', lw=0.5)
+    axes.set(xticks=range(robot.n_joints), xticklabels=robot.links, ylabel='mass [kg]')
+    axes.legend(frameon=False)
+    return _plain(figure)
+
+
+def _masses(*, physical: bool) -> np.ndarray:
+    model = ar.identify('my_arm.urdf', 'friday', physical=physical)
+    return np.asarray(model.arm.robot.rigid_parameters[::10])
+
+
+def own_effect() -> Figure:
+    """Draw the residual of an arm with a hose over the angle, and the law that is fitted."""
+    known = ar.ArmModel.of('my_arm.urdf', effects=FRICTION)
+    run = ar.simulate(known, 'plan/excitation.yaml', torque_noise=0.05)
+    elbow = run.joints.index('elbow')
+    angle = run.q[:, elbow]
+    noise = run.tau[:, elbow] - ar.simulate(known, 'plan/excitation.yaml').tau[:, elbow]
+    figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
+    axes, grid = figure.subplots(), np.linspace(angle.min(), angle.max(), 100)
+    axes.plot(angle[::20], (1.5 * angle**3 + noise)[::20], '.', color=GREY, ms=2, label='residual')
+    axes.plot(grid, 1.5 * grid**3, color=BLUE, label='hose: 1.5 N m/rad³ q³')
+    axes.set(xlabel='angle of elbow [rad]', ylabel='torque [N m]')
+    axes.legend(frameon=False)
+    return _plain(figure)
+
+
+def payload() -> Figure:
+    """Draw the torque of a joint with a load, and its prediction without and with the load."""
+    arm = ar.load_model('monday_result/model.yaml')
+    found = ar.diagnose(arm, 'friday', baseline='monday')
+    axes = found.plot()
+    return _sized(axes)
+
+
+def learned() -> Figure:
+    """Draw the torque of a worn gear over the angle."""
+    x = np.linspace(-1.5, 2.0, 300)
+    share = (x - 0.6) / 0.2
+    figure = Figure(figsize=(WIDTH, 2.4), layout='constrained')
+    axes = figure.subplots()
+    axes.plot(x, share * np.exp(-(share**2)), color=BLUE)
+    axes.axvspan(0.2, 1.0, color=ORANGE, alpha=0.2, label='worn place')
+    axes.set(xlabel='angle of elbow [rad]', ylabel='torque [N m]')
+    axes.legend(frameon=False)
+    return _plain(figure)
+
+
+def installed() -> Figure:
+    """Draw the answer of the first command after an installation."""
+    return _terminal(
+        [
+            '$ make',
+            '$ . .venv/setup.bash',
+            '$ armid check my_arm.urdf',
+            *_answer('check', 'my_arm.urdf'),
+        ]
+    )
+
+
+def refused() -> Figure:
+    """Draw a message as it is to be searched for."""
+    command = ('inspect', 'monday', '--robot', 'bags/none.urdf')
+    return _terminal([f'$ armid {" ".join(command)}', *_answer(*command)])
+
+
+def chain() -> Figure:
+    """Draw what a description goes through from the vendor to a plan."""
+    return _boxes(
+        [
+            'arm.xacro\nwith arguments',
+            'URDF\nexpanded',
+            'meshes of\n--package',
+            'armid check',
+            'armid excite',
+        ]
+    )
+
+
+def control() -> Figure:
+    """Draw the nodes between a plan and a recording."""
+    return _boxes(
+        [
+            'excitation.yaml',
+            'excitation_\npublisher',
+            'joint_trajectory_\ncontroller',
+            '/joint_states',
+            'recorder',
+        ]
+    )
+
+
+def _boxes(texts: list[str]) -> Figure:
+    """Return texts in boxes from left to right, with arrows between them."""
+    figure = Figure(figsize=(WIDTH, 1.1), layout='constrained')
+    axes = figure.subplots()
+    for place, text in enumerate(texts):
+        style = {'boxstyle': 'round,pad=0.5', 'fc': 'white', 'ec': BLUE}
+        axes.text(place, 0.0, text, ha='center', va='center', fontsize=8, bbox=style)
+        if place:
+            axes.annotate(
+                '', (place - 0.38, 0.0), (place - 0.62, 0.0), arrowprops={'arrowstyle': '->'}
+            )
+    axes.set(xlim=(-0.5, len(texts) - 0.5), ylim=(-1.0, 1.0))
+    axes.axis('off')
+    return figure
+
+
+def _answer(*command: str) -> list[str]:
+    """Return the lines that a command prints."""
+    run = [sys.executable, '-m', 'armid_ros.cli', *command]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    lines = (done.stdout + done.stderr).rstrip().splitlines()
+    return [part for line in lines for part in textwrap.wrap(line, 105)]
+
+
+def _terminal(lines: list[str]) -> Figure:
+    """Return lines as a terminal shows them."""
+    figure = Figure(figsize=(WIDTH, 0.18 * len(lines) + 0.2), facecolor='#1f2326')
+    top = {'family': 'monospace', 'fontsize': 7.5, 'color': '#e6e6e6', 'va': 'top'}
+    figure.text(0.02, 0.95, '\n'.join(lines).replace('$', r'\$'), **top)
+    return figure
+
+
+def _plain(figure: Figure) -> Figure:
+    """Return a figure without the upper and right lines of its frames."""
+    for axes in figure.axes:
+        axes.spines[['top', 'right']].set_visible(False)
+    return figure
+
+
+def _sized(drawn: np.ndarray) -> Figure:
+    """Return the figure of axes that the package drew, as wide as a column of text."""
+    figure: Figure = drawn.flat[0].figure
+    figure.set_size_inches(WIDTH, 1.1 * drawn.size + 0.5)
+    return figure
+
+
 PICTURES = {
+    'bodies.png': bodies,
     'candidates.png': candidates,
+    'chain.png': chain,
+    'comparison.png': comparison,
+    'control.png': control,
+    'currents.png': currents,
     'deviations.png': deviations,
+    'excitation.png': excitation,
     'exo_cycle.png': exo_cycle,
+    'installed.png': installed,
+    'learned.png': learned,
+    'own_effect.png': own_effect,
+    'payload.png': payload,
+    'recording.png': recording,
+    'refused.png': refused,
     'reliability.png': reliability,
 }
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.compare import compare as run
 from armid_ros.identification.assess.comparison import Comparison
@@ -53,9 +53,7 @@ class ComparisonResult(Shown):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return all parameters as a pandas table, before and after."""
-        from pandas import DataFrame
-
-        return DataFrame(self.document()['parameters'])
+        return data_frame(self.document()['parameters'])
 
     def document(self) -> dict[str, Any]:
         """Return what comparison.json holds."""

@@ -23,7 +23,7 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
+from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -153,9 +153,7 @@ class DiagnosisResult(ShownModel):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return what was named as a pandas table, a row a parameter."""
-        from pandas import DataFrame
-
-        return DataFrame(
+        return data_frame(
             {'effect': effect['name'], 'joints': ', '.join(effect['joints']), **row}
             for effect in self.document()['effects']
             for row in effect['parameters']

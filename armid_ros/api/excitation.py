@@ -12,7 +12,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import arm_of, generator, RecordingLike, recordings_of, Rng, RobotLike
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
@@ -117,14 +117,12 @@ class ExcitationResult(Shown):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the waypoints as a pandas table: t, and q, dq, ddq of every joint."""
-        from pandas import DataFrame
-
         motion = self.motion()
         columns = {'t': motion.t}
         for k, joint in enumerate(motion.joints):
             parts = {'q': motion.q, 'dq': motion.dq, 'ddq': motion.ddq}
             columns |= {f'{name}_{joint}': values[:, k] for name, values in parts.items()}
-        return DataFrame(columns)
+        return data_frame(columns)
 
     @cached_property
     def planner(self) -> TransferPlanner:

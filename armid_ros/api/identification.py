@@ -22,7 +22,7 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
+from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
 from armid_ros.arm.export_check import torque_check
@@ -177,9 +177,7 @@ class IdentificationResult(ShownModel):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
-        from pandas import DataFrame
-
-        return DataFrame(self.document()['parameters'])
+        return data_frame(self.document()['parameters'])
 
     @cached_property
     def exports(self) -> dict[str, Exported]:
@@ -258,7 +256,7 @@ class IdentificationResult(ShownModel):
             list(zip(*columns.values(), strict=True)),
             (
                 *others,
-                *residual_trends(joints, shown).values(),
+                *residual_trends(joints, shown),
                 *(self.gains.sentences() if self.gains else ()),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),
                 f'{count}; condition number {core.condition_number:.3g}',

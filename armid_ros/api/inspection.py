@@ -20,7 +20,7 @@ from armid_ros.api.arguments import (
     topics_of,
 )
 from armid_ros.api.identification import identify
-from armid_ros.api.table import DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.files import json_text, write_file
 from armid_ros.inspection import (
     check_links,
@@ -74,9 +74,7 @@ class InspectionResult(Shown):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return ranges, speeds and efforts of the joints as a pandas table."""
-        from pandas import DataFrame
-
-        return DataFrame(self.core.joints)
+        return data_frame(self.core.joints)
 
     def document(self) -> dict[str, Any]:
         """Return what ``armid inspect --json`` prints."""
@@ -281,4 +279,8 @@ def check(
     if not read:
         return CheckResult(described, remarks, None)
     found = identify(described, read, rng=rng)
-    return CheckResult(described, remarks, check_links(found.core, found.description, found.grade))
+    fault = next(iter(found.graded.faults), '')
+    if not fault and found.grade == 'unusable':
+        fault = found.graded.reasons[0]
+    links = check_links(found.core, found.description, found.grade, fault)
+    return CheckResult(described, remarks, links)

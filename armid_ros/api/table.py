@@ -14,12 +14,14 @@ from typing import Any, TYPE_CHECKING
 from armid_ros.api.arguments import source_of
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_urdf
-from armid_ros.files import staged, write_file
+from armid_ros.errors import ArmidError
+from armid_ros.files import result_folder, staged, write_file
 from armid_ros.robots import Robot
 
 if TYPE_CHECKING:
     from armid_ros.report.page import Section
     from armid_ros.report.provenance import Provenance
+    import pandas
 
 #: Lines of a result in a terminal.
 LINES = 10
@@ -55,7 +57,9 @@ class Summary:
     def text(self) -> str:
         """Return at most ten lines of 80 columns."""
         title = textwrap.wrap(self._headline, WIDTH, max_lines=3)
-        below = [piece for line in self.lines for piece in textwrap.wrap(line, WIDTH)][:2]
+        below = [piece for line in self.lines for piece in textwrap.wrap(line, WIDTH)]
+        if len(below) > 2:
+            below = [below[0], textwrap.shorten(below[1], WIDTH - 4, placeholder='') + ' ...']
         room = LINES - len(title) - len(below) - (1 if self.heads else 0)
         rows = list(self.rows)
         if len(rows) > room:
@@ -102,6 +106,23 @@ class ResultOrigin:
 DEFAULT_ORIGIN = ResultOrigin()
 
 
+def data_frame(rows: Any) -> pandas.DataFrame:
+    """
+    Return rows as a pandas table.
+
+    Raises
+    ------
+    ArmidError
+        If pandas is not installed.
+
+    """
+    try:
+        from pandas import DataFrame
+    except ModuleNotFoundError:
+        raise ArmidError('a table needs pandas: pip install pandas') from None
+    return DataFrame(rows)
+
+
 class Shown(ABC):
     """A result that prints as its summary and is written as the commands write it."""
 
@@ -127,10 +148,19 @@ class Shown(ABC):
         """Write all files of the result into a folder that exists; return its document."""
 
     def save(self, folder: str | Path) -> Path:
-        """Write the files that the command of the same name writes, all or none."""
+        """
+        Write the files that the command of the same name writes, all or none.
+
+        Raises
+        ------
+        OutputError
+            If the folder holds results of another kind, or files that armid did not write.
+
+        """
         with staged(Path(folder)) as result:
-            self.fill(result.folder)
-            result.keep()
+            schema = str(self.fill(result.folder)['schema'])
+            with result_folder(Path(folder), schema):
+                result.keep()
         return result.out
 
     def __repr__(self) -> str:

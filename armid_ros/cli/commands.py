@@ -41,6 +41,8 @@ COMMANDS = {
 }
 
 
+#: Exit code after Ctrl-C: 128 and the number of SIGINT.
+INTERRUPTED = 130
 #: Where the context keeps what is said on stderr when the work was done: an error is one line.
 NOTES = 'armid.notes'
 
@@ -97,6 +99,9 @@ class Commands(click.Group):
         except click.exceptions.Exit:  # with a code of its own
             _tell_notes(ctx)
             raise
+        except KeyboardInterrupt:
+            click.echo('armid: interrupted', err=True)
+            sys.exit(INTERRUPTED)
         except ArmidError as error:
             click.echo(f'armid: {" ".join(str(error).split())}', err=True)
             sys.exit(2)
@@ -168,7 +173,7 @@ def main() -> None:
     """
     Identify a robot arm: excite, record, identify, and find what the model lacks.
 
-    Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 3 a result that is not to
-    be gone on with (--strict of identify and diagnose).
+    Exit codes: 0 done, 1 a defect of the program, 2 bad input or data, 3 a result not to be used
+    (--strict of identify and diagnose), 130 interrupted.
 
     """

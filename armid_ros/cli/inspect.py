@@ -110,7 +110,7 @@ def _print(found: Inspection) -> None:
     rows = [dict(zip(heads, row, strict=True)) for row in joint_rows(found)]
     for row in rows:
         del row['step']
-    print_rows(rows, as_json=False, right=heads[1:], spare=('moving', heads[3]))
+    print_rows(rows, as_json=False, right=heads[1:], spare=('moving', *heads[6:7], *heads[3:0:-1]))
     _print_remarks(found.remarks)
     say(wrapped(found.verdict))
 
@@ -121,7 +121,7 @@ def _print_remarks(remarks: Sequence[Remark]) -> None:
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
-@click.argument('robot_source', metavar='R')
+@parameters.robot_argument
 @click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     '--out',
@@ -151,6 +151,8 @@ def check(
     """
     Check a URDF: alone, or against recordings.
 
+    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name.
+
     Without a recording: impossible inertias, densities of links with shapes, units of limits. With
     one: mass and centre of each link as described and as measured.
 
@@ -174,13 +176,15 @@ def check(
     if as_json:
         click.echo(json_text(found.document()))
     else:
-        for sentence in headline(found.remarks, found.links):
-            say(wrapped(sentence))
+        first, *others = headline(found.remarks, found.links)
+        say(wrapped(first))
         rows = () if found.links is None else link_rows(found.links)
         if rows:
             shown = [dict(zip(HEADS, row, strict=True)) for row in rows]
             print_rows(shown, as_json=False, right=HEADS[1:], spare=HEADS[:2:-1])
         _print_remarks(found.remarks)
+        for sentence in others:
+            say(wrapped(sentence))
         if out is not None:
             say(f'{out}: report.html, check.json')
     if strict and found.wrong:

@@ -120,6 +120,26 @@ seed = click.option(
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
 
+_packages = click.option(
+    '--package',
+    multiple=True,
+    metavar='P=FOLDER',
+    is_eager=True,
+    expose_value=False,
+    callback=lambda context, _, values: context.meta.update({PACKAGES: values}),
+    help='Folder of a ROS package that the description refers to; may be given several times.',
+)
+
+
+def _described(context: click.Context, _: click.Parameter, source: str | None) -> str | None:
+    return _with_packages(source, context.meta.get(PACKAGES, []))
+
+
+def robot_argument(command: _Command) -> _Command:
+    """Add a description as the first argument, and --package for it."""
+    return click.argument('robot_source', metavar='R', callback=_described)(_packages(command))
+
+
 def robot_described(**values: Any) -> Callable[[_Command], _Command]:
     """Add --robot, with what differs from any other option, and --package for its description."""
     source = click.option(
@@ -127,19 +147,10 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         'robot_source',
         metavar='R',
         shell_complete=_completed(_robots),
-        callback=lambda context, _, value: _with_packages(value, context.meta.get(PACKAGES, [])),
+        callback=_described,
         **values,
     )
-    packages = click.option(
-        '--package',
-        multiple=True,
-        metavar='P=FOLDER',
-        is_eager=True,
-        expose_value=False,
-        callback=lambda context, _, values: context.meta.update({PACKAGES: values}),
-        help='Folder of a ROS package that the description refers to; may be given several times.',
-    )
-    return lambda command: source(packages(command))
+    return lambda command: source(_packages(command))
 
 
 def _with_packages(source: str | None, packages: Sequence[str]) -> str | None:

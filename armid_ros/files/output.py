@@ -171,12 +171,18 @@ def _refuse_other_results(path: Path, schema: str, robot: str) -> None:
         except OutputError:
             kind, other = f'{name}, which cannot be read', ''
         if kind != schema:
-            raise OutputError(f'{path}: holds {kind}, not {schema}; {_HINT}')
+            raise OutputError(f'{path}: holds {_in_words(kind)}, not {_in_words(schema)}; {_HINT}')
         if robot and other and not _same(robot, other):
             raise OutputError(f'{path}: holds {kind} of {other}, not of {robot}; {_HINT}')
     alone = not any(os.path.lexists(path / name) for name in DOCUMENTS)
     if alone and schema in _WITH_MODEL and os.path.lexists(path / _MODEL):
         _refuse_other_model(path, robot)
+
+
+def _in_words(schema: str) -> str:
+    """Return the kind of result that a schema such as 'armid/comparison/1' stands for."""
+    parts = schema.split('/')
+    return f'results of kind {parts[1]}' if len(parts) == 3 else schema
 
 
 def _refuse_other_model(path: Path, robot: str) -> None:

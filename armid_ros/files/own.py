@@ -45,7 +45,7 @@ _WRITES = {
         'trajectory',
     ),
     'armid/comparison/1': ('comparison.json', 'report.html'),
-    'armid/inspection/1': ('inspection.html',),
+    'armid/inspection/1': ('inspection.html', 'inspection.json'),
     'armid/check/1': ('check.json', 'report.html'),
     'armid/elastic/1': ('elastic.json', 'report.html', 'resonances', 'steps'),
     'armid/springs/1': ('elastic.json', 'report.html'),

@@ -40,6 +40,8 @@ from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import Markup
 import numpy as np
 
+#: Characters of the names of arms that the first sentence lists.
+_LISTED = 60
 #: Parameters that have a column of curves in the overview.
 _COLUMNS = 9
 #: Refused bags that the overview lists.
@@ -114,10 +116,11 @@ def _arm_page(found: Watch, arm: WatchedArm, reports: set[str], diagnoses: Diagn
             f'{name} is {abs(distance):.1f} deviations of the fleet '
             f'{"above" if distance > 0 else "below"} that of its siblings'
         )
-    sections: list[Section] = [
-        VerdictSection(arm.health, tone, [f'{first[0].upper()}{first[1:]}'], beware)
-    ]
     diagnosis = diagnoses.get(arm.arm)
+    step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'
+    sections: list[Section] = [
+        VerdictSection(arm.health, tone, [f'{first[0].upper()}{first[1:]}'], beware, step=step)
+    ]
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
         cells = link(report, diagnosis['verdict'].replace('_', ' ')), diagnosis['summary']
@@ -153,9 +156,9 @@ def _verdict(found: Watch) -> VerdictSection:
     sentences = [f'None of {counted(len(found.arms), "arm")} changed.']
     if ill:
         sentences = [
-            f'{counted(ill, "arm")} of {len(found.arms)} changed: {counts["changed"]} from one '
-            f'bag to the next, {counts["wearing"]} little by little.',
-            f'False discovery rate: {100.0 * found.alpha:g} % of the named arms.',
+            f'{counted(ill, "arm")} of {len(found.arms)} changed: {counts["changed"]} '
+            f'suddenly, {counts["wearing"]} gradually.',
+            f'At most {100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
         ]
     beware = []
     if counts['too few bags']:
@@ -164,7 +167,9 @@ def _verdict(found: Watch) -> VerdictSection:
     if refused:
         beware.append(f'{counted(refused, "bag")} refused')
     grade, tone = ('changes', 'fair') if ill else ('quiet', 'good')
-    return VerdictSection(grade, tone, sentences, beware)
+    named = ', '.join(arm.arm for arm in found.arms if arm.named)
+    step = f'open the page of {named}.' if ill and len(named) < _LISTED else ''
+    return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
 def _arm_row(

@@ -66,6 +66,10 @@ class LinkCheck:
         Torque error with the described links and with fitted ones; friction fitted in both.
     grade : str
         Of the identification: good, poor or unusable.
+    fault : str
+        Why the recording cannot check the links; empty where it can.
+    rivals : tuple of int
+        Links that explain as much in place of a single wrong one.
 
     """
 
@@ -83,6 +87,8 @@ class LinkCheck:
     error_percent: float
     fitted_error_percent: float
     grade: str
+    fault: str
+    rivals: tuple[int, ...]
 
     @property
     def agrees(self) -> bool:
@@ -141,7 +147,7 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
     yield from (Remark('note', text) for text in missing.values())
 
 
-def check_links(found: Identification, described: ArmModel, grade: str) -> LinkCheck:
+def check_links(found: Identification, described: ArmModel, grade: str, fault: str) -> LinkCheck:
     """
     Find which links of a description explain what an identification found.
 
@@ -151,8 +157,8 @@ def check_links(found: Identification, described: ArmModel, grade: str) -> LinkC
         Not constrained to physical consistency, so that its covariance is that of the data.
     described : ArmModel
         The description, with the effects of the identification.
-    grade : str
-        Of the identification.
+    grade, fault : str
+        Of the identification, and what the recording shows to be wrong.
 
     """
     robot, size = described.robot, len(LINK_PARAMETERS)
@@ -171,6 +177,8 @@ def check_links(found: Identification, described: ArmModel, grade: str) -> LinkC
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
     covariance = covariance * max(1.0, rest / freedom)  # Birge ratio: what no link explains
     alone = [_fit(rows, spread, [k])[2] for k in range(robot.n_joints)]
+    # of two links that move alike each explains the difference alone
+    most = max(rest / _FURTHER, _REMAINS * len(rows)) if len(wrong) == 1 else 0.0
     body = robot.rigid_parameters.reshape(-1, size)[:, :4]
     measured, std = np.full((2, robot.n_joints, 4), np.nan)
     for position, k in enumerate(wrong):
@@ -197,6 +205,8 @@ def check_links(found: Identification, described: ArmModel, grade: str) -> LinkC
         error_percent=error,
         fitted_error_percent=fitted_error,
         grade=grade,
+        fault=fault,
+        rivals=tuple(k for k, left in enumerate(alone) if left < most and wrong not in ([k], [])),
     )
 
 

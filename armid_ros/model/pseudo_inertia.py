@@ -154,5 +154,5 @@ def require_consistent(links: tuple[str, ...], parameters: npt.ArrayLike) -> Non
             raise ModelError(
                 f"link '{link}': no body has these inertial parameters (mass {found.mass:.4g} kg, "
                 f'smallest eigenvalue of the pseudo-inertia {found.eigenvalues[0]:.3g}); '
-                'identify with physical consistency'
+                'use identify(..., physical=True) or armid identify --physical'
             )

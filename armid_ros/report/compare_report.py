@@ -17,7 +17,7 @@ from armid_ros.identification.fitting.identifiability import excludes_zero, HALF
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.report.blocks import ContentSection, FactList
 from armid_ros.report.families import full_label
-from armid_ros.report.notation import counted, measured, pretty, robot_label
+from armid_ros.report.notation import counted, digits, measured, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
@@ -161,19 +161,19 @@ def _residual(change: ResidualChange, comparison: Comparison) -> str:
     times = change.ratio if change.ratio > 1.0 else 1.0 / change.ratio if change.ratio else inf
     said = ''
     if errors[0] is not None and errors[1] is not None:
-        said = f' ({errors[0]:.2g} % of it before, {errors[1]:.2g} % after)'
+        said = f' ({digits(errors[0])} and {digits(errors[1])} % of the torque)'
     return (
-        f'{change.joint}: the residual of the {ranks[0]} model is {times:.2g} times that of the '
-        f'{ranks[1]}{said}; {_why_left(comparison)}.'
+        f'{change.joint}: the residual of the {ranks[0]} model is {digits(times)} times that of '
+        f'the {ranks[1]}{said}. {_why_left(comparison)}.'
     )
 
 
 def _why_left(comparison: Comparison) -> str:
     """Say what a residual that differs may come from."""
     if any(one.why == 'effect' for one in comparison.not_compared):
-        return 'the models have different effects, which may be the reason'
-    ask = '' if comparison.unusable else '; armid diagnose finds what does'
-    return f'no parameter of either explains that{ask}'
+        return 'The models have different effects, which may be the reason'
+    ask = '' if comparison.unusable else ': run armid diagnose'
+    return f'No parameter of either explains that{ask}'
 
 
 def _load(comparison: Comparison) -> str:

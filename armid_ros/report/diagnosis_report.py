@@ -148,7 +148,8 @@ def diagnosis_report(
     recordings = [(one, role) for role, several in read.items() for one in several]
     names = short_names([one.source for one, _ in recordings])
     residual, patched = extras.residual, bool(diagnosis.findings)
-    sections: list[Section] = [_verdict(diagnosis, names, extras.worse)]
+    steps = [*map(printed, extras.steps(diagnosis)), *_of_maps(residual)]
+    sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
     if diagnosis.gap is not None:
         sections += [
             Story(diagnosis, residual),
@@ -161,9 +162,7 @@ def diagnosis_report(
             sections.append(evidence_section(diagnosis.where, share_of(diagnosis)))
     if residual is not None:
         sections.append(residual_map_section(residual))
-    sections.append(
-        next_steps_section([*map(printed, extras.steps(diagnosis)), *_of_maps(residual)])
-    )
+    sections.append(next_steps_section(steps))
     if diagnosis.minor:
         sections.append(minor_section(diagnosis.minor, everything, patched))
     if diagnosis.gap is not None:
@@ -206,7 +205,7 @@ def _at_fault(
 
 
 def _verdict(
-    diagnosis: Diagnosis, names: Mapping[str, str], worse: Sequence[str]
+    diagnosis: Diagnosis, names: Mapping[str, str], worse: Sequence[str], step: str
 ) -> VerdictSection:
     tone = tone_of(diagnosis, worse)
     notes = [with_names(note, names) for note in diagnosis.notes]
@@ -217,7 +216,7 @@ def _verdict(
         )
     summary = printed(with_names(diagnosis.summary, names))
     badge = 'cause found' if diagnosis.verdict == 'named' else diagnosis.verdict.replace('_', ' ')
-    return VerdictSection(badge, tone, [summary], notes)
+    return VerdictSection(badge, tone, [summary], notes, step=with_names(step, names))
 
 
 def _of_maps(residual: Residual | None) -> list[str]:

@@ -196,11 +196,12 @@ def _kept(shares: Mapping[str, FloatArray], limits: Limits, checked: Fitness) ->
             f'. The smallest clearance is {100.0 * nearest.distance:.1f} cm, between '
             f'{nearest.first} and {nearest.second} at {nearest.time:.1f} s'
         )
-    if checked.lowest.link:
+    near = () if nearest is None else (nearest.first, nearest.second)
+    if checked.lowest.link and 'floor' not in near:
         text += f'; {checked.height()} at {checked.lowest.time:.1f} s'
     if checked.unchecked:
         missing = '; '.join(checked.unchecked)
-        text += f'. It is fit to run only if you confirm what was not checked: {missing}'
+        text += f'. Before the run, check yourself what was not checked: {missing}'
     return f'{text}.'
 
 

@@ -89,8 +89,8 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         f'Torque error: {digits(found.error_percent)} % with the links of the URDF, '
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
-    if found.grade == 'unusable':
-        first = 'The recording cannot check the links: no model fits it.'
+    if found.fault:
+        first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
     elif found.agrees:
         first = 'The links of the URDF agree with the recording.'
     elif found.explained < _MOSTLY:
@@ -100,7 +100,8 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         others = [found.joints[k] for k in found.wrong if not _wrong_mass(found, k)]
         if others:
             known.append(f'has a wrong mass distribution at {" and ".join(others)}')
-        first = f'The URDF {" and ".join(known)}, if the other links are right.'
+        rivals = ''.join(f' or {found.joints[k]}' for k in found.rivals)
+        first = f'The URDF {" and ".join(known)}{rivals}, if the other links are right.'
     return first, errors, values
 
 
@@ -118,7 +119,7 @@ def link_rows(found: LinkCheck) -> list[tuple[str, ...]]:
     """Return a row for every link, as `HEADS` has the columns."""
     return [
         (
-            link,
+            f'{link} ({found.joints[k]})',
             f'{found.mass[k]:.4g}',
             _interval(found.measured_mass[k : k + 1], found.mass_std[k : k + 1]),
             '-'

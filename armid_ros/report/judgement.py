@@ -21,7 +21,8 @@ _OVERFIT = 1.3
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
-#: Parameters that a sentence names.
+#: Joints that a sentence names; more are counted.
+_LISTED = 3
 #: Share of a joint's residual that one variable explains, from which there is something to find.
 TELLING_SHARE = 0.15
 #: Share of the lags outside their 99 % band from which a residual is far from white.
@@ -155,8 +156,9 @@ def _error_findings(
             findings.append(
                 Caution(
                     f'The held-out error is {digits(ratio)} times the training error: the model '
-                    'overfits, or the held-out motion leaves the range of the training data.',
-                    'Train on more recordings, and on the range of poses and speeds that matters.',
+                    'overfits, the held-out motion leaves its range, or the arm has changed.',
+                    'Train on more recordings, over all poses and speeds that matter. If the arm '
+                    'may have changed, run armid diagnose.',
                 )
             )
     errors = (held_out or training).joint_relative_error_percent
@@ -173,34 +175,29 @@ def _error_findings(
     return findings
 
 
-def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> dict[str, str]:
-    """Return a sentence for each joint whose residual depends on speed, position or load."""
-    sentences = {}
+def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ...]:
+    """Return a sentence on joints whose residual depends on speed, position or load; or none."""
+    depends: dict[str, list[str]] = {}
     for joint, name in enumerate(joints):
-        shares = explained_shares(fits, joint)
-        telling = [
-            key for key in sorted(shares, key=lambda k: -shares[k]) if shares[key] > TELLING_SHARE
-        ]
-        if telling:
-            parts = ', '.join(f'{key} ({100.0 * shares[key]:.0f} %)' for key in telling)
-            sentences[name] = (
-                f'{name}: the residual depends on {parts}; the model lacks an effect.'
-            )
-    return sentences
+        for key, share in explained_shares(fits, joint).items():
+            if share > TELLING_SHARE:
+                depends.setdefault(key, []).append(name)
+    parts = [
+        f'{key} ({", ".join(names) if len(names) <= _LISTED else f"{len(names)} joints"})'
+        for key, names in depends.items()
+    ]
+    said = f'The residual depends on {", ".join(parts)}: the model lacks an effect.'
+    return (said,) if parts else ()
 
 
 def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
     findings = []
     coloured = []
-    trends = residual_trends(result.arm.robot.joints, fits)
-    for joint, name in enumerate(result.arm.robot.joints):
-        if name in trends:
-            findings.append(
-                Caution(
-                    trends[name],
-                    'Run armid diagnose to find the missing effect, and add it with --effects.',
-                )
-            )
+    joints = result.arm.robot.joints
+    for sentence in residual_trends(joints, fits):
+        step = 'Run armid diagnose to find the missing effect, and add it with --effects.'
+        findings.append(Caution(sentence, step))
+    for joint, name in enumerate(joints):
         if Whiteness.of(fits, joint).outside > COLOURED_SHARE:
             coloured.append(name)
     if coloured:
@@ -221,8 +218,8 @@ def _excitation_findings(result: Identification) -> list[Caution]:
     if lost:
         findings.append(
             Caution(
-                f'{lost} of {len(known)} parameters have intervals that include zero. Use the '
-                'model for torques, not for these single values.'
+                f'{lost} of {len(known)} parameters are not distinguishable from zero: do not use '
+                'their single values.'
             )
         )
     if result.condition_number > WEAK_CONDITION:

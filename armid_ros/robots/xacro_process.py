@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import json
 import os
 from pathlib import Path
+import re
 import resource
 import runpy
 import signal
@@ -49,6 +50,9 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
         _find_packages(xacro, request, missing)
         document = xacro.process_file(request['path'], mappings=dict(request['arguments']))
         text = str(document.toxml())
+        unknown = _unknown(xacro, request)
+        if unknown:
+            return {'error': unknown}
         answer['text'] = text.replace(f'file://{NOWHERE}', 'package://')
         answer['text'] = answer['text'].replace(NOWHERE, 'package://')
         if len(text) > request['characters']:
@@ -114,9 +118,11 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
     cause = error.exc if isinstance(error, xacro.XacroException) else None
     if isinstance(cause, xacro.substitution_args.ArgException):
         name = str(cause)
+        known = {name: 'no default'} | _declared(xacro, request['path'])
+        listed = ', '.join(f'{one} ({how})' for one, how in known.items())
         return (
             f"{_place(xacro)} uses the argument '{name}', which is not given; the arguments "
-            f'are {_arguments(xacro, request["path"], name)}; write '
+            f'are {listed}; write '
             f"--robot '{request['path']} {name}:=VALUE'"
         )
     if missing:
@@ -127,15 +133,28 @@ def _reason(error: Exception, request: dict[str, Any], missing: dict[str, str]) 
     return text if place == request['path'] else f'{place}: {text}'
 
 
+def _unknown(xacro: Any, request: dict[str, Any]) -> str:
+    """Name an argument that no file declares or uses; '' where there is none."""
+    declared = _declared(xacro, request['path'])
+    files = [Path(file) for file in (request['path'], *xacro.all_includes)]
+    texts = [file.read_text('utf-8', 'replace') for file in files if file.is_file()]
+    for name in request['arguments']:
+        used = re.compile(rf'\$\(arg\s+{re.escape(name)}\s*\)')
+        if name not in declared and not any(used.search(text) for text in texts):
+            known = ', '.join(f'{one} ({how})' for one, how in declared.items()) or 'none'
+            return f"it has no argument '{name}'; the arguments are {known}"
+    return ''
+
+
 def _place(xacro: Any) -> str:
     """Return the file that is expanded: that of the macro, if one is."""
     macros, files = xacro.macrostack, xacro.filestack
     return str(macros[-1].history[-1][-1] if macros else files[-1])
 
 
-def _arguments(xacro: Any, path: str, missing: str) -> str:
-    """Return the arguments that the files declare, with their defaults."""
-    known = {missing: 'no default'}
+def _declared(xacro: Any, path: str) -> dict[str, str]:
+    """Return the arguments that the files declare, with their defaults in words."""
+    known: dict[str, str] = {}
     for file in (path, *xacro.all_includes):
         try:
             elements = xacro.parse(None, file).getElementsByTagName('xacro:arg')
@@ -146,7 +165,7 @@ def _arguments(xacro: Any, path: str, missing: str) -> str:
             known[element.getAttribute('name')] = (
                 'no default' if default is None else f"default '{default}'"
             )
-    return ', '.join(f'{name} ({default})' for name, default in known.items())
+    return known
 
 
 if __name__ == '__main__':

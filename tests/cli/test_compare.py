@@ -104,7 +104,7 @@ def test_what_a_model_leaves_is_a_change_where_no_parameter_is(tmp_path):
     first = identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0))
     second = identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0))
     result = armid('compare', first, second, '--out', tmp_path / 'out')
-    for fact in ('of 2 parameters', 'elbow: ', '30 times', '30 % after', 'armid diagnose'):
+    for fact in ('of 2 parameters', 'elbow: ', '30 times', '30 %', 'armid diagnose'):
         assert fact in result.output
     page = (tmp_path / 'out' / 'report.html').read_text()
     assert 'class="verdict fair"' in page and '>changed<' in page

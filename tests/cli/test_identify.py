@@ -226,7 +226,7 @@ def test_a_run_that_fails_leaves_the_result_that_was_there(bags, physical, tmp_p
     """Model, numbers and page of a folder are those of one run."""
     out = shutil.copytree(physical, tmp_path / 'out')
     before = {path.name: path.read_bytes() for path in out.iterdir()}
-    for code, end in ((2, OutputError('the disk is full')), (1, KeyboardInterrupt())):
+    for code, end in ((2, OutputError('the disk is full')), (130, KeyboardInterrupt())):
         with monkeypatch.context() as patch:
             fails = Mock(side_effect=end)
             patch.setattr('armid_ros.api.identification.write_document', fails)

@@ -18,7 +18,7 @@ from armid_ros.excitation import (
     Obstacle,
     with_obstacles,
 )
-from armid_ros.excitation.fitness import FIT
+from armid_ros.excitation.fitness import PARTLY
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
 from armid_ros.robots import collision_model, load_robot, robot_from_urdf
 import numpy as np
@@ -94,7 +94,7 @@ def test_clearance_is_that_of_links_and_that_of_the_environment(case, plan, html
 def test_every_parameter_is_listed_with_its_deviation(planned, html):
     for name in planned.information.parameters:
         assert name.name in html or name.joint in html
-    assert FIT in html
+    assert PARTLY in html
     assert 'table &lt;b&gt;' in html and '<b>' not in html
 
 

@@ -290,6 +290,8 @@ def excite(
             break
     if missing:
         click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
+    if result.core.stopped == INTERRUPTED:
+        raise KeyboardInterrupt
 
 
 def _shown(

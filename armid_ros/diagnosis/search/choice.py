@@ -57,10 +57,12 @@ _AS_EXACT = (
 )
 #: What would tell a change from a misfit, where there are no or too few recordings.
 _NO_BASELINE = (
-    'It may be the model error of this motion. Recordings from before (--baseline) exclude that.'
+    'Without a baseline, an error of the model in this motion is not excluded: give recordings '
+    'from before (--baseline).'
 )
 _ONE_EACH = (
-    'It may be the model error of this motion. Record more than one motion a day to exclude that.'
+    'With one motion a day, an error of the model in this motion is not excluded: record a second '
+    'motion.'
 )
 
 

@@ -142,8 +142,10 @@ def decide(
         return Verdict('partial', f'{said}{tied} There is more: {rest}.')
     if tied:
         return Verdict('ambiguous', f'{said}{tied}')
-    remains = floor_in_words if hides is None else 'as large as before the change'
-    return Verdict('named', f'{refit}{said} The remaining error is {remains}.')
+    rest = 'With it the error is back at its level before the change.'
+    if hides is None:
+        rest = f'The remaining error is {floor_in_words}.'
+    return Verdict('named', f'{refit}{said} {rest}')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:

@@ -13,7 +13,6 @@ import os
 import pickle
 import signal
 import sys
-import threading
 import time
 from types import ModuleType
 
@@ -228,13 +227,11 @@ def _undisturbed_children() -> Iterator[None]:
     """Have processes that start in the meantime find `_OF_CHILDREN`, and leave Ctrl-C to us."""
     before = {name: os.environ.get(name) for name in _OF_CHILDREN}
     os.environ.update(dict.fromkeys(_OF_CHILDREN, '1'))
-    ours = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if ours else None
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # it waits until then
     try:
         yield
     finally:
-        if handler is not None:
-            signal.signal(signal.SIGINT, handler)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
         for name, value in before.items():
             if value is None:
                 del os.environ[name]

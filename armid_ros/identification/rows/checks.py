@@ -204,9 +204,8 @@ def _refuse_laws(robot: Robot, problem: Sequence[Regression]) -> None:
 def wrong_sign(joints: Sequence[str]) -> str:
     """Say what is wrong with the torque of joints that friction seems to drive."""
     return (
-        f'the torque of {", ".join(joints)} is friction that drives, as only the opposite sign '
-        'shows, or somebody who moves the arm; effort has to be positive along the URDF joint '
-        'axis: negate it'
+        f'the torque of {", ".join(joints)} has the opposite sign of friction: negate it, as '
+        'effort has to be positive along the URDF joint axis; or somebody moved the arm'
     )
 
 

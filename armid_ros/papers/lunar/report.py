@@ -40,7 +40,9 @@ def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -
         Origin(provenance or Provenance()),
     ]
     subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper compared with its repeat'
-    return Page('The lunar paper', subtitle, sections).html()
+    return Page(
+        'Torques of a humanoid arm on the moon, as in the paper', subtitle, sections
+    ).html()
 
 
 def sentences(found: Reproduction) -> tuple[str, ...]:
@@ -51,24 +53,24 @@ def sentences(found: Reproduction) -> tuple[str, ...]:
         if one.table.uniform:
             low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
             lines.append(
-                f'Table {one.table.number}, {one.table.title}: the error over noise is at most '
-                f'{digits(float(slow.max()))} by the weight alone, '
+                f'Table {one.table.number}, {one.table.title}: the error over the noise is at '
+                f'most {digits(float(slow.max()))} with gravity alone and '
                 f'{digits(float(whole.max()))} with the whole dynamics. The paper has '
-                f'{low} to {high}: less is better.'
+                f'{low} to {high}; less is better.'
             )
             continue
         noisy = one.ratio(one.methods[0].noisy)
         paper = 100.0 * float(np.mean(one.table.ratio))
         lines.append(
-            f'Table {one.table.number}, {one.table.title}: the error of the peak torque is '
-            f'{digits(100.0 * float(noisy.mean()))} %; the paper has {paper:.2f} %'
+            f'The mean torque error of Table {one.table.number}, {one.table.title}, is '
+            f'{digits(100.0 * float(noisy.mean()))} % of the peak; the paper has {paper:.2f} %'
             + (f' ({STATED_ERROR:g} % in its abstract).' if one.table.number == 3 else '.')
-            + f' Without noise it is {digits(100.0 * float(slow.mean()))} % by the weight alone '
-            f'and {digits(100.0 * float(whole.mean()))} % with the whole dynamics.'
+            + f' Against the torque without noise it is {digits(100.0 * float(slow.mean()))} % '
+            f'with gravity alone, {digits(100.0 * float(whole.mean()))} % with the whole dynamics.'
         )
     lines.append(
-        f'{len(found.composites)} gravity parameters; a load of {_load(found)} is found where '
-        f'{LOAD:g} kg is.'
+        f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
+        f'hand; {LOAD:g} kg was simulated.'
     )
     return tuple(lines)
 

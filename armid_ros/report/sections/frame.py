@@ -31,6 +31,8 @@ class VerdictSection(Section):
         What not to overlook.
     bars : BarChart or None
         The number of the verdict for each joint.
+    step : str
+        What to do next; empty for nothing.
 
     """
 
@@ -42,6 +44,7 @@ class VerdictSection(Section):
     sentences: Sequence[str]
     beware: Sequence[str] = ()
     bars: BarChart | None = None
+    step: str = ''
 
 
 def next_steps_section(steps: Sequence[str]) -> ContentSection:

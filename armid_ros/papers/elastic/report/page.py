@@ -84,8 +84,8 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
     else:
         before, after = result.tuning.rms
         sentences.append(
-            f'Of the step responses {digits(before)} rad/s rms was unexplained before tuning and '
-            f'{digits(after)} rad/s is after it, noise included.'
+            f'The error of the step responses fell from {digits(before)} to {digits(after)} rad/s '
+            'rms by tuning, noise included.'
         )
         beware.append(
             'Viscous friction of link and motor are known as a sum; their shares are not.'

@@ -125,7 +125,7 @@ def exo_report(
     if assumptions:
         sections.append(Assumptions(assumptions))
     sections.append(Origin(provenance or Provenance()))
-    title = f'{pair.robot.name} on {pair.other.name}'
+    title = 'Springs between an exoskeleton and its wearer'
     return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
 
 
@@ -133,7 +133,11 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk) -> VerdictSect
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
-    sentences = [f'The springs between the two have {k:.0f} ± {reach:.0f} N/m (95 %).']
+    true = set(walked.truth.values())
+    truth = f'; {true.pop():.0f} N/m was simulated' if len(true) == 1 else ''
+    sentences = [
+        f'The straps between exoskeleton and wearer have {k:.0f} ± {reach:.0f} N/m{truth}.'
+    ]
     weak = [
         name.replace('_', ' ')
         for part in found[1:]
@@ -143,13 +147,11 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk) -> VerdictSect
     if walked.gait is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.1e}°' for d in walked.gait.driven)
         sentences.append(
-            f'Driven by their torques, joints follow the gait in single support: {each} at most.'
+            f'On one foot, joints driven by the computed torque are off by at most: {each}.'
         )
     if walked.whole is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.whole.driven)
-        sentences.append(
-            f'Over a whole cycle of walking, on either foot and on both: {each} at most.'
-        )
+        sentences.append(f'Over a whole walking cycle, they are off by at most: {each}.')
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)
