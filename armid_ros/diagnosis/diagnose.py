@@ -186,7 +186,7 @@ def _within(
     settings, look = asked.settings, chosen.look
     if not settings.spans or look is None or not _hardly_explained(result, settings):
         return None
-    spans = acting_spans(look, chosen.usual, settings.thresholds)
+    spans = acting_spans(look, settings.thresholds)
     cut = [_cut(*each) for each in zip(spans, [*recordings, *asked.validate], strict=False)]
     shorter, unseen = (
         [one for one in part if one is not None]

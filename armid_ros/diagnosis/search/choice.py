@@ -172,13 +172,12 @@ class Explainer:
         evidence = Evidence(prepared.data, sigma, noise, baseline.varies)
         self.tell(0.2, 'what has changed')
         result = self.comparison(self._of_both_days(baseline, misfit, sigma), None).found()
-        found = self._changes(result, evidence, result.usual)
+        found = self._changes(result, evidence, result.first.usual)
         first = count_recordings(baseline.data)
         second = count_recordings(prepared.data) + count_recordings(self.unseen)
         untested = _ONE_EACH if found.steps and first == second == 1 else ''
         notes = (untested,) if untested else ()
-        own = result.first, result.usual
-        return Chosen(found, misfit, OWN_MISFIT, notes, untested, *own)
+        return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
         """Explain what has changed in a model that stays as given."""

@@ -21,7 +21,6 @@ from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.nuisance import Nuisance
 from armid_ros.diagnosis.search.odds import (
     allowed,
-    CauseFit,
     IMPOSSIBLE,
     odds,
     OWN_SPREADS,
@@ -29,6 +28,7 @@ from armid_ros.diagnosis.search.odds import (
 )
 from armid_ros.diagnosis.search.priors import UNLISTED
 from armid_ros.diagnosis.search.setting import LASTING, Marginal, Setting
+from armid_ros.diagnosis.search.trial import Look, Ranked
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -46,87 +46,6 @@ _FACTORS = ((1.0, 0.0), (1.3, -1.0), (2.0, -3.0), (4.0, -5.0))
 _REFINED, _COMPARED, _MOST = 5, 14, 5
 #: Of how many causes one is used for the usual spread.
 _SAMPLED = 8
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """
-    A cause that was compared.
-
-    Attributes
-    ----------
-    cause : Cause
-        The cause, in its best shape.
-    fit : CauseFit
-        Its values.
-    data : float
-        Log Bayes factor of the torque that it explains.
-    odds : float
-        Log odds that it is there, or has changed.
-    under : Marginal
-        What it was compared with, under its likeliest setting.
-    probability : float
-        Among all explanations.
-
-    """
-
-    cause: Cause
-    fit: CauseFit
-    data: float
-    odds: float
-    under: Marginal
-    probability: float = 0.0
-
-    @property
-    def worth(self) -> float:
-        """Log posterior probability, but for a constant."""
-        return self.data + self.cause.prior
-
-    @property
-    def left(self) -> float:
-        """Half of the weighted squares that it leaves."""
-        return self.under.loss - self.fit.explained
-
-    def ahead(self, other: Ranked, levels: Thresholds) -> float:
-        """
-        Return the log odds to another cause.
-
-        A lead of a share of what is explained is none, as laws are inexact, unless one leaves so
-        little that the other is no fit then. Then what freedom costs and what is commoner
-        decide.
-
-        """
-        lead = self.fit.explained - other.fit.explained
-        slack = min(
-            levels.inexact * max(self.fit.explained, other.fit.explained),
-            (levels.same_fit - 1.0) * max(min(self.left, other.left), 0.0),
-        )
-        seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
-        return seen + (self.worth - self.fit.explained) - (other.worth - other.fit.explained)
-
-
-@dataclass(frozen=True)
-class Look:
-    """
-    A look at all causes.
-
-    Attributes
-    ----------
-    ranking : tuple of Ranked
-        The best causes in their best shape, the likeliest first.
-    others : tuple of Cause
-        All other causes in the best shape of those that a search starts from.
-    nuisance : Nuisance
-        What they were compared with.
-    under : Marginal
-        The same under the likeliest setting.
-
-    """
-
-    ranking: tuple[Ranked, ...]
-    others: tuple[Cause, ...]
-    nuisance: Nuisance
-    under: Marginal
 
 
 @dataclass(frozen=True)
@@ -165,8 +84,6 @@ class Result:
         The same under the likeliest setting.
     first : Look
         The first look.
-    usual : float
-        Usual spread of values between recordings.
     effects : tuple of Effect
         Every effect in every place that was looked for.
 
@@ -176,7 +93,6 @@ class Result:
     nuisance: Nuisance
     under: Marginal
     first: Look
-    usual: float
     effects: tuple[Effect, ...]
 
 
@@ -217,7 +133,7 @@ class CauseComparison:
         """Look at all causes, and accept none."""
         look = self.look(self.nuisance)
         effects = tuple(self.catalogue.effects)
-        return Result((), self.nuisance, look.under, look, self.usual, effects)
+        return Result((), self.nuisance, look.under, look, effects)
 
     def found(self) -> Result:
         """Accept the best cause as long as any is beyond doubt; drop what others make needless."""
@@ -319,7 +235,7 @@ class CauseComparison:
             result.append(self.ranked(cause, nuisance))
         ranking = tuple(sorted(result, key=lambda one: -one.worth))
         others = tuple(cause for _, cause, _ in best[_COMPARED:])
-        return Look(ranking, others, nuisance, likeliest)
+        return Look(ranking, others, nuisance, likeliest, self.usual)
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
         """Compare a cause with nothing over all settings."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
-from armid_ros.diagnosis.search.comparison import Accepted, Result
+from armid_ros.diagnosis.search.comparison import Result
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import JointFit
-from armid_ros.diagnosis.search.trial import Judge, Key, Step, Survey, Trial
+from armid_ros.diagnosis.search.trial import Key, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -63,7 +63,8 @@ def explain(
     names, small = list(known), list[Trial]()
     values = result.nuisance.means(result.under)
     for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
-        step = _step(one, result.usual, material)
+        rivals = tuple(one.look.worth(other, material) for other in one.tied)
+        step = Step(one.look.worth(one.best, material), rivals)
         if _matters(one.best.cause, values[span], result, material):
             names.append(_name(step, one.best.cause, values[span], problem.arm))
         else:
@@ -92,11 +93,6 @@ def _name(step: Step, cause: Cause, values: FloatArray, arm: ArmModel) -> Name:
     effect, first = cause.effect.when_found(whole)
     kept = cause.kept if effect is cause.effect else tuple(range(len(first)))
     return Name(SelectedEffect(effect, kept), step, first)
-
-
-def _step(one: Accepted, usual: float, material: float) -> Step:
-    judge = Judge(one.look, usual, material)
-    return Step(judge.ranked(one.best), tuple(judge.ranked(other) for other in one.tied))
 
 
 def _matters(cause: Cause, values: FloatArray, result: Result, material: float) -> bool:
@@ -163,10 +159,10 @@ def survey_of(
 ) -> Survey:
     """Return what the first look showed of all causes, those that were named first."""
     look, levels = result.first, settings.thresholds
-    judge = Judge(look, result.usual, settings.material)
     ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
-    best = [judge.ranked(one) for one in ranking]
-    every = [*best, *map(judge.of, look.others), *(t for _, t in _open(result, unknown, settings))]
+    best = [look.worth(one, settings.material) for one in ranking]
+    others = (look.trial(one, settings.material) for one in look.others)
+    every = [*best, *others, *(t for _, t in _open(result, unknown, settings))]
     seen = tuple(one for one in every if one.visible >= levels.least_visible)
     names = {one.effect.said_as for one in seen}
     keys = {one.key[:2] for one in seen}

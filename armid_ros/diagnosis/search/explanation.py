@@ -18,11 +18,8 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.search.cause import SelectedEffect
-from armid_ros.diagnosis.search.comparison import Look
-from armid_ros.diagnosis.search.odds import POPULATION_SPREAD
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Step, Survey, Trial
+from armid_ros.diagnosis.search.trial import Look, Step, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
@@ -82,13 +79,11 @@ class Explanation:
 
     def only(self, keep: Sequence[int]) -> Explanation:
         """Return the explanation with some of its names, in this order, fitted anew."""
-        own = self.fitted
-        fitted = self._fit([own.named[k] for k in keep], [own.values[k] for k in keep])
-        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
-
-    def _fit(self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]) -> Fitted:
         assert self.problem is not None
-        return self.problem.fit(named, values)
+        own = self.fitted
+        named, values = [own.named[k] for k in keep], [own.values[k] for k in keep]
+        fitted = self.problem.fit(named, values)
+        return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
     def in_common_body(self) -> Explanation:
         """Return the same names in an arm with the body and friction that both days have."""
@@ -143,8 +138,6 @@ class Chosen:
         recordings do. Where they do not, names have to take most of the gap.
     look : Look or None
         What all causes were worth at first.
-    usual : float
-        Usual spread of values between recordings.
 
     """
 
@@ -154,7 +147,6 @@ class Chosen:
     notes: tuple[str, ...] = ()
     untested: str = ''
     look: Look | None = None
-    usual: float = POPULATION_SPREAD
 
     @property
     def measured(self) -> bool:

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause
-from armid_ros.diagnosis.search.comparison import Look, Ranked
 from armid_ros.diagnosis.search.odds import CauseInformation, odds, OWN_SPREADS
+from armid_ros.diagnosis.search.trial import Look, Ranked
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -171,7 +171,7 @@ def _up_to(parts: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros((1, *parts.shape[1:])), np.cumsum(parts, axis=0)])
 
 
-def acting_spans(look: Look, usual: float, thresholds: Thresholds) -> tuple[Span, ...]:
+def acting_spans(look: Look, thresholds: Thresholds) -> tuple[Span, ...]:
     """
     Return the seconds in which the likeliest cause acts.
 
@@ -179,8 +179,6 @@ def acting_spans(look: Look, usual: float, thresholds: Thresholds) -> tuple[Span
     ----------
     look : Look
         What causes that act throughout explain.
-    usual : float
-        Usual spread of values between recordings.
     thresholds : Thresholds
         By how much a cause has to be likelier if it acts for a part of the time, and than that
         its values differ between recordings only.
@@ -200,7 +198,7 @@ def acting_spans(look: Look, usual: float, thresholds: Thresholds) -> tuple[Span
     throughout = max((one.throughout for one in timed), key=lambda one: one.worth)
     nuisance = look.nuisance
     known = CauseInformation.of(best.cause, nuisance, best.under).of_day(today=True)
-    there = odds(best.cause, nuisance, known, usual, OWN_SPREADS).factor
+    there = odds(best.cause, nuisance, known, look.usual, OWN_SPREADS).factor
     lead = best.ahead(throughout, thresholds)
     if min(lead, there) <= thresholds.alarm:
         return ()

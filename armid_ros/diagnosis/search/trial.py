@@ -9,9 +9,10 @@ from functools import cached_property
 from typing import TypeAlias
 
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
-from armid_ros.diagnosis.search.comparison import Look, Ranked
-from armid_ros.diagnosis.search.odds import CauseInformation, odds
+from armid_ros.diagnosis.search.nuisance import Nuisance
+from armid_ros.diagnosis.search.odds import CauseFit, CauseInformation, odds
 from armid_ros.diagnosis.search.setting import Marginal
+from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -79,6 +80,144 @@ class Trial:
 
 
 @dataclass(frozen=True)
+class Ranked:
+    """
+    A cause that was compared.
+
+    Attributes
+    ----------
+    cause : Cause
+        The cause, in its best shape.
+    fit : CauseFit
+        Its values.
+    data : float
+        Log Bayes factor of the torque that it explains.
+    odds : float
+        Log odds that it is there, or has changed.
+    under : Marginal
+        What it was compared with, under its likeliest setting.
+    probability : float
+        Among all explanations.
+
+    """
+
+    cause: Cause
+    fit: CauseFit
+    data: float
+    odds: float
+    under: Marginal
+    probability: float = 0.0
+
+    @property
+    def worth(self) -> float:
+        """Log posterior probability, but for a constant."""
+        return self.data + self.cause.prior
+
+    @property
+    def left(self) -> float:
+        """Half of the weighted squares that it leaves."""
+        return self.under.loss - self.fit.explained
+
+    def ahead(self, other: Ranked, levels: Thresholds) -> float:
+        """
+        Return the log odds to another cause.
+
+        A lead of a share of what is explained is none, as laws are inexact, unless one leaves so
+        little that the other is no fit then. Then what freedom costs and what is commoner
+        decide.
+
+        """
+        lead = self.fit.explained - other.fit.explained
+        slack = min(
+            levels.inexact * max(self.fit.explained, other.fit.explained),
+            (levels.same_fit - 1.0) * max(min(self.left, other.left), 0.0),
+        )
+        seen = float(np.sign(lead)) * max(abs(lead) - slack, 0.0)
+        return seen + (self.worth - self.fit.explained) - (other.worth - other.fit.explained)
+
+
+@dataclass(frozen=True)
+class Look:
+    """
+    A look at all causes.
+
+    Attributes
+    ----------
+    ranking : tuple of Ranked
+        The best causes in their best shape, the likeliest first.
+    others : tuple of Cause
+        All other causes in the best shape of those that a search starts from.
+    nuisance : Nuisance
+        What they were compared with.
+    under : Marginal
+        The same under the likeliest setting.
+    usual : float
+        Usual spread of values between recordings.
+
+    """
+
+    ranking: tuple[Ranked, ...]
+    others: tuple[Cause, ...]
+    nuisance: Nuisance
+    under: Marginal
+    usual: float
+
+    def worth(self, one: Ranked, material: float) -> Trial:
+        """Return what a cause of a ranking is worth; see `trial`."""
+        own = self.trial(one.cause, material, one.under)
+        return replace(own, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
+
+    def trial(self, cause: Cause, material: float, under: Marginal | None = None) -> Trial:
+        """
+        Return what any cause is worth.
+
+        Parameters
+        ----------
+        cause : Cause
+            The cause.
+        material : float
+            Share of the torque of a joint that matters.
+        under : Marginal, optional
+            What it is compared with; under the likeliest setting by default.
+
+        """
+        nuisance = self.nuisance
+        known = CauseInformation.of(cause, nuisance, under or self.under)
+        spread = np.array([self.usual if nuisance.rows.before else 0.0])
+        fit = odds(cause, nuisance, known, self.usual, spread)
+        each = len(known.today)
+        blocks = known.matrix.reshape(each, known.size, each, known.size)
+        x = fit.values / cause.unit
+        gains = [
+            2.0 * x @ known.vector.reshape(each, -1)[g] - x @ blocks[g, :, g] @ x
+            for g in np.flatnonzero(known.today)
+        ]
+        places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
+        today = np.flatnonzero(nuisance.rows.today).tolist()
+        made = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
+        torque = cause.torque * known.visible / nuisance.rows.torque[:, np.newaxis]
+        return Trial(
+            SelectedEffect(cause.effect, cause.kept),
+            fit.values,
+            fit.std,
+            fit.resolution,
+            np.asarray(material / np.maximum(torque.max(axis=0), 1e-300)),
+            known.visible,
+            2.0 * fit.factor,
+            fit.factor - float(np.log(cause.shapes * places)),
+            min(made / self._left, 1.0),
+            int(np.sum(np.array(gains) > 0.0)),
+        )
+
+    @cached_property
+    def _left(self) -> float:
+        """Squares of the residual of the day in question."""
+        values = self.nuisance.means(self.under)
+        today = np.flatnonzero(self.nuisance.rows.today).tolist()
+        return max(float(sum(np.sum(self.nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
+
+
+@dataclass(frozen=True)
 class Step:
     """
     One name that was accepted.
@@ -121,71 +260,3 @@ class Survey:
     unseen: tuple[tuple[str, tuple[str, ...]], ...]
     suspected: Trial | None = None
     unproven: Trial | None = None
-
-
-@dataclass(frozen=True)
-class Judge:
-    """
-    Says what causes are worth under one setting.
-
-    Attributes
-    ----------
-    look : Look
-        What they are compared with, under the likeliest setting.
-    usual : float
-        Usual spread of values between recordings.
-    material : float
-        Share of the torque of a joint that matters.
-
-    """
-
-    look: Look
-    usual: float
-    material: float
-
-    def ranked(self, one: Ranked) -> Trial:
-        """Return what a cause of a ranking is worth."""
-        trial = self.of(one.cause, one.under)
-        return replace(trial, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
-
-    def of(self, cause: Cause, under: Marginal | None = None) -> Trial:
-        """Return what any cause is worth, under the likeliest setting by default."""
-        nuisance = self.look.nuisance
-        known = CauseInformation.of(cause, nuisance, under or self.look.under)
-        spread = np.array([self.usual if nuisance.rows.before else 0.0])
-        fit = odds(cause, nuisance, known, self.usual, spread)
-        each = len(known.today)
-        blocks = known.matrix.reshape(each, known.size, each, known.size)
-        x = fit.values / cause.unit
-        gains = [
-            2.0 * x @ known.vector.reshape(each, -1)[g] - x @ blocks[g, :, g] @ x
-            for g in np.flatnonzero(known.today)
-        ]
-        places = max(len(cause.effect.places(nuisance.arm.robot)), 1)
-        today = np.flatnonzero(nuisance.rows.today).tolist()
-        made = float(sum(fit.values @ cause.own[k] @ fit.values for k in today))
-        return Trial(
-            SelectedEffect(cause.effect, cause.kept),
-            fit.values,
-            fit.std,
-            fit.resolution,
-            self._least(cause, known.visible),
-            known.visible,
-            2.0 * fit.factor,
-            fit.factor - float(np.log(cause.shapes * places)),
-            min(made / self._left, 1.0),
-            int(np.sum(np.array(gains) > 0.0)),
-        )
-
-    @cached_property
-    def _left(self) -> float:
-        """Squares of the residual of the day in question."""
-        nuisance = self.look.nuisance
-        values = nuisance.means(self.look.under)
-        today = np.flatnonzero(nuisance.rows.today).tolist()
-        return max(float(sum(np.sum(nuisance.rest(values, k) ** 2) for k in today)), 1e-300)
-
-    def _least(self, cause: Cause, visible: float) -> FloatArray:
-        """Return the size of each value, (p,), whose torque matters in some joint."""
-        torque = cause.torque * visible / self.look.nuisance.rows.torque[:, np.newaxis]
-        return np.asarray(self.material / np.maximum(torque.max(axis=0), 1e-300))

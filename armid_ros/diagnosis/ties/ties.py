@@ -28,7 +28,7 @@ from armid_ros.diagnosis.search.explain import explain, Name, survey_of
 from armid_ros.diagnosis.search.explanation import Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.odds import CauseInformation
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Judge, Step, Survey
+from armid_ros.diagnosis.search.trial import Step, Survey
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.regression import rightly_described, TieRegression, without_bias
 from armid_ros.effects.tied import Partner, Tied, TiedInteraction, TiedSlack
@@ -352,10 +352,10 @@ def _as_one_cause(ties: Ties, explainer: Explainer, fitted: Fitted) -> tuple[Ste
     cause = comparison.catalogue.made(whole, kept, columns)
     assert cause is not None
     one = comparison.ranked(cause, nuisance)
-    judge = Judge(result.first, result.usual, settings.material)
-    rivals = [judge.ranked(other) for other in result.first.ranking if other.data >= one.data]
+    look, material = result.first, settings.material
+    rivals = [look.worth(other, material) for other in look.ranking if other.data >= one.data]
     survey = survey_of(result, (), settings)
-    trial = replace(judge.ranked(one), probability=1.0 / (1.0 + len(rivals)))
+    trial = replace(look.worth(one, material), probability=1.0 / (1.0 + len(rivals)))
     survey = replace(survey, ranking=(trial, *survey.ranking))
     return Step(trial, tuple(rivals)), survey
 
