@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armid_ros.errors import ModelError
-from armid_ros.model import inverse_dynamics, point_motion
+from armid_ros.model import inverse_dynamics
 from armid_ros.model.spring_ties import (
     leg_ties,
     SEGMENTS,
@@ -163,14 +163,7 @@ class PairTorques:
     forces: FloatArray
 
 
-def pair_torques(
-    pair: TiedPair,
-    motion: Motion,
-    other_motion: Motion,
-    *,
-    foot_force: FloatArray | None = None,
-    foot: tuple[str, tuple[float, float, float]] = ('exo_swing_ankle', (0.0, 0.0, 0.0)),
-) -> PairTorques:
+def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTorques:
     """
     Compute the joint torques of both machines, springs included.
 
@@ -180,11 +173,6 @@ def pair_torques(
         The machines and their springs.
     motion, other_motion : Motion
         How each moves, on one time base.
-    foot_force : ndarray, shape (N, 3), optional
-        In double support: what the ground does to the second foot of the machine [N], (27). It
-        has to be measured or assumed: two feet on the ground leave it open.
-    foot : (str, (float, float, float))
-        Joint that moves that foot, and where the force acts in its frame [m].
 
     """
     geometry = pair.geometry(motion, other_motion)
@@ -193,9 +181,6 @@ def pair_torques(
     tau -= np.einsum('nsxj,nsx->nj', geometry.jacobian, forces)
     other_tau = inverse_dynamics(pair.other, other_motion)
     other_tau += np.einsum('nsxj,nsx->nj', geometry.other_jacobian, forces)
-    if foot_force is not None:
-        _, jacobian = point_motion(pair.robot, foot[0], foot[1], motion.q)
-        tau -= np.einsum('nxj,nx->nj', jacobian, foot_force)
     return PairTorques(read_only(tau), read_only(other_tau), read_only(forces))
 
 

@@ -9,14 +9,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.gait import Gait, read_gait
-from armid_ros.papers.exo.plant.leg_pair import (
-    leg_pair,
-    pair_torques,
-    PairMotion,
-    stepping,
-    TiedPair,
-)
+from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, stepping, TiedPair
 from armid_ros.papers.exo.plant.torque_driven import drive_by_torque
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
@@ -81,14 +75,14 @@ class SimulatedPair:
 
     Parameters
     ----------
-    pair : TiedPair, optional
-        The machines and their springs; the shipped ones by default.
-    gait : Gait, optional
-        The shipped one by default.
+    pair : TiedPair
+        The machines and their springs.
+    gait : Gait
+        Of one leg.
     driven : sequence of str
         Joints of the machine that follow torques.
-    torque_rate : float, optional
-        Torque samples per second [Hz]; by default what is assumed of the source.
+    torque_rate : float
+        Torque samples per second [Hz].
     rate : float
         Samples per second [Hz].
     sensors : PairSensors, optional
@@ -105,27 +99,24 @@ class SimulatedPair:
 
     def __init__(
         self,
-        pair: TiedPair | None = None,
-        gait: Gait | None = None,
+        pair: TiedPair,
+        gait: Gait,
         *,
         driven: Sequence[str] = (),
-        torque_rate: float | None = None,
+        torque_rate: float = 100.0,
         rate: float = 1000.0,
         sensors: PairSensors | None = None,
         rng: np.random.Generator,
     ) -> None:
-        known = read_assumptions()
-        self.pair = leg_pair() if pair is None else pair
+        self.pair = pair
         self.driven = tuple(driven)
         self._columns = [self.pair.robot.index(joint) for joint in self.driven]
-        self._gait = read_gait() if gait is None else gait
+        self._gait = gait
         self._rate = rate
         self._sensors = sensors or PairSensors()
         self._rng = rng
-        period = float(known['stepping_period'].value)
-        knots = np.linspace(
-            0.0, period, round(period * (torque_rate or known['torque_rate'].value))
-        )
+        period = float(read_assumptions()['stepping_period'].value)
+        knots = np.linspace(0.0, period, round(period * torque_rate))
         tau = np.array(pair_torques(self.pair, *stepping(self.pair, self._gait, knots)).tau)
         tau[-1] = tau[0]
         self._torque = CubicSpline(knots, tau, bc_type='periodic')

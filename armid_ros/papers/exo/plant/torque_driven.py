@@ -18,7 +18,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.contact import Ground
-from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.papers.exo.plant.walkers import contacts, leg_length
 import numpy as np
 import pinocchio as pin
@@ -227,30 +227,3 @@ class GaitCheck:
     def most(self) -> float:
         """How far it is off at most [deg]."""
         return float(np.degrees(np.abs(self.error).max()))
-
-
-def check_gait(
-    pair: TiedPair, motions: PairMotion, joint: str, rate: float, believed: TiedPair | None = None
-) -> GaitCheck:
-    """
-    Let one joint of the machine walk by its torque, as the source does.
-
-    Parameters
-    ----------
-    pair : TiedPair
-        The machines as they are.
-    motions : PairMotion
-        What was prescribed.
-    joint : str
-        The joint that follows its torque.
-    rate : float
-        Torque samples per second, joined by cubic splines.
-    believed : TiedPair, optional
-        The machines that the torques are computed for; by default those that there are.
-
-    """
-    own, other = motions
-    column = pair.robot.index(joint)
-    tau = pair_torques(believed or pair, own, other).tau[:, [column]]
-    moved = drive_by_torque(pair, own, other, [joint], splined(own.t, tau, rate))
-    return GaitCheck(joint, own.q[::2, column], moved)

@@ -14,7 +14,7 @@ from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
 from armid_ros.papers.exo.report.poses import draw_poses
 from armid_ros.papers.exo.report.sections import Assumptions, Forces, Poses, Stiffness
-from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, FootForces, Walk
+from armid_ros.papers.exo.report.walk import CycleByTorque, FootForces, Walk
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
@@ -55,8 +55,6 @@ class SimulatedWalk:
     ----------
     truth : mapping of str to float
         True stiffnesses [N/m].
-    gait : ByTorque or None
-        Joints driven by torque in single support.
     cycle : GaitCycle or None
         A whole cycle of walking.
     whole : CycleByTorque or None
@@ -65,7 +63,6 @@ class SimulatedWalk:
     """
 
     truth: Mapping[str, float] = field(default_factory=dict)
-    gait: ByTorque | None = None
     cycle: GaitCycle | None = None
     whole: CycleByTorque | None = None
 
@@ -108,8 +105,6 @@ def exo_report(
     if walked.cycle is not None and walked.whole is not None:
         cycle, whole = walked.cycle, walked.whole
         sections += [Walk(cycle, whole.driven), whole, FootForces(cycle)]
-    if walked.gait is not None:
-        sections.append(walked.gait)
     sections += [
         Forces(
             abscissa,
@@ -140,15 +135,11 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk) -> VerdictSect
         for name, value, std in zip(part.segments, part.stiffness, part.std, strict=True)
         if 1.96 * std > _NARROW * abs(value)
     ]
-    if walked.gait is not None:
-        each = ', '.join(f'{d.joint} {d.right.most:.1e}°' for d in walked.gait.driven)
-        sentences.append(
-            f'Driven by their torques, joints follow the gait in single support: {each} at most.'
-        )
     if walked.whole is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.whole.driven)
         sentences.append(
-            f'Over a whole cycle of walking, on either foot and on both: {each} at most.'
+            'Driven by their torques, joints follow a whole cycle of walking, on either foot and '
+            f'on both: {each} at most.'
         )
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:

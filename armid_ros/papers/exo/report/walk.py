@@ -39,14 +39,14 @@ class Driven:
     ----------
     right, softer : GaitCheck
         With the torque that is right, and with that for springs that are too soft.
-    shared : GaitCheck or None
+    shared : GaitCheck
         With the torque for feet that bear what (20) to (22) say.
 
     """
 
     right: GaitCheck
     softer: GaitCheck
-    shared: GaitCheck | None = None
+    shared: GaitCheck
 
     @property
     def joint(self) -> str:
@@ -55,65 +55,8 @@ class Driven:
 
     @property
     def source(self) -> float:
-        """How far it is off at most by the source [deg]; NaN for what the source does not have."""
-        return SOURCE.get(self.joint.split('_')[-1], np.nan)
-
-
-@dataclass(frozen=True)
-class ByTorque(Section):
-    """
-    Joints driven by their torques against the prescribed gait, in single support.
-
-    Attributes
-    ----------
-    driven : sequence of Driven
-        Joints by their torque.
-    softer : float
-        By which share springs were taken too soft.
-    phase : ndarray, shape (N,)
-        Phase of a leg at the samples of the checks.
-    rate : float
-        Torque samples per second.
-
-    """
-
-    title: ClassVar[str] = 'Gait by torque'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'gait.html'
-    abscissa: ClassVar[str] = 'gait cycle of the swing leg'
-
-    driven: Sequence[Driven]
-    softer: float
-    phase: FloatArray
-    rate: float
-
-    @property
-    def panels(self) -> list[tuple[str, str, Chart, Chart]]:
-        """Name, largest errors, angle and error of every joint."""
-        return [
-            (
-                d.joint,
-                f'at most {d.right.most:.1e}°; springs too soft {d.softer.most:.2f}°',
-                *self._charts(d),
-            )
-            for d in self.driven
-        ]
-
-    def _charts(self, d: Driven) -> tuple[Chart, Chart]:
-        """Draw angle and error of a joint."""
-        both: tuple[tuple[str, GaitCheck, Role], ...] = (
-            ('by its torque', d.right, 'residual'),
-            ('springs too soft', d.softer, 'predicted'),
-        )
-        angles = [
-            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
-            *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
-        ]
-        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
-        return Chart(self.phase, angles, '', 'angle [°]', link=d.joint), Chart(
-            self.phase, errors, self.abscissa, 'error [°]', height=150, link=d.joint,
-            symmetric=True, legend=False,
-        )  # fmt: skip
+        """How far it is off at most by the source [deg]."""
+        return SOURCE[self.joint.split('_')[-1]]
 
 
 @dataclass(frozen=True)
@@ -278,12 +221,31 @@ class FootForces(Section):
 
 
 @dataclass(frozen=True)
-class CycleByTorque(ByTorque):
-    """The same over the whole cycle, hips free, with what the source found."""
+class CycleByTorque(Section):
+    """
+    Joints driven by their torques over the whole cycle, hips free, with what the source found.
+
+    Attributes
+    ----------
+    driven : sequence of Driven
+        Joints by their torque.
+    softer : float
+        By which share springs were taken too soft.
+    phase : ndarray, shape (N,)
+        Phase of the right leg at the samples of the checks.
+    rate : float
+        Torque samples per second.
+
+    """
 
     title: ClassVar[str] = 'Whole cycle by torque'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'cycle.html'
-    abscissa: ClassVar[str] = 'gait cycle of the right leg'
+
+    driven: Sequence[Driven]
+    softer: float
+    phase: FloatArray
+    rate: float
 
     @property
     def rows(self) -> list[tuple[str, str, str, str, str]]:
@@ -291,13 +253,34 @@ class CycleByTorque(ByTorque):
         return [
             (
                 d.joint,
-                f'{d.source:g}' if np.isfinite(d.source) else '',
+                f'{d.source:g}',
                 f'{d.right.most:.2g}',
                 f'{d.softer.most:.2f}',
-                '' if d.shared is None else f'{d.shared.most:.2f}',
+                f'{d.shared.most:.2f}',
             )
             for d in self.driven
         ]
+
+    @property
+    def panels(self) -> list[tuple[str, Chart, Chart]]:
+        """Name, angle and error of every joint."""
+        return [(d.joint, *self._charts(d)) for d in self.driven]
+
+    def _charts(self, d: Driven) -> tuple[Chart, Chart]:
+        """Draw angle and error of a joint."""
+        both: tuple[tuple[str, GaitCheck, Role], ...] = (
+            ('by its torque', d.right, 'residual'),
+            ('springs too soft', d.softer, 'predicted'),
+        )
+        angles = [
+            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
+            *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
+        ]
+        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
+        return Chart(self.phase, angles, '', 'angle [°]', link=d.joint), Chart(
+            self.phase, errors, 'gait cycle of the right leg', 'error [°]', height=150,
+            link=d.joint, symmetric=True, legend=False,
+        )  # fmt: skip
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
