@@ -30,8 +30,9 @@ from armid_ros.papers.exo.plant.leg_pair import (
 )
 from armid_ros.papers.exo.plant.shares import ground_by_shares
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.page import exo_report, ShownMotion, SimulatedWalk
-from armid_ros.papers.exo.report.walk import CycleByTorque, Driven
+from armid_ros.papers.exo.report.page import exo_report
+from armid_ros.papers.exo.report.sections import ShownMotion
+from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
 from armid_ros.recording import read_recording, Recording, write_joint_states
 from armid_ros.recording.writer import require_new, whole_bag
 import click
@@ -118,15 +119,14 @@ def identify_pair(
         source = str(settled(path))
         both = replace(machine, source=source), replace(wearer, source=source)
         found = _identify(pair, *both, inertias, tick)
-        walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else SimulatedWalk()
+        walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else None
     document = _document(found, walked, both[0].source)
     page = exo_report(
         pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
         _shown(pair, gait) if bag is None else _recorded(*both),
         found,
         walked,
-        assumptions=read_assumptions(),
-        provenance=provenance(
+        provenance(
             [path], {'inertias': inertias, 'topics': topics}, seed if bag is None else None
         ),
     )
@@ -156,8 +156,7 @@ def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Si
         for joint in _DRIVEN
     ]
     truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
-    whole = CycleByTorque(driven, _SOFTER, cycle.phase[::2], rate)
-    return SimulatedWalk(truth, cycle, whole)
+    return SimulatedWalk(truth, cycle, driven, _SOFTER, rate)
 
 
 def _tell(document: dict[str, Any]) -> None:
@@ -226,7 +225,9 @@ def _smooth(recording: Recording, t: FloatArray) -> Motion:
     return Motion(recording.joints, t, q, np.zeros_like(q), np.zeros_like(q))
 
 
-def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> dict[str, Any]:
+def _document(
+    found: list[Interaction], walked: SimulatedWalk | None, source: str
+) -> dict[str, Any]:
     rows = [
         {
             'segment': segment,
@@ -235,7 +236,7 @@ def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> d
             'unit': 'N/m',
             'interval': part.interval()[k].tolist(),
             'bias_of_least_squares': float(part.bias[k]),
-            'truth': walked.truth.get(segment),
+            'truth': walked.truth.get(segment) if walked else None,
         }
         for part in found
         for k, segment in enumerate(part.segments)
@@ -248,14 +249,14 @@ def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> d
             'error_shared_deg': d.shared.most,
             'source_deg': d.source,
         }
-        for d in (walked.whole.driven if walked.whole else ())
+        for d in (walked.driven if walked else ())
     ]
     return {
         'schema': SCHEMA,
         'recording': source,
         'stiffness': rows,
         'cycle': cycle,
-        'feet': _feet(walked.cycle) if walked.cycle else [],
+        'feet': _feet(walked.cycle) if walked else [],
     }
 
 
