@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.lunar.reproduction import Composite, Repeated
+from armid_ros.report.blocks import ContentSection, DataTable, Fold, Panels, Paragraph
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Section
@@ -71,82 +73,69 @@ class PaperTables(Section):
         return [*rows, ('mean', ['', '', '', '', '', *means])]
 
 
-@dataclass(frozen=True)
-class TorqueCurves(Section):
-    """
-    True torque and that of the identified weight, along a trajectory that was not used.
-
-    Attributes
-    ----------
-    repeated : tuple of Repeated
-        Tables in order.
-
-    """
-
-    title: ClassVar[str] = 'Torque curves'
-    package: ClassVar[str] = 'armid_ros.papers.lunar'
-    template: ClassVar[str] = 'curves.html'
-
-    repeated: tuple[Repeated, ...]
-
-    @property
-    def drawn(self) -> list[tuple[Repeated, list[tuple[str, Chart]]]]:
-        """Each table with the charts of its joints."""
-        return [
-            (one, [(joint, self._chart(one, k)) for k, joint in enumerate(one.joints)])
-            for one in self.repeated
-        ]
-
-    def _chart(self, one: Repeated, joint: int) -> Chart:
-        tau = one.test.motion.tau
-        assert tau is not None
-        true: FloatArray = 1e3 * tau[:, joint]
-        found: FloatArray = 1e3 * one.test.predicted[:, joint]
-        kept = thinned(true, found)
-        return Chart(
-            one.test.motion.t[kept],
-            [Series('true', true[kept]), Series('identified', found[kept], 'predicted')],
-            'time [s]',
-            'torque [N mm]',
-            height=170,
-            link=f'table{one.table.number}',
+def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
+    """Show the true torque and that of the identified weight, along a trajectory not used."""
+    said = (
+        'Weight alone, identified from the noisy run, along a trajectory that was not used. Drag '
+        'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
+    )
+    folds = [
+        Fold(
+            f'Table {one.table.number}: {one.table.title}',
+            [Panels([(joint, '', [_chart(one, k)]) for k, joint in enumerate(one.joints)])],
+            opened=number == 0,
         )
+        for number, one in enumerate(repeated)
+    ]
+    return ContentSection('Torque curves', [Paragraph(said, 'hint'), *folds])
 
 
-@dataclass(frozen=True)
-class GravityParameters(Section):
+def _chart(one: Repeated, joint: int) -> Chart:
+    tau = one.test.motion.tau
+    assert tau is not None
+    true: FloatArray = 1e3 * tau[:, joint]
+    found: FloatArray = 1e3 * one.test.predicted[:, joint]
+    kept = thinned(true, found)
+    return Chart(
+        one.test.motion.t[kept],
+        [Series('true', true[kept]), Series('identified', found[kept], 'predicted')],
+        'time [s]',
+        'torque [N mm]',
+        height=170,
+        link=f'table{one.table.number}',
+    )
+
+
+def gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
     """
-    The minimal gravity parameters, with and without the load.
+    Show the minimal gravity parameters, with and without the load.
 
-    Attributes
+    Parameters
     ----------
-    composites : tuple of Composite
+    composites : sequence of Composite
         All of them.
     load : str
         The mass that the two runs differ by, as it is read.
 
     """
-
-    title: ClassVar[str] = 'Gravity parameters'
-    package: ClassVar[str] = 'armid_ros.papers.lunar'
-    template: ClassVar[str] = 'composites.html'
-
-    composites: tuple[Composite, ...]
-    load: str
-
-    @property
-    def rows(self) -> list[tuple[str, str, list[str]]]:
-        """Expression, joint and cells."""
-        return [
-            (
-                one.name,
-                one.joint,
-                [
-                    f'{one.truth:.3f}',
-                    ' ± '.join(measured(one.value, HALF_WIDTH * one.std)),
-                    f'{one.loaded_truth:.3f}',
-                    ' ± '.join(measured(one.loaded, HALF_WIDTH * one.loaded_std)),
-                ],
-            )
-            for one in self.composites
-        ]
+    said = (
+        'Masses and first moments times the gravity of the moon, in N mm, by the weight alone; '
+        "± 95 %. An arm with revolute joints has an even number of them; of the paper's table "
+        'nine are legible, and all nine have this form. The two runs differ by '
+        f'{load} at the hand.'
+    )
+    heads = ('Parameter', 'Joint', 'True', 'Identified', 'True, loaded', 'Identified, loaded')
+    rows = [
+        (
+            one.name,
+            one.joint,
+            f'{one.truth:.3f}',
+            ' ± '.join(measured(one.value, HALF_WIDTH * one.std)),
+            f'{one.loaded_truth:.3f}',
+            ' ± '.join(measured(one.loaded, HALF_WIDTH * one.loaded_std)),
+        )
+        for one in composites
+    ]
+    return ContentSection(
+        'Gravity parameters', [Paragraph(said), DataTable(heads, rows, words=(0, 1))]
+    )
