@@ -20,7 +20,7 @@ def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
     rng = np.random.default_rng(0)
     walking = SimulatedPair(pair, read_gait(), sensors=SENSORS, rate=500.0, rng=rng)
-    online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
+    online = OnlineInteraction(pair.machines, SETTINGS)
     for _ in range(round(500.0 * seconds)):
         sample = walking.advance()
         online.take_other(sample.t, sample.other_q)
@@ -49,7 +49,7 @@ def test_slack_is_seen_and_measured():
 
 def test_one_machine_alone_is_not_enough():
     pair = leg_pair()
-    online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
+    online = OnlineInteraction(pair.machines, SETTINGS)
     online.take(0.0, np.zeros(6), np.zeros(6))
     with pytest.raises(IdentificationError, match='joint states'):
         online.take(5.0, np.zeros(6), np.zeros(6))

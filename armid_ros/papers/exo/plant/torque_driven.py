@@ -163,8 +163,7 @@ class _Machine:
         self._data = self._model.createData()
         joints = [tie.other_joint for tie in ties]
         points = np.array([tie.other_point for tie in ties]).reshape(-1, 3)
-        self._far, jacobian = points_motion(pair.other, joints, points, motions.other.q)
-        self._far_speed = np.einsum('nsxj,nj->nsx', jacobian, motions.other.dq)
+        self._far, _ = points_motion(pair.other, joints, points, motions.other.q)
 
     def rate(self, k: int, x: FloatArray, tau: FloatArray) -> FloatArray:
         """Return speeds and accelerations of the free joints at sample k, shape (2 d,)."""
@@ -181,13 +180,10 @@ class _Machine:
         jacobian = np.array(
             [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in self._frames]
         )
-        speed = jacobian @ dq
         force = np.zeros_like(place)
-        force[:tied] = self._pair.law(
-            place[:tied] - self._far[k], speed[:tied] - self._far_speed[k]
-        )
+        force[:tied] = self._pair.forces(place[:tied] - self._far[k])
         if self._ground is not None:
-            feet, moving = place[tied:], speed[tied:]
+            feet, moving = place[tied:], jacobian[tied:] @ dq
             force[tied:, ::2] = self._ground.force(feet[:, 2], moving[:, 2], moving[:, 0])
         push = tau - load[free] + np.einsum('cxj,cx->j', jacobian, force)[free]
         return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])
