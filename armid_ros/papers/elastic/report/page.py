@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.elastic.identification.interaction import decibel_error
-from armid_ros.papers.elastic.identification.physical import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.report.parameters import parameters_section, rigid_section
-from armid_ros.papers.elastic.report.steps import COMPARED, responses_section, steps_section
+from armid_ros.papers.elastic.report.steps import decibels_apart, responses_section, steps_section
 from armid_ros.report.notation import counted, digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -69,7 +67,11 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
         springs.append(f'{value} N m/rad at {joint.joint}')
     interval = ' (95 %)' if result.tuning is not None else ''
     sentences = [f'The springs have {" and ".join(springs)}{interval}.']
-    poor = [joint.joint for k, joint in enumerate(result.joints) if _apart(result, k) > _CLOSE_DB]
+    poor = [
+        joint.joint
+        for k, joint in enumerate(result.joints)
+        if decibels_apart(result, k) > _CLOSE_DB
+    ]
     beware = (
         [
             f'{", ".join(poor)}: what was measured is not the response of a motor and a link on a '
@@ -92,11 +94,3 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
     return VerdictSection(
         'uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware
     )
-
-
-def _apart(result: TwoInertiaIdentification, joint: int) -> float:
-    """Return how far measured and physical responses of a joint are apart, 5 to 60 Hz [dB]."""
-    measured = result.measured[joint]
-    seen = (measured.frequency >= COMPARED[0]) & (measured.frequency <= COMPARED[1])
-    ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
-    return decibel_error(measured.decoupled[seen, 0], ideal)
