@@ -65,7 +65,3 @@ def test_the_exoskeleton_is_what_was_assumed() -> None:
             reach = np.abs(body.lever).max()
             ends = (centroid[segment], length[segment] - centroid[segment])
             assert min(abs(reach - end) for end in ends) < 1e-9
-
-
-def test_every_assumption_has_a_reason() -> None:
-    assert all(entry.reason.strip().endswith('.') for entry in read_assumptions().values())

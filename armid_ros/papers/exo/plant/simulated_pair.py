@@ -119,7 +119,7 @@ class SimulatedPair:
         knots = np.linspace(0.0, period, round(period * torque_rate))
         tau = np.array(pair_torques(self.pair, *stepping(self.pair, self._gait, knots)).tau)
         tau[-1] = tau[0]
-        self._torque = CubicSpline(knots, tau, bc_type='periodic')
+        self._torque = CubicSpline(knots, tau[:, self._columns], bc_type='periodic')
         self.reset()
 
     def reset(self) -> None:
@@ -167,7 +167,7 @@ class SimulatedPair:
             return PairMotion(own, other), pair_torques(self.pair, own, other).tau
         own = self._driven(own)
         tau = np.array(pair_torques(self.pair, own, other).tau)
-        tau[:, self._columns] = self._torque(t)[:, self._columns]
+        tau[:, self._columns] = self._torque(t)
         return PairMotion(own, other), tau
 
     def _driven(self, own: Motion) -> Motion:
@@ -178,7 +178,7 @@ class SimulatedPair:
             q, dq = np.array(prescribed.q), np.array(prescribed.dq)
             q[0, self._columns], dq[0, self._columns] = self._state
             prescribed = replace(prescribed, q=q, dq=dq)
-        moved = drive_by_torque(self.pair, prescribed, other, self.driven, self._driving_torque)
+        moved = drive_by_torque(self.pair, prescribed, other, self.driven, self._torque)
         self._state = np.array([moved.q[-1, self._columns], moved.dq[-1, self._columns]])
         q, dq, ddq = (np.array(part) for part in (own.q, own.dq, own.ddq))
         far = moved.q[-1, self._columns] - q[-1, self._columns]
@@ -188,6 +188,3 @@ class SimulatedPair:
         for values, curve in ((q, path(own.t)), (dq, speed(own.t)), (ddq, speed(own.t, 1))):
             values[:, self._columns] = curve[:, self._columns]
         return replace(own, q=q, dq=dq, ddq=ddq)
-
-    def _driving_torque(self, t: float) -> FloatArray:
-        return np.asarray(self._torque(t))[self._columns]
