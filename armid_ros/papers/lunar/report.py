@@ -7,7 +7,7 @@ from __future__ import annotations
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.papers.lunar.paper import LOAD, STATED_ERROR
 from armid_ros.papers.lunar.reproduction import Repeated, Reproduction
-from armid_ros.papers.lunar.sections import curves_section, gravity_section, PaperTables
+from armid_ros.papers.lunar.sections import curves_section, gravity_section, tables_section
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -34,7 +34,7 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
     grade = ('reproduced', 'good') if held else ('in part', 'fair')
     sections: list[Section] = [
         VerdictSection(*grade, sentences(found)),
-        PaperTables(found.repeated),
+        tables_section(found.repeated),
         curves_section(found.repeated),
         gravity_section(found.composites, _load(found)),
         Origin(provenance),

@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
@@ -14,63 +12,59 @@ from armid_ros.papers.lunar.reproduction import Composite, Repeated
 from armid_ros.report.blocks import ContentSection, DataTable, Fold, Panels, Paragraph
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured
-from armid_ros.report.page import Section
 import numpy as np
 
-Row = tuple[str, list[str]]
+
+def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
+    """Show the paper's tables next to those of the repeat, joint by joint."""
+    said = (
+        'Peak: of the paper, and the largest torque of gravity at the joint. Errors are those of '
+        'trajectories that were not used, against the true torque. Noisy is the error against the '
+        "noisy torque of the run, as the paper may have it. Weight is the paper's method, whole "
+        'the full dynamics.'
+    )
+    folds = [
+        Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
+        for one in repeated
+    ]
+    return ContentSection('Tables', [Paragraph(said), *folds])
 
 
-@dataclass(frozen=True)
-class PaperTables(Section):
-    """
-    The paper's tables next to those of the repeat, joint by joint.
-
-    Attributes
-    ----------
-    repeated : tuple of Repeated
-        Tables in order.
-
-    """
-
-    title: ClassVar[str] = 'Tables'
-    package: ClassVar[str] = 'armid_ros.papers.lunar'
-    template: ClassVar[str] = 'tables.html'
-
-    repeated: tuple[Repeated, ...]
-
-    @property
-    def tables(self) -> list[tuple[Repeated, list[Row]]]:
-        """Each table with its rows: joint and cells, the mean last."""
-        return [(one, self._rows(one)) for one in self.repeated]
-
-    def _rows(self, one: Repeated) -> list[Row]:
-        slow, whole = one.methods
-        scale = 1.0 if one.table.uniform else 100.0
-        ratios = [
-            scale * ratio
-            for ratio in (
-                one.table.ratio,
-                one.ratio(slow.noisy),
-                one.ratio(slow.held_out),
-                one.ratio(whole.held_out),
-            )
-        ]
-        rows = [
-            (
-                joint,
-                [
-                    digits(1e3 * one.table.peak[k], 3),
-                    digits(1e3 * one.peak[k], 3),
-                    digits(1e3 * one.table.error[k]),
-                    digits(1e3 * slow.held_out[k]),
-                    digits(1e3 * whole.held_out[k]),
-                    *(digits(float(ratio[k])) for ratio in ratios),
-                ],
-            )
-            for k, joint in enumerate(one.joints)
-        ]
-        means = [digits(float(np.mean(ratio))) for ratio in ratios]
-        return [*rows, ('mean', ['', '', '', '', '', *means])]
+def _table(one: Repeated) -> DataTable:
+    slow, whole = one.methods
+    scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
+    if one.table.uniform:
+        scale, error, share = 1.0, 'MAE', 'MAE over noise'
+    ratios = [
+        scale * ratio
+        for ratio in (
+            one.table.ratio,
+            one.ratio(slow.noisy),
+            one.ratio(slow.held_out),
+            one.ratio(whole.held_out),
+        )
+    ]
+    rows = [
+        (
+            joint,
+            digits(1e3 * one.table.peak[k], 3),
+            digits(1e3 * one.peak[k], 3),
+            digits(1e3 * one.table.error[k]),
+            digits(1e3 * slow.held_out[k]),
+            digits(1e3 * whole.held_out[k]),
+            *(digits(float(ratio[k])) for ratio in ratios),
+        )
+        for k, joint in enumerate(one.joints)
+    ]
+    mean = ('mean', *[''] * 5, *(digits(float(np.mean(ratio))) for ratio in ratios))
+    heads = (
+        'Joint',
+        'Peak, paper [N mm]',
+        'Peak, largest [N mm]',
+        *(f'{error}, {by} [N mm]' for by in ('paper', 'weight', 'whole')),
+        *(f'{share}, {by}' for by in ('paper', 'noisy', 'weight', 'whole')),
+    )
+    return DataTable(heads, [*rows, mean])
 
 
 def curves_section(repeated: Sequence[Repeated]) -> ContentSection:

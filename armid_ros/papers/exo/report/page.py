@@ -12,7 +12,6 @@ from armid_ros.papers.exo.report.poses import draw_poses
 from armid_ros.papers.exo.report.sections import (
     assumptions_section,
     forces_section,
-    Poses,
     ShownMotion,
     stiffness_section,
 )
@@ -66,7 +65,7 @@ def exo_report(
         ]
     sections += [
         forces_section(pair, shown),
-        Poses(draw_poses(pair, motions, samples, captions)),
+        draw_poses(pair, motions, samples, captions),
         assumptions_section(),
         Origin(provenance),
     ]

@@ -1,19 +1,17 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A machine and its wearer: stiffness of the ties, forces, poses, assumptions."""
+"""A machine and its wearer: stiffness of the ties, forces, assumptions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.assumptions import Assumption, read_assumptions
 from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
-from armid_ros.papers.exo.report.poses import Drawing
 from armid_ros.report.blocks import (
     ContentSection,
     DataTable,
@@ -24,7 +22,6 @@ from armid_ros.report.blocks import (
 )
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import measured
-from armid_ros.report.page import Section
 import numpy as np
 
 _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
@@ -122,25 +119,6 @@ def forces_section(pair: TiedPair, shown: ShownMotion) -> ContentSection:
             Fold('What the springs make of the joint torques', [Panels(panels)]),
         ],
     )
-
-
-@dataclass(frozen=True)
-class Poses(Section):
-    """
-    Both bodies at instants of the motion.
-
-    Attributes
-    ----------
-    drawing : Drawing
-        Lines of both and where the springs are.
-
-    """
-
-    title: ClassVar[str] = 'Poses'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'poses.html'
-
-    drawing: Drawing
 
 
 def assumptions_section() -> ContentSection:
