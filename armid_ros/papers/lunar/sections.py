@@ -17,7 +17,7 @@ import numpy as np
 
 def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Show the paper's tables next to those of the repeat, joint by joint."""
-    said = (
+    text = (
         'Peak: of the paper, and the largest torque of gravity at the joint. Errors are those of '
         'trajectories that were not used, against the true torque. Noisy is the error against the '
         "noisy torque of the run, as the paper may have it. Weight is the paper's method, whole "
@@ -27,7 +27,7 @@ def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
         Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
         for one in repeated
     ]
-    return ContentSection('Tables', [Paragraph(said), *folds])
+    return ContentSection('Tables', [Paragraph(text), *folds])
 
 
 def _table(one: Repeated) -> DataTable:
@@ -69,7 +69,7 @@ def _table(one: Repeated) -> DataTable:
 
 def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
     """Show the true torque and that of the identified weight, along a trajectory not used."""
-    said = (
+    text = (
         'Weight alone, identified from the noisy run, along a trajectory that was not used. Drag '
         'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
     )
@@ -81,7 +81,7 @@ def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
         )
         for number, one in enumerate(repeated)
     ]
-    return ContentSection('Torque curves', [Paragraph(said, 'hint'), *folds])
+    return ContentSection('Torque curves', [Paragraph(text, 'hint'), *folds])
 
 
 def _chart(one: Repeated, joint: int) -> Chart:
@@ -112,7 +112,7 @@ def gravity_section(composites: Sequence[Composite], load: str) -> ContentSectio
         The mass that the two runs differ by, as it is read.
 
     """
-    said = (
+    text = (
         'Masses and first moments times the gravity of the moon, in N mm, by the weight alone; '
         "± 95 %. An arm with revolute joints has an even number of them; of the paper's table "
         'nine are legible, and all nine have this form. The two runs differ by '
@@ -131,5 +131,5 @@ def gravity_section(composites: Sequence[Composite], load: str) -> ContentSectio
         for one in composites
     ]
     return ContentSection(
-        'Gravity parameters', [Paragraph(said), DataTable(heads, rows, words=(0, 1))]
+        'Gravity parameters', [Paragraph(text), DataTable(heads, rows, words=(0, 1))]
     )

@@ -35,10 +35,10 @@ def parameters_section(
     values, untuned = unpack(result.parameters).tolist(), unpack(result.untuned).tolist()
     base = None if known is None else unpack(known).tolist()
     std: list[float] = []
-    said = 'From the frequency responses. Step responses would tune them and give intervals.'
+    text = 'From the frequency responses. Step responses would tune them and give intervals.'
     heads = ['Parameter', 'Joint', 'Estimate']
     if result.tuning is not None:
-        said = (
+        text = (
             'Tuned to the step responses; intervals hold 95 %. Of dl and dm only the sum is known '
             'well, dl + dm gear². The shares of link and motor are those of the start values.'
         )
@@ -52,7 +52,7 @@ def parameters_section(
             if known is not None and base is not None:
                 base.append(float(known.total_damping[k]))
     if base is not None:
-        said += f' Compared with {source}.'
+        text += f' Compared with {source}.'
         heads += ['Known', 'Difference']
     rows = []
     for k, (name, joint, unit) in enumerate(lines):
@@ -65,7 +65,7 @@ def parameters_section(
             row += [f'{base[k]:g}', f'{100.0 * (values[k] / base[k] - 1.0):+.2f} %']
         rows.append([*row, pretty(unit)])
     table = DataTable([*heads, 'Unit'], rows, words=(0, 1, len(heads)))
-    return ContentSection('Parameters', [Paragraph(said), table])
+    return ContentSection('Parameters', [Paragraph(text), table])
 
 
 def rigid_section(fit: RigidFit) -> ContentSection:
@@ -77,9 +77,9 @@ def rigid_section(fit: RigidFit) -> ContentSection:
             estimate.parameters, estimate.values, estimate.std, strict=True
         )
     ]
-    said = (
+    text = (
         f'Step 1, least squares below {CUTOFF:g} Hz: motor and link of joint 1, and friction of '
         f'motors and links, are one. {fit.relative_error:.2f} % of the torque is left.'
     )
     heads = ('Parameter', 'Joint', 'Estimate', '± 95 %', 'Unit')
-    return ContentSection('Rigid arm', [Paragraph(said), DataTable(heads, rows, words=(0, 1, 4))])
+    return ContentSection('Rigid arm', [Paragraph(text), DataTable(heads, rows, words=(0, 1, 4))])

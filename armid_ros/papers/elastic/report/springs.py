@@ -46,7 +46,7 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
             for x in (one.antiresonance, one.resonance)
         ]
         motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
-    said = (
+    text = (
         'The twist of each motor against its link, over what the rigid body takes there: inertia, '
         'gravity and the interaction of all links included. Compliance and free play are told '
         'apart where the load changes sides; a correlation near ±1 says that they are not.'
@@ -57,7 +57,7 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
     )
     return ContentSection(
         'Springs',
-        [Paragraph(said), DataTable(_SPRINGS, springs), DataTable(_MOTORS, motors),
+        [Paragraph(text), DataTable(_SPRINGS, springs), DataTable(_MOTORS, motors),
          Paragraph(hint, 'hint')],
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ _SIZE = 'size [dB re rad/(N m s)]'
 
 def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     """Show frequency responses from motor torque to motor velocity of both joints."""
-    said = (
+    text = (
         'From motor torque to motor velocity. The torque between the links is a second input. '
         'Each joint then responds like one motor and one link on a spring. Drag across a plot, or '
         'pinch it, to zoom; double-click or double-tap to see it all.'
@@ -37,7 +37,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
     )
     panels = [panel for k in range(2) for panel in _joint(result, k)]
     return ContentSection(
-        'Frequency responses', [Paragraph(said), Panels(panels), Paragraph(hint, 'hint')]
+        'Frequency responses', [Paragraph(text), Panels(panels), Paragraph(hint, 'hint')]
     )
 
 
@@ -146,7 +146,7 @@ def _dip_and_peak(frequency: FloatArray, size: FloatArray) -> tuple[float, float
 def steps_section(tuning: Tuning) -> ContentSection:
     """Show velocities of the links after steps of the reference, before and after tuning."""
     before, after = tuning.rms
-    said = (
+    text = (
         'Velocities of the links after the loops are asked for a step. Before tuning '
         f'{digits(before, 3)} rad/s rms is left unexplained, after it {digits(after, 3)} rad/s, '
         'noise included.'
@@ -173,4 +173,4 @@ def steps_section(tuning: Tuning) -> ContentSection:
         ]
         name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s asked for'
         panels.append((name, '', charts))
-    return ContentSection('Step responses', [Paragraph(said), Panels(panels)])
+    return ContentSection('Step responses', [Paragraph(text), Panels(panels)])

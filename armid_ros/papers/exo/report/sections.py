@@ -75,13 +75,13 @@ def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) 
         ('Noise of the angles, as filtered', f'{_range(np.degrees(found[0].position_noise))}°'),
         ('Noise of the torques, as filtered', f'{_range(found[0].torque_noise)} N m'),
     ]
-    said = (
+    text = (
         'Springs are drawn out by millimetres, the small difference of measured angles. Noise in '
         'the angles makes plain least squares wrong in a direction that more data do not heal. '
         'The noise was measured in the recording and its effect taken out.'
     )
     table = DataTable([*heads, 'Simulated with'] if truth else heads, rows)
-    return ContentSection('Stiffness', [table, FactList(noise), Paragraph(said, 'hint')])
+    return ContentSection('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
 
 
 def _range(values: FloatArray) -> str:
@@ -127,9 +127,9 @@ def assumptions_section() -> ContentSection:
         (name.replace('_', ' '), _shown(entry), entry.reason)
         for name, entry in read_assumptions().items()
     ]
-    said = 'What the literature leaves open and what was assumed instead.'
+    text = 'What the literature leaves open and what was assumed instead.'
     table = DataTable(['Quantity', 'Value', 'Reason'], rows, words=(0, 1, 2))
-    return ContentSection('Assumptions', [Paragraph(said), table])
+    return ContentSection('Assumptions', [Paragraph(text), table])
 
 
 def _shown(entry: Assumption) -> str:

@@ -183,7 +183,7 @@ class Walk(Section):
 
 def feet_section(cycle: GaitCycle) -> ContentSection:
     """Show what feet bear over a cycle: by the ground, and by the source's rule."""
-    said = (
+    text = (
         "What the ground does to the feet, by the contact of the source's Table 3 "
         '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: from one foot on the ground to '
         'two and back. In double support the source splits the trunk between the legs by the '
@@ -216,12 +216,12 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
                 f'{np.sqrt(np.mean((rule - feet)[two] ** 2)):.0f}',
             )
         )
-    return ContentSection('Feet', [Paragraph(said), Panels(panels), DataTable(heads, rows)])
+    return ContentSection('Feet', [Paragraph(text), Panels(panels), DataTable(heads, rows)])
 
 
 def by_torque_section(walked: SimulatedWalk) -> ContentSection:
     """Show joints driven by their torques over the whole cycle, with what the source found."""
-    said = (
+    text = (
         f'One joint follows its torque alone ({walked.rate:g} samples per second, cubic splines) '
         'through swing and stance; hips are free, all other joints move as prescribed. Largest '
         'errors over the cycle:'
@@ -240,7 +240,7 @@ def by_torque_section(walked: SimulatedWalk) -> ContentSection:
     ]
     panels = [(d.joint, '', _followed(d, walked.cycle.phase[::2])) for d in walked.driven]
     return ContentSection(
-        'Whole cycle by torque', [Paragraph(said), DataTable(heads, rows), Panels(panels)]
+        'Whole cycle by torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
     )
 
 
