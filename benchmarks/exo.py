@@ -22,6 +22,7 @@ from armid_ros.identification.ties.problem import (
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import read_gait
+from armid_ros.papers.exo.plant.gait_cycle import driving_torque, gait_cycle
 from armid_ros.papers.exo.plant.leg_pair import (
     leg_pair,
     pair_torques,
@@ -31,6 +32,7 @@ from armid_ros.papers.exo.plant.leg_pair import (
     walking,
 )
 from armid_ros.papers.exo.plant.torque_driven import splined
+from armid_ros.papers.exo.plant.walkers import walking_pair
 import numpy as np
 
 from benchmarks.exo_deviations import deviations
@@ -38,6 +40,7 @@ from benchmarks.exo_diagnosis import diagnosed
 from benchmarks.exo_noise import find_springs, TORQUE_NOISE, with_torques
 from benchmarks.exo_poses import choose_poses, stiffness_bound
 from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
+from benchmarks.walking_in_mujoco import walk_in_mujoco
 
 SECONDS = 6.0
 #: Time of a step forward and back, of the steps that poses are chosen from [s].
@@ -59,39 +62,29 @@ def main() -> None:
 
 
 def gait_by_torque() -> None:
-    """Drive joints by 100 Hz splined torques in MuJoCo over single support."""
-    pair, gait = leg_pair(), read_gait()
-    motions = walking(pair, gait, np.linspace(0.0, 0.456, 457))
-    soft = pair.with_stiffness(0.8 * pair.stiffness)
-    print('in MuJoCo, one joint by its torque        paper    wanted    measured')
-    for joint, paper, wanted in (('exo_swing_hip', 1.5, 0.05), ('exo_swing_knee', 2.5, 0.1)):
-        error = _error(pair, motions, [joint], pair, 100.0)
-        print(f'  {joint:38s} {paper:4.1f} deg <= {wanted:4.2f} deg  {error:.1e} deg')
-    for joint, wanted in (('exo_swing_hip', 0.6), ('exo_swing_knee', 1.7)):
-        error = _error(pair, motions, [joint], soft, 100.0)
-        what = f'{joint}, springs 20 % too soft'
-        print(f'  {what:38s}     -  about {wanted:3.1f} deg  {error:.2f} deg')
-    whole = walking(pair, gait, np.linspace(0.0, 1.2, 1201), 0.0)
+    """Drive joints by splined torques in MuJoCo over a cycle, then all joints at once."""
+    cycle = gait_cycle(walking_pair(), read_gait())
+    soft = cycle.pair.with_stiffness(0.8 * cycle.pair.stiffness)
+    print('in MuJoCo, one joint by its torque               paper      wanted      measured')
+    for joint, paper, wanted in (('exo_right_hip', 1.5, 0.05), ('exo_right_knee', 2.5, 0.1)):
+        for rate, believed in ((100.0, None), (200.0, None), (1000.0, None), (200.0, soft)):
+            torque = driving_torque(cycle, joint, rate, believed)
+            path = walk_in_mujoco(cycle, joint, lambda t, torque=torque: torque(t)[2]).driven
+            error = _most(path - cycle.motions.own.q[:, cycle.pair.robot.index(joint)])
+            what = f'{joint}, {rate:.0f} Hz' + (', springs 20 % too soft' if believed else '')
+            aim = ' ' * 10 if believed else f'<= {wanted:4.2f} deg'
+            print(f'  {what:45s} {paper:4.1f} deg {aim:11s}  {error:.3g} deg')
+    pair = leg_pair()
+    whole = walking(pair, read_gait(), np.linspace(0.0, 1.2, 1201), 0.0)
     for rate, share in ((50.0, 1.0), (100.0, 1.0), (400.0, 1.0), (400.0, 1.01)):
-        error = _error(pair, whole, pair.robot.joints, pair, rate, share)
-        what = f'all joints, one cycle, {rate:.0f} Hz' + (
-            ', torques 1 % off' if share != 1 else ''
-        )
-        print(f'  {what:38s}     -           -  {error:.2g} deg')
+        torque = splined(whole.own.t, share * pair_torques(pair, *whole).tau, rate)
+        path = drive_in_mujoco(pair, whole, pair.robot.joints, torque)
+        what = f'all joints, {rate:.0f} Hz' + (', torques 1 % off' if share != 1 else '')
+        print(f'  {what:45s}     -                     {_most(path - whole.own.q):.2g} deg')
 
 
-def _error(
-    pair: TiedPair,
-    motions: PairMotion,
-    joints: list[str] | tuple[str, ...],
-    believed: TiedPair,
-    rate: float,
-    share: float = 1.0,
-) -> float:
-    columns = [pair.robot.index(joint) for joint in joints]
-    tau = share * pair_torques(believed, *motions).tau[:, columns]
-    path = drive_in_mujoco(pair, motions, joints, splined(motions.own.t, tau, rate))
-    return float(np.degrees(np.abs(path - motions.own.q[:, columns]).max()))
+def _most(error: FloatArray) -> float:
+    return float(np.degrees(np.abs(error).max()))
 
 
 def stiffness(draws: int) -> None:

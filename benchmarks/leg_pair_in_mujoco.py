@@ -43,7 +43,7 @@ def pair_model(pair: TiedPair) -> mujoco.MjModel:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
     model = spec.compile()
-    model.tendon_stiffness[:], model.tendon_damping[:] = pair.stiffness, pair.damping
+    model.tendon_stiffness[:] = pair.stiffness
     return model
 
 

@@ -19,7 +19,7 @@ CEILING = {
     'asks': 21,
     'asked': 224,
     'believes': 3,
-    'believed': 69,
+    'believed': 66,
     'denies': 1,
     'denied': 11,
     'beside': 178,

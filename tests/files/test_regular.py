@@ -9,7 +9,6 @@ from armid_ros.errors import ArmidError, RobotError
 from armid_ros.excitation import load_environment, load_excitation
 from armid_ros.files import read_text
 from armid_ros.identification.parameters_file import read_parameters
-from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.recording import Bag, read_recording, recover
 from armid_ros.robots import collision_model, load_robot
@@ -25,7 +24,6 @@ READERS = {
     'robot.urdf': load_robot,
     'robot.urdf.xacro': load_robot,
     'gait.csv': read_gait,
-    'assumptions.yaml': read_assumptions,
     'parameters.yaml': lambda path: two_link_set('after', path),
     'robot.srdf': lambda path: collision_model(load_robot('humanoid_arm'), srdf=path),
     'bag.mcap': Bag,

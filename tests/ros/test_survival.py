@@ -73,8 +73,8 @@ def test_an_identifier_survives_every_joint_state(bench):
 @pytest.mark.parametrize('topic', ['exo/joint_states', 'human/joint_states'])
 def test_an_interaction_identifier_survives_every_joint_state(bench, topic):
     node = bench.add(InteractionIdentifierNode)
-    core = node.identifier
-    names = (core.robot if topic.startswith('exo') else core.other).joints
+    machines = node.identifier.machines
+    names = (machines.robot if topic.startswith('exo') else machines.other).joints
     publisher = bench.matched_publisher(JointState, topic)
     sent(bench, node, publisher, hostile(names), lambda: node.received)
     node.publish_diagnostics()

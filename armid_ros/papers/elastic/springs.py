@@ -48,7 +48,7 @@ def identify_springs(
     document = springs_document(found, source)
     write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
     origin = provenance(bags, {'model': str(model or source)})
-    page = springs_report(found, robot.name, provenance=origin)
+    page = springs_report(found, robot.name, origin)
     write_file(staged.folder / 'report.html', page)
     staged.keep()
     if as_json:

@@ -165,7 +165,7 @@ def identify_elastic(
             known, table = printed, f"the set '{begin}', which the tuning began with"
         files, seeds = [*data.bags, *data.steps], seed if data.demo else None
         origin = provenance(files, {'start of the tuning': begin}, seeds)
-        page = elastic_report(result, robot.name, known=known, source=table, provenance=origin)
+        page = elastic_report(result, robot.name, known, table, origin)
         write_file(staged.folder / 'report.html', page)
     document = elastic_document(result, data.robot)
     if data.demo and result.tuning is not None:

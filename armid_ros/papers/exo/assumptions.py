@@ -8,11 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
-from armid_ros.errors import RobotError
-from armid_ros.files import load_yaml, read_text, reading
+from armid_ros.files import load_yaml
 
 
 @dataclass(frozen=True)
@@ -36,30 +34,10 @@ class Assumption:
     reason: str
 
 
-def read_assumptions(path: Path | None = None) -> Mapping[str, Assumption]:
-    """
-    Read a file of assumptions; by default that of the human-exoskeleton leg pair.
-
-    Raises
-    ------
-    RobotError
-        If an entry has no value, unit or reason.
-
-    """
-    path = path or leg_pair_file('exoskeleton_legs/assumptions.yaml')
-    text = read_text(path, RobotError)
-    with reading(path, RobotError):
-        entries = load_yaml(text)
-        try:
-            found = {
-                name: Assumption(entry['value'], entry['unit'], entry['reason'])
-                for name, entry in entries.items()
-            }
-        except (AttributeError, KeyError, TypeError) as error:
-            raise RobotError(
-                f'every entry needs value, unit and reason; one lacks {error}'
-            ) from None
-    return MappingProxyType(found)
+def read_assumptions() -> Mapping[str, Assumption]:
+    """Read the assumptions of the human-exoskeleton leg pair."""
+    text = leg_pair_file('exoskeleton_legs/assumptions.yaml').read_text(encoding='utf-8')
+    return {name: Assumption(**entry) for name, entry in load_yaml(text).items()}
 
 
 def leg_pair_file(name: str) -> Path:

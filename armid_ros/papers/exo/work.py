@@ -29,10 +29,10 @@ from armid_ros.papers.exo.plant.leg_pair import (
     walking,
 )
 from armid_ros.papers.exo.plant.shares import ground_by_shares
-from armid_ros.papers.exo.plant.torque_driven import check_gait
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.page import exo_report, ShownMotion, SimulatedWalk
-from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, Driven
+from armid_ros.papers.exo.report.page import exo_report
+from armid_ros.papers.exo.report.sections import ShownMotion
+from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
 from armid_ros.recording import read_recording, Recording, write_joint_states
 from armid_ros.recording.writer import require_new, whole_bag
 import click
@@ -40,8 +40,7 @@ import numpy as np
 from numpy.random import Generator
 
 #: Joints that the source drives by torque, one at a time.
-_DRIVEN = ('exo_swing_hip', 'exo_swing_knee')
-_DRIVEN_IN_CYCLE = ('exo_right_hip', 'exo_right_knee')
+_DRIVEN = ('exo_right_hip', 'exo_right_knee')
 _SOFTER = 0.2
 SCHEMA = 'armid/exo/1'
 _RATE = 1000.0
@@ -120,15 +119,14 @@ def identify_pair(
         source = str(settled(path))
         both = replace(machine, source=source), replace(wearer, source=source)
         found = _identify(pair, *both, inertias, tick)
-        walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else SimulatedWalk()
+        walked = _walk(pair, gait, simulated.stiffness, tick) if bag is None else None
     document = _document(found, walked, both[0].source)
     page = exo_report(
         pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
         _shown(pair, gait) if bag is None else _recorded(*both),
         found,
         walked,
-        assumptions=read_assumptions(),
-        provenance=provenance(
+        provenance(
             [path], {'inertias': inertias, 'topics': topics}, seed if bag is None else None
         ),
     )
@@ -144,33 +142,21 @@ def identify_pair(
 
 def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
     """Let the simulated pair walk, its joints driven by torque."""
-    tick(0.6, 'driving joints by torque')
-    known, shown = read_assumptions(), _shown(pair, gait)
-    rate = known['torque_rate'].value
-    soft = pair.with_stiffness((1.0 - _SOFTER) * pair.stiffness)
-    driven = [
-        Driven(*(check_gait(pair, shown.motions, joint, rate, one) for one in (pair, soft)))
-        for joint in _DRIVEN
-    ]
-    single = ByTorque(driven, _SOFTER, shown.abscissa[::2], rate)
-    tick(0.75, 'walking a whole cycle')
+    tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
-    cycle, rate = gait_cycle(walkers, gait), known['cycle_torque_rate'].value
-    soft, shared = (
-        walkers.with_stiffness((1.0 - _SOFTER) * walkers.stiffness),
-        ground_by_shares(cycle),
-    )
+    cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
+    soft = walkers.with_stiffness((1.0 - _SOFTER) * walkers.stiffness)
+    shared = ground_by_shares(cycle)
     driven = [
         Driven(
             check_cycle(cycle, joint, rate),
             check_cycle(cycle, joint, rate, soft),
             check_cycle(cycle, joint, rate, ground_forces=shared),
         )
-        for joint in _DRIVEN_IN_CYCLE
+        for joint in _DRIVEN
     ]
     truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
-    whole = CycleByTorque(driven, _SOFTER, cycle.phase[::2], rate)
-    return SimulatedWalk(truth, single, cycle, whole)
+    return SimulatedWalk(truth, cycle, driven, _SOFTER, rate)
 
 
 def _tell(document: dict[str, Any]) -> None:
@@ -188,11 +174,6 @@ def _tell(document: dict[str, Any]) -> None:
         as_json=False,
         right=('stiffness', 'std'),
     )
-    for row in document['gait']:
-        say(
-            f'{row["joint"]} by its torque: at most {row["error_deg"]:.1e} deg off; '
-            f'{row["error_softer_deg"]:.2f} deg with springs {100 * _SOFTER:.0f} % too soft'
-        )
     for row in document['cycle']:
         say(
             f'{row["joint"]} by its torque over a whole cycle: at most {row["error_deg"]:.2g} deg '
@@ -244,7 +225,9 @@ def _smooth(recording: Recording, t: FloatArray) -> Motion:
     return Motion(recording.joints, t, q, np.zeros_like(q), np.zeros_like(q))
 
 
-def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> dict[str, Any]:
+def _document(
+    found: list[Interaction], walked: SimulatedWalk | None, source: str
+) -> dict[str, Any]:
     rows = [
         {
             'segment': segment,
@@ -253,36 +236,27 @@ def _document(found: list[Interaction], walked: SimulatedWalk, source: str) -> d
             'unit': 'N/m',
             'interval': part.interval()[k].tolist(),
             'bias_of_least_squares': float(part.bias[k]),
-            'truth': walked.truth.get(segment),
+            'truth': walked.truth.get(segment) if walked else None,
         }
         for part in found
         for k, segment in enumerate(part.segments)
-    ]
-    gait = [
-        {
-            'joint': d.joint,
-            'error_deg': d.right.most,
-            'error_softer_deg': d.softer.most,
-        }
-        for d in (walked.gait.driven if walked.gait else ())
     ]
     cycle = [
         {
             'joint': d.joint,
             'error_deg': d.right.most,
             'error_softer_deg': d.softer.most,
-            'error_shared_deg': d.shared.most if d.shared else None,
+            'error_shared_deg': d.shared.most,
             'source_deg': d.source,
         }
-        for d in (walked.whole.driven if walked.whole else ())
+        for d in (walked.driven if walked else ())
     ]
     return {
         'schema': SCHEMA,
         'recording': source,
         'stiffness': rows,
-        'gait': gait,
         'cycle': cycle,
-        'feet': _feet(walked.cycle) if walked.cycle else [],
+        'feet': _feet(walked.cycle) if walked else [],
     }
 
 

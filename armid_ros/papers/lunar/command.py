@@ -38,7 +38,7 @@ def lunar(out: Path, seed: int, as_json: bool) -> None:
         found = reproduce(seed=seed, progress=tick)
     document = lunar_document(found)
     write_document(staged.folder / 'lunar.json', document)
-    page = lunar_report(found, provenance=provenance([], {'robot': 'humanoid_arm'}, seed))
+    page = lunar_report(found, provenance([], {'robot': 'humanoid_arm'}, seed))
     write_file(staged.folder / 'report.html', page)
     staged.keep()
     if as_json:

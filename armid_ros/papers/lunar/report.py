@@ -7,7 +7,7 @@ from __future__ import annotations
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.papers.lunar.paper import LOAD, STATED_ERROR
 from armid_ros.papers.lunar.reproduction import Repeated, Reproduction
-from armid_ros.papers.lunar.sections import GravityParameters, PaperTables, TorqueCurves
+from armid_ros.papers.lunar.sections import curves_section, gravity_section, tables_section
 from armid_ros.report.notation import digits, measured
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -18,7 +18,7 @@ import numpy as np
 _WANTED = 1.0, 0.15
 
 
-def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -> str:
+def lunar_report(found: Reproduction, provenance: Provenance) -> str:
     """
     Return report.html of the repeat.
 
@@ -26,7 +26,7 @@ def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -
     ----------
     found : Reproduction
         Tables and gravity parameters.
-    provenance : Provenance, optional
+    provenance : Provenance
         Files, versions, settings, seed.
 
     """
@@ -34,10 +34,10 @@ def lunar_report(found: Reproduction, *, provenance: Provenance | None = None) -
     grade = ('reproduced', 'good') if held else ('in part', 'fair')
     sections: list[Section] = [
         VerdictSection(*grade, sentences(found)),
-        PaperTables(found.repeated),
-        TorqueCurves(found.repeated),
-        GravityParameters(found.composites, _load(found)),
-        Origin(provenance or Provenance()),
+        tables_section(found.repeated),
+        curves_section(found.repeated),
+        gravity_section(found.composites, _load(found)),
+        Origin(provenance),
     ]
     subtitle = 'gravity and dynamics of a 6-DOF humanoid arm · the paper compared with its repeat'
     return Page(

@@ -52,8 +52,6 @@ class MethodErrors:
 
     Attributes
     ----------
-    name : str
-        'weight alone' or 'whole dynamics'.
     result : Identification
         What it found.
     held_out : ndarray, shape (6,)
@@ -64,7 +62,6 @@ class MethodErrors:
 
     """
 
-    name: str
     result: Identification
     held_out: FloatArray
     noisy: FloatArray
@@ -232,14 +229,14 @@ def _repeat(
     believed = believed.with_inertias(_BELIEVED * believed.rigid_parameters)
     torques = [truth.torque(motion) for motion in tests]
     methods = []
-    for name, slow in (('weight alone', True), ('whole dynamics', False)):
+    for slow in (True, False):
         described = ArmModel(believed, quasi_static=slow)
         result = identify(described, [recording], rng=np.random.default_rng(0))
         arm = replace(result.arm, quasi_static=slow)
         found = [arm.torque(motion) for motion in tests]
         off = np.concatenate([f - t for f, t in zip(found, torques, strict=True)])
         left = recording.tau - arm.torque(moved)
-        methods.append(MethodErrors(name, result, _size(off, table), _size(left, table)))
+        methods.append(MethodErrors(result, _size(off, table), _size(left, table)))
         if slow:
             shown = found[0]
     return Repeated(

@@ -4,149 +4,132 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Sequence
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.papers.lunar.reproduction import Composite, Repeated
+from armid_ros.report.blocks import ContentSection, DataTable, Fold, Panels, Paragraph
 from armid_ros.report.charts import Chart, Series, thinned
 from armid_ros.report.notation import digits, measured
-from armid_ros.report.page import Section
 import numpy as np
 
-Row = tuple[str, list[str]]
+
+def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
+    """Show the paper's tables next to those of the repeat, joint by joint."""
+    text = (
+        'Peak: of the paper, and the largest torque of gravity at the joint. Errors are those of '
+        'trajectories that were not used, against the true torque. Noisy is the error against the '
+        "noisy torque of the run, as the paper may have it. Weight is the paper's method, whole "
+        'the full dynamics.'
+    )
+    folds = [
+        Fold(f'Table {one.table.number}: {one.table.title}', [_table(one)], opened=True)
+        for one in repeated
+    ]
+    return ContentSection('Tables', [Paragraph(text), *folds])
 
 
-@dataclass(frozen=True)
-class PaperTables(Section):
-    """
-    The paper's tables next to those of the repeat, joint by joint.
-
-    Attributes
-    ----------
-    repeated : tuple of Repeated
-        Tables in order.
-
-    """
-
-    title: ClassVar[str] = 'Tables'
-    package: ClassVar[str] = 'armid_ros.papers.lunar'
-    template: ClassVar[str] = 'tables.html'
-
-    repeated: tuple[Repeated, ...]
-
-    @property
-    def tables(self) -> list[tuple[Repeated, list[Row]]]:
-        """Each table with its rows: joint and cells, the mean last."""
-        return [(one, self._rows(one)) for one in self.repeated]
-
-    def _rows(self, one: Repeated) -> list[Row]:
-        slow, whole = one.methods
-        scale = 1.0 if one.table.uniform else 100.0
-        ratios = [
-            scale * ratio
-            for ratio in (
-                one.table.ratio,
-                one.ratio(slow.noisy),
-                one.ratio(slow.held_out),
-                one.ratio(whole.held_out),
-            )
-        ]
-        rows = [
-            (
-                joint,
-                [
-                    digits(1e3 * one.table.peak[k], 3),
-                    digits(1e3 * one.peak[k], 3),
-                    digits(1e3 * one.table.error[k]),
-                    digits(1e3 * slow.held_out[k]),
-                    digits(1e3 * whole.held_out[k]),
-                    *(digits(float(ratio[k])) for ratio in ratios),
-                ],
-            )
-            for k, joint in enumerate(one.joints)
-        ]
-        means = [digits(float(np.mean(ratio))) for ratio in ratios]
-        return [*rows, ('mean', ['', '', '', '', '', *means])]
-
-
-@dataclass(frozen=True)
-class TorqueCurves(Section):
-    """
-    True torque and that of the identified weight, along a trajectory that was not used.
-
-    Attributes
-    ----------
-    repeated : tuple of Repeated
-        Tables in order.
-
-    """
-
-    title: ClassVar[str] = 'Torque curves'
-    package: ClassVar[str] = 'armid_ros.papers.lunar'
-    template: ClassVar[str] = 'curves.html'
-
-    repeated: tuple[Repeated, ...]
-
-    @property
-    def drawn(self) -> list[tuple[Repeated, list[tuple[str, Chart]]]]:
-        """Each table with the charts of its joints."""
-        return [
-            (one, [(joint, self._chart(one, k)) for k, joint in enumerate(one.joints)])
-            for one in self.repeated
-        ]
-
-    def _chart(self, one: Repeated, joint: int) -> Chart:
-        tau = one.test.motion.tau
-        assert tau is not None
-        true: FloatArray = 1e3 * tau[:, joint]
-        found: FloatArray = 1e3 * one.test.predicted[:, joint]
-        kept = thinned(true, found)
-        return Chart(
-            one.test.motion.t[kept],
-            [Series('true', true[kept]), Series('identified', found[kept], 'predicted')],
-            'time [s]',
-            'torque [N mm]',
-            height=170,
-            link=f'table{one.table.number}',
+def _table(one: Repeated) -> DataTable:
+    slow, whole = one.methods
+    scale, error, share = 100.0, 'RMSE', 'RMSE over peak [%]'
+    if one.table.uniform:
+        scale, error, share = 1.0, 'MAE', 'MAE over noise'
+    ratios = [
+        scale * ratio
+        for ratio in (
+            one.table.ratio,
+            one.ratio(slow.noisy),
+            one.ratio(slow.held_out),
+            one.ratio(whole.held_out),
         )
+    ]
+    rows = [
+        (
+            joint,
+            digits(1e3 * one.table.peak[k], 3),
+            digits(1e3 * one.peak[k], 3),
+            digits(1e3 * one.table.error[k]),
+            digits(1e3 * slow.held_out[k]),
+            digits(1e3 * whole.held_out[k]),
+            *(digits(float(ratio[k])) for ratio in ratios),
+        )
+        for k, joint in enumerate(one.joints)
+    ]
+    mean = ('mean', *[''] * 5, *(digits(float(np.mean(ratio))) for ratio in ratios))
+    heads = (
+        'Joint',
+        'Peak, paper [N mm]',
+        'Peak, largest [N mm]',
+        *(f'{error}, {by} [N mm]' for by in ('paper', 'weight', 'whole')),
+        *(f'{share}, {by}' for by in ('paper', 'noisy', 'weight', 'whole')),
+    )
+    return DataTable(heads, [*rows, mean])
 
 
-@dataclass(frozen=True)
-class GravityParameters(Section):
+def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
+    """Show the true torque and that of the identified weight, along a trajectory not used."""
+    text = (
+        'Weight alone, identified from the noisy run, along a trajectory that was not used. Drag '
+        'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
+    )
+    folds = [
+        Fold(
+            f'Table {one.table.number}: {one.table.title}',
+            [Panels([(joint, '', [_chart(one, k)]) for k, joint in enumerate(one.joints)])],
+            opened=number == 0,
+        )
+        for number, one in enumerate(repeated)
+    ]
+    return ContentSection('Torque curves', [Paragraph(text, 'hint'), *folds])
+
+
+def _chart(one: Repeated, joint: int) -> Chart:
+    tau = one.test.motion.tau
+    assert tau is not None
+    true: FloatArray = 1e3 * tau[:, joint]
+    found: FloatArray = 1e3 * one.test.predicted[:, joint]
+    kept = thinned(true, found)
+    return Chart(
+        one.test.motion.t[kept],
+        [Series('true', true[kept]), Series('identified', found[kept], 'predicted')],
+        'time [s]',
+        'torque [N mm]',
+        height=170,
+        link=f'table{one.table.number}',
+    )
+
+
+def gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
     """
-    The minimal gravity parameters, with and without the load.
+    Show the minimal gravity parameters, with and without the load.
 
-    Attributes
+    Parameters
     ----------
-    composites : tuple of Composite
+    composites : sequence of Composite
         All of them.
     load : str
         The mass that the two runs differ by, as it is read.
 
     """
-
-    title: ClassVar[str] = 'Gravity parameters'
-    package: ClassVar[str] = 'armid_ros.papers.lunar'
-    template: ClassVar[str] = 'composites.html'
-
-    composites: tuple[Composite, ...]
-    load: str
-
-    @property
-    def rows(self) -> list[tuple[str, str, list[str]]]:
-        """Expression, joint and cells."""
-        return [
-            (
-                one.name,
-                one.joint,
-                [
-                    f'{one.truth:.3f}',
-                    ' ± '.join(measured(one.value, HALF_WIDTH * one.std)),
-                    f'{one.loaded_truth:.3f}',
-                    ' ± '.join(measured(one.loaded, HALF_WIDTH * one.loaded_std)),
-                ],
-            )
-            for one in self.composites
-        ]
+    text = (
+        'Masses and first moments times the gravity of the moon, in N mm, by the weight alone; '
+        "± 95 %. An arm with revolute joints has an even number of them; of the paper's table "
+        'nine are legible, and all nine have this form. The two runs differ by '
+        f'{load} at the hand.'
+    )
+    heads = ('Parameter', 'Joint', 'True', 'Identified', 'True, loaded', 'Identified, loaded')
+    rows = [
+        (
+            one.name,
+            one.joint,
+            f'{one.truth:.3f}',
+            ' ± '.join(measured(one.value, HALF_WIDTH * one.std)),
+            f'{one.loaded_truth:.3f}',
+            ' ± '.join(measured(one.loaded, HALF_WIDTH * one.loaded_std)),
+        )
+        for one in composites
+    ]
+    return ContentSection(
+        'Gravity parameters', [Paragraph(text), DataTable(heads, rows, words=(0, 1))]
+    )

@@ -34,7 +34,7 @@ def test_demo_finds_the_springs(demo) -> None:
     assert document['schema'] == 'armid/elastic/1'
     assert faults('elastic', document) == []
     assert stiffness(document) == pytest.approx(wanted, rel=0.02)
-    assert (demo / 'report.html').stat().st_size > 10_000
+    assert 'Table 1 of the source' in (demo / 'report.html').read_text(encoding='utf-8')
 
 
 def test_demo_tells_the_story_of_the_tuning(demo) -> None:
@@ -53,9 +53,7 @@ def test_bags_give_the_same_again_and_no_steps_leave_out_the_tuning(demo, tmp_pa
     again = json.loads((tmp_path / 'again' / 'elastic.json').read_text())
     assert 'tuning' not in again
     page = (tmp_path / 'again' / 'report.html').read_text(encoding='utf-8')
-    assert 'no intervals' in page
     assert 'Step responses</h2>' not in page
-    assert '± 95 %</th><th class="number wide">' not in page
     assert faults('elastic', again) == []
     assert again['untuned'] == json.loads((demo / 'elastic.json').read_text())['untuned']
 

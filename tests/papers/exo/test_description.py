@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from armid_ros.errors import RobotError
 from armid_ros.papers.exo.assumptions import read_assumptions
 from armid_ros.robots import load_robot, Robot
 import numpy as np
@@ -66,14 +65,3 @@ def test_the_exoskeleton_is_what_was_assumed() -> None:
             reach = np.abs(body.lever).max()
             ends = (centroid[segment], length[segment] - centroid[segment])
             assert min(abs(reach - end) for end in ends) < 1e-9
-
-
-def test_every_assumption_has_a_reason() -> None:
-    assert all(entry.reason.strip().endswith('.') for entry in read_assumptions().values())
-
-
-def test_an_assumption_without_reason_is_refused(tmp_path) -> None:
-    path = tmp_path / 'assumptions.yaml'
-    path.write_text('mass: {value: 3.0, unit: kg}\n', encoding='utf-8')
-    with pytest.raises(RobotError, match='reason'):
-        read_assumptions(path)

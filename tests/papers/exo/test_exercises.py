@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from armid_ros.errors import TrajectoryError
 from armid_ros.papers.exo.plant.exercises import exercise, EXERCISES
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 import numpy as np
@@ -38,8 +37,3 @@ def test_quick_steps_tell_the_springs_best() -> None:
     worst = {name: bound(name, 60).max() for name in ('step', 'quick_step', 'squat', 'rock')}
     assert min(worst, key=worst.__getitem__) == 'quick_step'
     assert worst['quick_step'] < 0.6 * worst['step']
-
-
-def test_an_exercise_that_there_is_not_is_refused() -> None:
-    with pytest.raises(TrajectoryError, match='quick_step'):
-        exercise(PAIR, 'dance', T)

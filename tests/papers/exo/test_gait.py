@@ -58,8 +58,3 @@ def test_what_is_no_gait_is_refused(tmp_path, text, message) -> None:
     path.write_text(text, encoding='utf-8')
     with pytest.raises(TrajectoryError, match=message):
         read_gait(path)
-
-
-def test_a_missing_file_is_named(tmp_path) -> None:
-    with pytest.raises(TrajectoryError, match=r'none\.csv'):
-        read_gait(tmp_path / 'none.csv')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
 from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
+from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
 import numpy as np
@@ -17,8 +18,9 @@ SETTINGS = InteractionSettings(memory=4.0, period=2.0)
 
 def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
-    walking = SimulatedPair(pair, sensors=SENSORS, rate=500.0, rng=np.random.default_rng(0))
-    online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
+    rng = np.random.default_rng(0)
+    walking = SimulatedPair(pair, read_gait(), sensors=SENSORS, rate=500.0, rng=rng)
+    online = OnlineInteraction(pair.machines, SETTINGS)
     for _ in range(round(500.0 * seconds)):
         sample = walking.advance()
         online.take_other(sample.t, sample.other_q)
@@ -47,7 +49,7 @@ def test_slack_is_seen_and_measured():
 
 def test_one_machine_alone_is_not_enough():
     pair = leg_pair()
-    online = OnlineInteraction(pair.robot, pair.other, pair.ties, SETTINGS)
+    online = OnlineInteraction(pair.machines, SETTINGS)
     online.take(0.0, np.zeros(6), np.zeros(6))
     with pytest.raises(IdentificationError, match='joint states'):
         online.take(5.0, np.zeros(6), np.zeros(6))

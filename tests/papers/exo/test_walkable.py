@@ -31,7 +31,6 @@ def feet(plan):
 
 def test_heel_and_toe_stay_where_they_stand(plan) -> None:
     phase, heel, toe = feet(plan)
-    assert plan.sliding < 0.5e-3
     for point, place, (begin, end) in (
         (heel, [0.0, 0.0], HEEL_DOWN),
         (toe, [LEG.foot, 0.0], TOE_DOWN),

@@ -29,6 +29,8 @@ DualArray = npt.NDArray[Any]
 #: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
 _STEP = 1e-30
 _ROUNDS = 16
+#: Parts that a sample is integrated in.
+_SUBSTEPS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,6 @@ class Steps:
         Gains.
     integral : ndarray, shape (E, 2)
         What the integral of the loop holds at first [rad].
-    substeps : int
-        Parts that a sample is integrated in.
 
     """
 
@@ -58,7 +58,6 @@ class Steps:
     dt: float
     loop: VelocityLoop
     integral: FloatArray
-    substeps: int = 2
 
     @classmethod
     def of(cls, runs: Sequence[ElasticRun], loop: VelocityLoop) -> Steps:
@@ -76,8 +75,8 @@ class Steps:
 
 def velocities(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
     """Return velocities of motors (at the joints) and links, shape (N, E, 4) [rad/s]."""
-    values = unpack(parameters)[np.newaxis]
-    return np.asarray(_simulate(steps, values, parameters).real[:, :, 0])
+    values = _point(parameters)[np.newaxis]
+    return np.asarray(_simulate(steps, values, parameters.gear).real[:, :, 0])
 
 
 def sensitivities(
@@ -92,7 +91,7 @@ def sensitivities(
         The experiments.
     parameters : TwoLinkParameters
         Where to differentiate.
-    directions : ndarray, shape (D, 13) or (D, 15)
+    directions : ndarray, shape (D, 15)
         Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques; they
         should be of the size of these.
 
@@ -103,9 +102,8 @@ def sensitivities(
     derivatives : ndarray, shape (N, E, 4, D)
 
     """
-    point = np.concatenate([unpack(parameters), parameters.coulomb])
-    values = point[: directions.shape[1]] + 1j * _STEP * directions
-    found = _simulate(steps, values, parameters)
+    values = _point(parameters) + 1j * _STEP * directions
+    found = _simulate(steps, values, parameters.gear)
     return found[:, :, 0].real, np.moveaxis(found.imag / _STEP, 2, 3)
 
 
@@ -120,17 +118,21 @@ def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
         both links [rad/s] at first.
 
     """
-    values = np.tile(unpack(parameters).astype(complex), (4, 1))
-    found = _simulate(steps, values, parameters, 1j * _STEP * np.eye(4))
+    values = np.tile(_point(parameters).astype(complex), (4, 1))
+    found = _simulate(steps, values, parameters.gear, 1j * _STEP * np.eye(4))
     return np.moveaxis(found.imag / _STEP, 2, 3)
 
 
+def _point(parameters: TwoLinkParameters) -> FloatArray:
+    return np.concatenate([unpack(parameters), parameters.coulomb])
+
+
 def _simulate(
-    steps: Steps, values: DualArray, fixed: TwoLinkParameters, rest: DualArray | None = None
+    steps: Steps, values: DualArray, gear: FloatArray, rest: DualArray | None = None
 ) -> DualArray:
     """Run E experiments with D parameter vectors and initial states each; (N, E, D, 4)."""
     experiments, sets = len(steps.q), len(values)
-    arm = _Arm(np.tile(values, (experiments, 1)), fixed, steps.dt / steps.substeps)
+    arm = _Arm(np.tile(values, (experiments, 1)), gear, steps.dt / _SUBSTEPS)
     size = experiments * sets
     dtype = values.dtype
     q2 = np.repeat(steps.q[:, 1], sets).astype(dtype)
@@ -147,23 +149,22 @@ def _simulate(
         error = reference - x[:, 2:4]
         integral = integral + steps.dt * error
         torque = steps.loop.proportional * error + steps.loop.integral * integral
-        for _ in range(steps.substeps):
+        for _ in range(_SUBSTEPS):
             q2, x, dv, modes = arm.advance(q2, x, dv, modes, torque)
     return out.reshape(len(out), experiments, sets, 4)
 
 
 class _Arm:
-    """The two links with B parameter vectors, shape (B, 13), for one step of integration."""
+    """The two links with B parameter vectors, shape (B, 15), for one step of integration."""
 
-    def __init__(self, values: DualArray, fixed: TwoLinkParameters, dt: float):
+    def __init__(self, values: DualArray, gear: FloatArray, dt: float):
         self.alpha, self.beta, self.gamma = values[:, 0], values[:, 1], values[:, 2]
-        self.rotor = values[:, 3:5] * fixed.gear**2
+        self.rotor = values[:, 3:5] * gear**2
         self.stiffness = values[:, 5:7]
         self.link_damping = values[:, 7:9]
-        self.motor_damping = values[:, 9:11] * fixed.gear**2
+        self.motor_damping = values[:, 9:11] * gear**2
         self.spring_damping = values[:, 11:13]
-        free = values.shape[1] > SIZE
-        self.coulomb = values[:, SIZE:] * fixed.gear if free else fixed.joint_coulomb
+        self.coulomb = values[:, SIZE:] * gear
         self.dt = dt
         batch, dtype = len(values), values.dtype
         self.a = np.zeros((batch, 6, 6), dtype)
@@ -246,7 +247,7 @@ def _friction(
         Change of velocity at the end of the step per torque.
     free : ndarray, shape (B, 2)
         Velocity at the end without friction.
-    level : ndarray, shape (2,) or (B, 2)
+    level : ndarray, shape (B, 2)
         Coulomb torque.
     modes : ndarray of int, shape (B, 2)
         First guess: 1 slips forwards, -1 backwards, 0 sticks.

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.subspace import Signals
 import numpy as np
@@ -34,18 +33,14 @@ def measured_response(
     dt : float
         Time between samples [s].
     window : float
-        Length of the averaged stretches [s], half overlapping, under a Hann window.
+        Length of the averaged stretches [s], half overlapping, under a Hann window; no longer than
+        the experiments.
 
     Returns
     -------
     frequency : ndarray, shape (K,)
         [Hz], zero left out.
     response : ndarray of complex, shape (K, p, m)
-
-    Raises
-    ------
-    IdentificationError
-        If the data are shorter than one window.
 
     """
     size = round(window / dt)
@@ -60,10 +55,6 @@ def measured_response(
             )
             cross.append(np.einsum('kp,km->kpm', y, u.conj()))
             power.append(np.einsum('kl,km->klm', u, u.conj()))
-    if not cross:
-        raise IdentificationError(
-            f'no experiment is as long as the window of {window:g} s of the spectra'
-        )
     frequency = np.fft.rfftfreq(size, dt)[1:]
     inverse = np.linalg.pinv(np.sum(power, axis=0)[1:], rcond=1e-12, hermitian=True)
     response = np.asarray(np.sum(cross, axis=0)[1:] @ inverse)

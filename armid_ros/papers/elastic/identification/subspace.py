@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.errors import IdentificationError
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
@@ -75,16 +75,6 @@ class Signals:
     u: FloatArray
     y: FloatArray
 
-    def __post_init__(self) -> None:
-        """Freeze the arrays and check that they belong together."""
-        object.__setattr__(self, 'u', read_only(self.u))
-        object.__setattr__(self, 'y', read_only(self.y))
-        if self.u.ndim != 2 or self.y.ndim != 2 or len(self.u) != len(self.y):
-            raise IdentificationError(
-                f'subspace identification: inputs {self.u.shape} and outputs {self.y.shape} have '
-                'to be tables of equal length'
-            )
-
 
 def identify_subspace(
     experiments: Sequence[Signals],
@@ -113,7 +103,13 @@ def identify_subspace(
         sampled system.
 
     """
-    _require_data(experiments, order, hold)
+    needed = 4 * _HORIZON * (experiments[0].u.shape[1] + experiments[0].y.shape[1])
+    columns = sum(max(len(e.u) - 2 * _HORIZON + 1, 0) for e in experiments)
+    if columns < needed:
+        raise IdentificationError(
+            f'subspace identification: {columns} samples after the first {2 * _HORIZON} of each '
+            f'experiment are too few; {needed} are needed'
+        )
     u_scale, y_scale = (
         np.sqrt(np.mean(np.concatenate([getattr(e, name) for e in experiments]) ** 2, axis=0))
         for name in ('u', 'y')
@@ -132,25 +128,6 @@ def identify_subspace(
     modal = c @ vectors
     b = _inputs(scaled, dt, poles, modal, hold)
     return StateSpace(poles, b / u_scale, y_scale[:, np.newaxis] * modal)
-
-
-def _require_data(experiments: Sequence[Signals], order: int, hold: Sequence[Hold]) -> None:
-    if not experiments:
-        raise IdentificationError('subspace identification: there is no experiment')
-    m, p = experiments[0].u.shape[1], experiments[0].y.shape[1]
-    if len(hold) != m:
-        raise IdentificationError(f'subspace identification: {m} inputs, but {len(hold)} holds')
-    if order > p * (_HORIZON - 1):
-        raise IdentificationError(
-            f'subspace identification: order {order} is above {p * (_HORIZON - 1)}, the highest '
-            f'of {p} outputs'
-        )
-    columns = sum(max(len(e.u) - 2 * _HORIZON + 1, 0) for e in experiments)
-    if columns < 4 * _HORIZON * (m + p):
-        raise IdentificationError(
-            f'subspace identification: {columns} samples after the first {2 * _HORIZON} of each '
-            f'experiment are too few; {4 * _HORIZON * (m + p)} are needed'
-        )
 
 
 def _observable(experiments: Sequence[Signals], order: int) -> tuple[FloatArray, FloatArray]:

@@ -124,8 +124,6 @@ def identify_two_inertia(
         If the data do not tell; the message says which step, and what to do.
 
     """
-    if not runs:
-        raise IdentificationError('no experiments through the resonances are given')
     if steps and loop is None:
         raise IdentificationError('tuning to step responses needs the gains of their loop')
 

@@ -112,11 +112,9 @@ def tune(
     Raises
     ------
     IdentificationError
-        If there are no runs, or the responses do not determine the factors.
+        If the responses do not determine the factors.
 
     """
-    if not runs:
-        raise IdentificationError('tuning needs step responses, and there are none')
     steps = Steps.of(runs, loop)
     count = len(steps.reference)
     measured = np.stack(

@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.papers.elastic.identification.interaction import decibel_error
-from armid_ros.papers.elastic.identification.physical import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
-from armid_ros.papers.elastic.report.parameters import ElasticParameters, RigidParameters
-from armid_ros.papers.elastic.report.steps import COMPARED, Responses, StepResponses
+from armid_ros.papers.elastic.report.parameters import parameters_section, rigid_section
+from armid_ros.papers.elastic.report.steps import decibels_apart, responses_section, steps_section
 from armid_ros.report.notation import counted, digits
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
@@ -23,10 +21,9 @@ _CLOSE_DB = 0.5
 def elastic_report(
     result: TwoInertiaIdentification,
     robot: str,
-    *,
-    known: TwoLinkParameters | None = None,
-    source: str = '',
-    provenance: Provenance | None = None,
+    known: TwoLinkParameters | None,
+    source: str,
+    provenance: Provenance,
 ) -> str:
     """
     Return report.html of an identification of elastic joints.
@@ -37,21 +34,21 @@ def elastic_report(
         What the three steps found.
     robot : str
         Its name.
-    known : TwoLinkParameters, optional
+    known : TwoLinkParameters or None
         What the parameters are compared with.
     source : str
         Where that comes from, in words.
-    provenance : Provenance, optional
+    provenance : Provenance
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [_verdict(result), Responses(result)]
+    sections: list[Section] = [_verdict(result), responses_section(result)]
     if result.tuning is not None:
-        sections.append(StepResponses(result.tuning))
+        sections.append(steps_section(result.tuning))
     sections += [
-        ElasticParameters(result, known, source),
-        RigidParameters(result.rigid),
-        Origin(provenance or Provenance()),
+        parameters_section(result, known, source),
+        rigid_section(result.rigid),
+        Origin(provenance),
     ]
     steps = 0 if result.tuning is None else result.tuning.measured.shape[1]
     subtitle = f'{robot} · {counted(result.experiments, "experiment")} through the resonances'
@@ -70,7 +67,11 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
         springs.append(f'{value} N m/rad at {joint.joint}')
     interval = ' (95 %)' if result.tuning is not None else ''
     sentences = [f'The springs have {" and ".join(springs)}{interval}.']
-    poor = [joint.joint for k, joint in enumerate(result.joints) if _apart(result, k) > _CLOSE_DB]
+    poor = [
+        joint.joint
+        for k, joint in enumerate(result.joints)
+        if decibels_apart(result, k) > _CLOSE_DB
+    ]
     beware = (
         [
             f'{", ".join(poor)}: what was measured is not the response of a motor and a link on a '
@@ -93,11 +94,3 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
     return VerdictSection(
         'uncertain' if poor else 'found', 'fair' if poor else 'good', sentences, beware
     )
-
-
-def _apart(result: TwoInertiaIdentification, joint: int) -> float:
-    """Return how far measured and physical responses of a joint are apart, 5 to 60 Hz [dB]."""
-    measured = result.measured[joint]
-    seen = (measured.frequency >= COMPARED[0]) & (measured.frequency <= COMPARED[1])
-    ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
-    return decibel_error(measured.decoupled[seen, 0], ideal)

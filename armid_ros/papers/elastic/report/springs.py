@@ -5,76 +5,64 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.papers.elastic.identification.joints import SpringEstimate
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
 from armid_ros.report.notation import counted
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
+_SPRINGS = (
+    'Joint', 'Stiffness [N m/rad]', '95 %', 'Backlash [mrad], 95 %', 'Correlation', 'R²'
+)  # fmt: skip
+_MOTORS = (
+    'Joint', 'Link [kg m²]', 'Rotor [kg m²]', 'Viscous [N m s/rad]', 'Coulomb [N m]',
+    'Antiresonance [Hz]', 'Resonance [Hz]',
+)  # fmt: skip
 
-@dataclass(frozen=True)
-class Springs(Section):
-    """
-    Stiffness, free play and motor of every joint.
 
-    Attributes
-    ----------
-    found : sequence of SpringEstimate
-        Every joint.
-
-    """
-
-    title: ClassVar[str] = 'Springs'
-    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
-    template: ClassVar[str] = 'springs.html'
-
-    found: Sequence[SpringEstimate]
-
-    @property
-    def springs(self) -> list[tuple[str, str, str, str, str, str]]:
-        """Joint, stiffness, interval, free play, correlation of the two, R^2."""
-        rows = []
-        for one in self.found:
-            fit = one.transmission
-            value, low, high = fit.stiffness
-            play = [1e3 * x for x in fit.backlash]
-            rows.append(
-                (
-                    one.joint,
-                    f'{value:.4g}' if one.informative else 'not identifiable',
-                    f'{low:.4g} to {high:.4g}' if one.informative else '',
-                    f'{play[1]:.2g} to {play[2]:.2g}'
-                    if np.isfinite(play).all()
-                    else 'no reversals',
-                    f'{fit.correlation:+.2f}' if np.isfinite(fit.correlation) else '',
-                    f'{fit.explained:.4f}',
-                )
+def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
+    """Show stiffness, free play and motor of every joint."""
+    springs, motors = [], []
+    for one in found:
+        fit = one.transmission
+        value, low, high = fit.stiffness
+        play = [1e3 * x for x in fit.backlash]
+        springs.append(
+            (
+                one.joint,
+                f'{value:.4g}' if one.informative else 'not identifiable',
+                f'{low:.4g} to {high:.4g}' if one.informative else '',
+                f'{play[1]:.2g} to {play[2]:.2g}' if np.isfinite(play).all() else 'no reversals',
+                f'{fit.correlation:+.2f}' if np.isfinite(fit.correlation) else '',
+                f'{fit.explained:.4f}',
             )
-        return rows
+        )
+        own = ['', '', ''] if one.motor is None else [f'{x:.3g}' for x in one.motor]
+        both = [
+            f'{x:.1f}' if one.informative and np.isfinite(x) else ''
+            for x in (one.antiresonance, one.resonance)
+        ]
+        motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
+    text = (
+        'The twist of each motor against its link, over what the rigid body takes there: inertia, '
+        'gravity and the interaction of all links included. Compliance and free play are told '
+        'apart where the load changes sides; a correlation near ±1 says that they are not.'
+    )
+    hint = (
+        'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
+        'recording.'
+    )
+    return ContentSection(
+        'Springs',
+        [Paragraph(text), DataTable(_SPRINGS, springs), DataTable(_MOTORS, motors),
+         Paragraph(hint, 'hint')],
+    )  # fmt: skip
 
-    @property
-    def motors(self) -> list[tuple[str, str, str, str, str, str, str]]:
-        """Joint, inertia of the link, rotor, friction twice, antiresonance, resonance."""
-        rows = []
-        for one in self.found:
-            own = ['', '', ''] if one.motor is None else [f'{x:.3g}' for x in one.motor]
-            both = [
-                f'{x:.1f}' if one.informative and np.isfinite(x) else ''
-                for x in (one.antiresonance, one.resonance)
-            ]
-            rows.append(
-                (one.joint, f'{one.inertia:.3g}', own[0], own[1], own[2], both[0], both[1])
-            )
-        return rows
 
-
-def springs_report(
-    found: Sequence[SpringEstimate], robot: str, *, provenance: Provenance | None = None
-) -> str:
+def springs_report(found: Sequence[SpringEstimate], robot: str, provenance: Provenance) -> str:
     """
     Return report.html of springs that were found joint by joint.
 
@@ -84,11 +72,11 @@ def springs_report(
         Every joint.
     robot : str
         Its name.
-    provenance : Provenance, optional
+    provenance : Provenance
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [_verdict(found), Springs(found), Origin(provenance or Provenance())]
+    sections: list[Section] = [_verdict(found), _springs(found), Origin(provenance)]
     subtitle = f'{robot} · {counted(len(found), "joint")}, encoders on both sides'
     return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 

@@ -4,123 +4,101 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable, Iterator, Sequence
 
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.interaction import coupled_response, decibel_error
 from armid_ros.papers.elastic.identification.physical import ideal_response
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
+from armid_ros.report.blocks import ContentSection, FactList, PageBlock, Panels, Paragraph
 from armid_ros.report.charts import Chart, Mark, Role, Series
 from armid_ros.report.notation import digits
-from armid_ros.report.page import Section
 import numpy as np
 import numpy.typing as npt
 
 #: What is shown, and what responses are compared in [Hz].
-_SHOWN, COMPARED = (2.0, 100.0), (5.0, 60.0)
+_SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
 _POINTS = 300
 _ROLES: tuple[Role, Role] = ('residual', 'predicted')
+_SIZE = 'size [dB re rad/(N m s)]'
 
 
-@dataclass(frozen=True)
-class JointResponse:
-    """
-    Responses of one joint, ready to be drawn.
-
-    Attributes
-    ----------
-    joint : str
-        Its name.
-    size, phase : Chart
-        Decoupled: measured, by subspaces, by physical parameters.
-    coupled : Chart
-        From motor torque alone: measured, whole arm, and this joint.
-    facts : sequence of (str, str)
-        Frequencies and differences.
-
-    """
-
-    joint: str
-    size: Chart
-    phase: Chart
-    coupled: Chart
-    facts: Sequence[tuple[str, str]]
+def responses_section(result: TwoInertiaIdentification) -> ContentSection:
+    """Show frequency responses from motor torque to motor velocity of both joints."""
+    text = (
+        'From motor torque to motor velocity. The torque between the links is a second input. '
+        'Each joint then responds like one motor and one link on a spring. Drag across a plot, or '
+        'pinch it, to zoom; double-click or double-tap to see it all.'
+    )
+    hint = (
+        'The response of the whole arm is the mean over the poses of joint 2 in the recording, '
+        'with the other motor free. Differences are those from 5 to 60 Hz.'
+    )
+    panels = [panel for k in range(2) for panel in _joint(result, k)]
+    return ContentSection(
+        'Frequency responses', [Paragraph(text), Panels(panels), Paragraph(hint, 'hint')]
+    )
 
 
-@dataclass(frozen=True)
-class Responses(Section):
-    """
-    Frequency responses from motor torque to motor velocity of both joints.
+def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
+    """Return how far measured and physical responses of a joint are apart, 5 to 60 Hz [dB]."""
+    measured = result.measured[joint]
+    seen = (measured.frequency >= _COMPARED[0]) & (measured.frequency <= _COMPARED[1])
+    ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
+    return decibel_error(measured.decoupled[seen, 0], ideal)
 
-    Attributes
-    ----------
-    result : TwoInertiaIdentification
-        What was measured and found.
 
-    """
-
-    title: ClassVar[str] = 'Frequency responses'
-    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
-    template: ClassVar[str] = 'responses.html'
-
-    result: TwoInertiaIdentification
-
-    @property
-    def joints(self) -> list[JointResponse]:
-        """Charts and facts of both joints."""
-        return [self._joint(k) for k in range(2)]
-
-    def _joint(self, k: int) -> JointResponse:
-        result, measured = self.result, self.result.measured[k]
-        parameters = result.parameters
-        seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
-        own = measured.frequency[seen]
-        frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, _POINTS), own]))
-        decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
-        subspaces = result.joints[k].system.response(frequency)[:, 0, 0]
-        coupled = coupled_response(parameters, result.angles, frequency)[:, k]
-        at = np.searchsorted(frequency, own)
-        points, alone = np.full((2, len(frequency)), np.nan, complex)
-        points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
-        inertia, rotor, spring = (
-            values[k] for values in (parameters.inertia, parameters.rotor, parameters.stiffness)
-        )
-        low, high = (
-            float(np.sqrt(spring * share) / (2.0 * np.pi))
-            for share in (1.0 / inertia, 1.0 / inertia + 1.0 / rotor)
-        )
-        marks = [
-            Mark(low, f'antiresonance {low:.1f} Hz', before=True),
-            Mark(high, f'resonance {high:.1f} Hz'),
-        ]
-        modelled = [('by subspaces', subspaces), ('by physical parameters', decoupled)]
-        within = (own >= COMPARED[0]) & (own <= COMPARED[1])
-        rows = at[within]
-        errors = (
-            decibel_error(points[rows], decoupled[rows]),
-            decibel_error(alone[rows], decoupled[rows]),
-            decibel_error(alone[rows], coupled[rows]),
-        )
-        dip, peak = _dip_and_peak(own[within], np.abs(alone[rows]))
-        return JointResponse(
-            measured.joint,
-            _chart(frequency, points, modelled, _decibel, 'size [dB re rad/(N m s)]', 260, marks),
-            _chart(frequency, points, modelled, _degrees, 'phase [°]', 150, marks, last=True),
-            _chart(
-                frequency, alone, [('whole arm, modelled', coupled), ('this joint', decoupled)],
-                _decibel, 'size [dB re rad/(N m s)]', 220, marks, last=True,
-            ),
-            [
-                ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
-                ('Lowest, highest from motor torque alone', f'{dip:.1f} Hz, {peak:.1f} Hz'),
-                ('Measured, decoupled, against the joint', f'{errors[0]:.2f} dB rms'),
-                ('From motor torque alone, against the joint', f'{errors[1]:.1f} dB rms'),
-                ('The same against the whole arm', f'{errors[2]:.1f} dB rms'),
-            ],
-        )  # fmt: skip
+def _joint(
+    result: TwoInertiaIdentification, k: int
+) -> Iterator[tuple[str, str, Sequence[PageBlock]]]:
+    """Yield panels of one joint: decoupled, and from motor torque alone."""
+    measured = result.measured[k]
+    parameters = result.parameters
+    seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
+    own = measured.frequency[seen]
+    frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, _POINTS), own]))
+    decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
+    subspaces = result.joints[k].system.response(frequency)[:, 0, 0]
+    coupled = coupled_response(parameters, result.angles, frequency)[:, k]
+    at = np.searchsorted(frequency, own)
+    points, alone = np.full((2, len(frequency)), np.nan, complex)
+    points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
+    inertia, rotor, spring = (
+        values[k] for values in (parameters.inertia, parameters.rotor, parameters.stiffness)
+    )
+    low, high = (
+        float(np.sqrt(spring * share) / (2.0 * np.pi))
+        for share in (1.0 / inertia, 1.0 / inertia + 1.0 / rotor)
+    )
+    marks = [
+        Mark(low, f'antiresonance {low:.1f} Hz', before=True),
+        Mark(high, f'resonance {high:.1f} Hz'),
+    ]
+    modelled = [('by subspaces', subspaces), ('by physical parameters', decoupled)]
+    within = (own >= _COMPARED[0]) & (own <= _COMPARED[1])
+    rows = at[within]
+    errors = (
+        decibels_apart(result, k),
+        decibel_error(alone[rows], decoupled[rows]),
+        decibel_error(alone[rows], coupled[rows]),
+    )
+    dip, peak = _dip_and_peak(own[within], np.abs(alone[rows]))
+    decoupled_charts = (
+        _chart(frequency, points, modelled, _decibel, _SIZE, 260, marks),
+        _chart(frequency, points, modelled, _degrees, 'phase [°]', 150, marks, last=True),
+    )
+    yield measured.joint, 'decoupled', decoupled_charts
+    whole = [('whole arm, modelled', coupled), ('this joint', decoupled)]
+    alone_chart = _chart(frequency, alone, whole, _decibel, _SIZE, 220, marks, last=True)
+    facts = [
+        ('Antiresonance, resonance of the joint', f'{low:.2f} Hz, {high:.2f} Hz'),
+        ('Lowest, highest from motor torque alone', f'{dip:.1f} Hz, {peak:.1f} Hz'),
+        ('Measured, decoupled, against the joint', f'{errors[0]:.2f} dB rms'),
+        ('From motor torque alone, against the joint', f'{errors[1]:.1f} dB rms'),
+        ('The same against the whole arm', f'{errors[2]:.1f} dB rms'),
+    ]
+    yield measured.joint, 'coupled: from motor torque alone', (alone_chart, FactList(facts))
 
 
 def _chart(
@@ -145,9 +123,9 @@ def _chart(
         ylabel,
         height=height,
         link='frequency',
-        marks=marks if 'size' in ylabel else [Mark(mark.x) for mark in marks],
+        marks=marks if ylabel == _SIZE else [Mark(mark.x) for mark in marks],
         logarithmic=True,
-        legend='size' in ylabel,
+        legend=ylabel == _SIZE,
     )
 
 
@@ -165,55 +143,34 @@ def _dip_and_peak(frequency: FloatArray, size: FloatArray) -> tuple[float, float
     return float(frequency[lowest]), float(frequency[lowest + int(np.argmax(size[lowest:]))])
 
 
-@dataclass(frozen=True)
-class StepResponses(Section):
-    """
-    Velocities of the links after steps of the reference, before and after tuning.
-
-    Attributes
-    ----------
-    tuning : Tuning
-        What was measured and simulated.
-
-    """
-
-    title: ClassVar[str] = 'Step responses'
-    package: ClassVar[str] = 'armid_ros.papers.elastic.report'
-    template: ClassVar[str] = 'steps.html'
-
-    tuning: Tuning
-
-    @property
-    def panels(self) -> list[tuple[str, list[Chart]]]:
-        """Pose and charts of both links of every experiment."""
-        tuning = self.tuning
-        samples = np.arange(len(tuning.measured))
-        t = np.asarray(1e3 * tuning.steps.dt * samples, dtype=np.float64)
-        panels = []
-        for k, pose in enumerate(np.degrees(tuning.steps.q[:, 1])):
-            asked = tuning.steps.reference[-1, k]
-            charts = [
-                Chart(
-                    t,
-                    [
-                        Series('measured', tuning.measured[:, k, 2 + link], 'measured'),
-                        Series('before tuning', tuning.before[:, k, 2 + link], 'residual'),
-                        Series('after tuning', tuning.after[:, k, 2 + link], 'predicted'),
-                        Series('asked for', tuning.steps.reference[:, k, link], 'faint'),
-                    ],
-                    'time [ms]',
-                    f'link {link + 1} [rad/s]',
-                    height=180,
-                    link=f'step {k}',
-                )
-                for link in range(2)
-            ]
-            name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s asked for'
-            panels.append((name, charts))
-        return panels
-
-    @property
-    def rms(self) -> tuple[str, str]:
-        """Return what is not explained before and after, noise included [rad/s]."""
-        before, after = self.tuning.rms
-        return digits(before, 3), digits(after, 3)
+def steps_section(tuning: Tuning) -> ContentSection:
+    """Show velocities of the links after steps of the reference, before and after tuning."""
+    before, after = tuning.rms
+    text = (
+        'Velocities of the links after the loops are asked for a step. Before tuning '
+        f'{digits(before, 3)} rad/s rms is left unexplained, after it {digits(after, 3)} rad/s, '
+        'noise included.'
+    )
+    t = np.asarray(1e3 * tuning.steps.dt * np.arange(len(tuning.measured)), dtype=np.float64)
+    panels = []
+    for k, pose in enumerate(np.degrees(tuning.steps.q[:, 1])):
+        asked = tuning.steps.reference[-1, k]
+        charts = [
+            Chart(
+                t,
+                [
+                    Series('measured', tuning.measured[:, k, 2 + link], 'measured'),
+                    Series('before tuning', tuning.before[:, k, 2 + link], 'residual'),
+                    Series('after tuning', tuning.after[:, k, 2 + link], 'predicted'),
+                    Series('asked for', tuning.steps.reference[:, k, link], 'faint'),
+                ],
+                'time [ms]',
+                f'link {link + 1} [rad/s]',
+                height=180,
+                link=f'step {k}',
+            )
+            for link in range(2)
+        ]
+        name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s asked for'
+        panels.append((name, '', charts))
+    return ContentSection('Step responses', [Paragraph(text), Panels(panels)])

@@ -5,18 +5,16 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.ties.problem import Inertias, InteractionProblem
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
-from armid_ros.model.spring_ties import Tie, TiedMachines
+from armid_ros.model.spring_ties import TiedMachines
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.identification.slack import find_slack, Slack
 from armid_ros.recording import Recording
-from armid_ros.robots import Robot
 import numpy as np
 
 #: Samples are averaged to about this rate [Hz]: far above how people move, and cheap.
@@ -96,11 +94,9 @@ class OnlineInteraction:
 
     Parameters
     ----------
-    robot, other : Robot
-        The machine whose torques are measured, and the one it is tied to.
-    ties : sequence of Tie
-        Where springs may be.
-    settings : InteractionSettings, optional
+    machines : TiedMachines
+        Both, and where springs may be.
+    settings : InteractionSettings
         Memory and how often.
 
     Attributes
@@ -112,15 +108,8 @@ class OnlineInteraction:
 
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        other: Robot,
-        ties: Sequence[Tie],
-        settings: InteractionSettings | None = None,
-    ) -> None:
-        self.robot, self.other, self.ties = robot, other, tuple(ties)
-        self.settings = settings or InteractionSettings()
+    def __init__(self, machines: TiedMachines, settings: InteractionSettings) -> None:
+        self.machines, self.settings = machines, settings
         self._own = _Averages(self.settings.memory)
         self._far = _Averages(self.settings.memory)
         self.reset()
@@ -183,22 +172,23 @@ class OnlineInteraction:
         return True
 
     def _problem(self, *, separate: bool, slack: float = 0.0) -> InteractionProblem:
-        n = self.robot.n_joints
+        robot, other = self.machines.robot, self.machines.other
+        n = robot.n_joints
         if len(self._own.t) < 2 or len(self._far.t) < 2:
             raise IdentificationError(
-                f'{self.robot.name} and {self.other.name}: joint states of both are needed'
+                f'{robot.name} and {other.name}: joint states of both are needed'
             )
         begin = self._own.t[0]
         rows = np.array(self._own.rows)
         own, far = (
             Recording(joints=machine.joints, t=np.array(t) - begin, q=q, tau=tau)
             for machine, t, q, tau in (
-                (self.robot, self._own.t, rows[:, :n], rows[:, n:]),
-                (self.other, self._far.t, np.array(self._far.rows), None),
+                (robot, self._own.t, rows[:, :n], rows[:, n:]),
+                (other, self._far.t, np.array(self._far.rows), None),
             )
         )
         return recorded_interaction_problem(
-            TiedMachines(self.robot, self.other, self.ties),
+            self.machines,
             own,
             far,
             inertias=self.settings.inertias,

@@ -16,6 +16,7 @@ from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.messages.joint_states import DISTURBANCES
 from armid_ros.nodes.messages.timeliness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
@@ -33,12 +34,9 @@ _LOOK_PERIOD = 0.1
 _DEPTH = 10_000
 _TOPICS = ('exo/joint_states', 'human/joint_states')
 #: What is said of joint states that are left out.
-_DAMAGED = {
+_DAMAGED = DISTURBANCES | {
     'spike': 'joint states that jump for single samples are left out',
     'pulse': 'torques that jump for single samples, as an arm may do, are left out',
-    'stamp': 'joint states whose stamp alone is off are left out',
-    'out_of_order': 'joint states whose stamp is not after that of the one before are left out',
-    'erratic': 'joint states that follow neither those before nor each other are left out',
 }
 
 
@@ -84,14 +82,13 @@ class InteractionIdentifierNode(ArmidNode):
             self.value('slack_period'),
             self.value('inertias'),
         )
-        self.identifier = OnlineInteraction(pair.robot, pair.other, pair.ties, settings)
+        self.identifier = OnlineInteraction(pair.machines, settings)
         self.received = 0
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
-        core = self.identifier
-        self._joints = core.robot.joints, core.other.joints
+        self._joints = pair.robot.joints, pair.other.joints
         self._gates = tuple(
             joint_gate(robot.prismatic, signals, torque_limit=robot.torque_limit)
-            for robot, signals in ((core.robot, 'qt'), (core.other, 'q'))
+            for robot, signals in ((pair.robot, 'qt'), (pair.other, 'q'))
         )
         self._told: list[Counter[str]] = [Counter(), Counter()]
         self.freshness = tuple(Freshness(topic) for topic in _TOPICS)
@@ -108,7 +105,7 @@ class InteractionIdentifierNode(ArmidNode):
     @property
     def hardware(self) -> str:
         """Name of the machine."""
-        return str(self.identifier.robot.name)
+        return str(self.identifier.machines.robot.name)
 
     def match(self) -> None:
         """Look at who publishes joint states, and say at once when they stop or come again."""
@@ -161,7 +158,7 @@ class InteractionIdentifierNode(ArmidNode):
     def _on_machine(self, message: JointState) -> None:
         self.received += 1
         self.freshness[0].heard()
-        n = self.identifier.robot.n_joints
+        n = len(self._joints[0])
         for sample in self._signals(0, message, ('position', 'effort')):
             self._follow(0, sample)
             try:

@@ -61,16 +61,12 @@ class SimulatedPairNode(ArmidNode):
         ),
     )
 
-    def __init__(
-        self, pair: SimulatedPair | None = None, start_ns: int | None = None, **kwargs: Any
-    ) -> None:
+    def __init__(self, start_ns: int | None = None, **kwargs: Any) -> None:
         """
         Make the node.
 
         Parameters
         ----------
-        pair : SimulatedPair, optional
-            By default the one the parameters describe.
         start_ns : int, optional
             Stamp of the beginning [ns]; by default that of the node's clock.
         **kwargs
@@ -78,7 +74,7 @@ class SimulatedPairNode(ArmidNode):
 
         """
         super().__init__('simulated_pair', **kwargs)
-        self.pair = pair or self._make_pair()
+        self.pair = self._make_pair()
         self._origin_ns = self.get_clock().now().nanoseconds if start_ns is None else start_ns
         self._exo = self.create_publisher(JointState, 'exo/joint_states', SAMPLES)
         self._human = self.create_publisher(JointState, 'human/joint_states', SAMPLES)

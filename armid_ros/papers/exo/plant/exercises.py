@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.gait import Gait, read_gait
 from armid_ros.papers.exo.plant.leg_pair import following, PairMotion, stepping, TiedPair
@@ -78,14 +77,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     gait : Gait, optional
         Of steps; the shipped one by default.
 
-    Raises
-    ------
-    TrajectoryError
-        If there is no such exercise.
-
     """
-    if name not in EXERCISES:
-        raise TrajectoryError(f"no exercise '{name}'; there are {', '.join(EXERCISES)}")
     plan = EXERCISES[name]
     if name.endswith('step'):
         return stepping(pair, gait or read_gait(), t, plan.period)

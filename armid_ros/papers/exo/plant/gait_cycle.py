@@ -59,8 +59,6 @@ class GaitCycle:
         Force on right heel and toe and left heel and toe, forward and up [N].
     torques : PairTorques
         Of all joints; those of the floating joints are what is left over.
-    gaits : tuple of WalkableGait
-        Of the machine and of its wearer.
     soil : Ground
         What they walk on.
 
@@ -72,7 +70,6 @@ class GaitCycle:
     ground: FloatArray
     other_ground: FloatArray
     torques: PairTorques
-    gaits: tuple[WalkableGait, WalkableGait]
     soil: Ground
 
     def feet(self, *, other: bool = False) -> FloatArray:
@@ -99,7 +96,6 @@ class _Course:
     contact: FloatArray  # (2 K, 4, 2)
     contact_speed: FloatArray
     tied: FloatArray  # (2 K, S, 2)
-    tied_speed: FloatArray
     pull: FloatArray  # (2 K, 2): weight and what accelerating limbs do [N]
     mass: float
 
@@ -158,7 +154,6 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
         read_only(forces[0]),
         read_only(forces[1]),
         walking_torques(pair, motions, forces[0], forces[1]),
-        (own, worn),
         ground,
     )
 
@@ -220,26 +215,19 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
     robot = pair.other if other else pair.robot
     joints, points = contacts(robot, leg_length(robot))
     ties = [(t.other_joint, t.other_point) if other else (t.joint, t.point) for t in pair.ties]
-    joints = [*joints, *(joint for joint, _ in ties)]
-    place, jacobian = points_motion(
-        robot, joints, np.vstack([points, [point for _, point in ties]]), motion.q
+    contact, jacobian = points_motion(robot, joints, points, motion.q)
+    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
+    tied, _ = points_motion(
+        robot, [joint for joint, _ in ties], np.array([point for _, point in ties]), motion.q
     )
-    speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)[..., _PLANE]
-    place = place[..., _PLANE]
     data = robot.model.createData()
-    rows = zip(motion.q, motion.dq, motion.ddq, strict=True)
-    hurry = np.array([_hurry(robot, data, *map(np.array, row)) for row in rows])
+    hurry = np.empty((len(motion), 2))  # acceleration of the centre of mass
+    for k, row in enumerate(zip(motion.q, motion.dq, motion.ddq, strict=True)):
+        pin.centerOfMass(robot.model, data, *map(np.array, row))
+        hurry[k] = data.acom[0][_PLANE]
     mass = float(robot.rigid_parameters[::10].sum())
     pull = mass * (robot.gravity[_PLANE] - hurry)
-    return _Course(place[:, :4], speed[:, :4], place[:, 4:], speed[:, 4:], pull, mass)
-
-
-def _hurry(
-    robot: Robot, data: pin.Data, q: FloatArray, dq: FloatArray, ddq: FloatArray
-) -> FloatArray:
-    """Return the acceleration of the centre of mass, forward and up [m/s^2]."""
-    pin.centerOfMass(robot.model, data, q, dq, ddq)
-    return np.asarray(np.asarray(data.acom[0])[_PLANE])
+    return _Course(contact[..., _PLANE], speed[..., _PLANE], tied[..., _PLANE], pull, mass)
 
 
 def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) -> FloatArray:
@@ -273,8 +261,7 @@ def _walk(
             touch = ground.force(points[:, 1], moving[:, 1], moving[:, 0])
             pulls.append(course.pull[k] + touch.sum(axis=0))
         way = own.tied[k] - far.tied[k] + (x[:2] - x[2:4])
-        drift = own.tied_speed[k] - far.tied_speed[k] + (x[4:6] - x[6:])
-        spring = pair.law(way, drift).sum(axis=0)
+        spring = pair.forces(way).sum(axis=0)
         force = np.concatenate([pulls[0] + spring, pulls[1] - spring])
         return np.concatenate([x[4:], force / masses])
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from armid_ros.errors import ModelError
-from armid_ros.model import inverse_dynamics, point_motion
+from armid_ros.model import inverse_dynamics
 from armid_ros.model.spring_ties import (
     leg_ties,
     SEGMENTS,
@@ -51,8 +51,6 @@ class TiedPair:
         Where the S springs are.
     stiffness : ndarray, shape (S,)
         k [N/m].
-    damping : ndarray, shape (S,)
-        Of dampers parallel to the springs [N s/m]; zero by default.
     slack : ndarray, shape (S,)
         Way that a spring gives before it pulls [m]; zero by default.
 
@@ -62,13 +60,12 @@ class TiedPair:
     other: Robot
     ties: tuple[Tie, ...]
     stiffness: FloatArray
-    damping: FloatArray | None = None
     slack: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Spread single numbers over the springs and check them."""
         size = (len(self.ties),)
-        for name in ('stiffness', 'damping', 'slack'):
+        for name in ('stiffness', 'slack'):
             values = getattr(self, name)
             try:
                 spread = np.broadcast_to(np.asarray(0.0 if values is None else values), size)
@@ -103,30 +100,27 @@ class TiedPair:
         """Return the ties along the motions of both."""
         return tie_geometry(self.robot, motion.q, self.other, other_motion.q, self.ties)
 
-    def forces(
-        self, motion: Motion, other_motion: Motion, geometry: TieGeometry | None = None
-    ) -> FloatArray:
+    def forces(self, way: FloatArray) -> FloatArray:
         """
-        Return what the springs do to the machine; they do the opposite to the other one.
+        Return what springs that are drawn out so do to the machine.
+
+        They do the opposite to the other one.
+
+        Parameters
+        ----------
+        way : ndarray, shape (..., S, 3)
+            From the other machine's ends to the machine's own [m].
 
         Returns
         -------
-        ndarray, shape (N, S, 3)
-            Forces at the machine's ends in the base frame [N].
+        ndarray, shape (..., S, 3)
+            [N].
 
         """
-        geometry = geometry or self.geometry(motion, other_motion)
-        own = np.einsum('nsxj,nj->nsx', geometry.jacobian, motion.dq)
-        far = np.einsum('nsxj,nj->nsx', geometry.other_jacobian, other_motion.dq)
-        return self.law(geometry.way, own - far)
-
-    def law(self, way: FloatArray, velocity: FloatArray) -> FloatArray:
-        """Return the force on the machine's end of springs drawn out so, shape (..., S, 3) [N]."""
-        assert self.damping is not None and self.slack is not None
+        assert self.slack is not None
         length = np.linalg.norm(way, axis=-1)
         pulling = np.maximum(1.0 - self.slack / np.maximum(length, 1e-12), 0.0)
-        pull = (self.stiffness * pulling)[..., np.newaxis] * way
-        return np.asarray(-pull - self.damping[:, np.newaxis] * velocity)
+        return np.asarray(-(self.stiffness * pulling)[..., np.newaxis] * way)
 
 
 class PairMotion(NamedTuple):
@@ -163,14 +157,7 @@ class PairTorques:
     forces: FloatArray
 
 
-def pair_torques(
-    pair: TiedPair,
-    motion: Motion,
-    other_motion: Motion,
-    *,
-    foot_force: FloatArray | None = None,
-    foot: tuple[str, tuple[float, float, float]] = ('exo_swing_ankle', (0.0, 0.0, 0.0)),
-) -> PairTorques:
+def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTorques:
     """
     Compute the joint torques of both machines, springs included.
 
@@ -180,22 +167,14 @@ def pair_torques(
         The machines and their springs.
     motion, other_motion : Motion
         How each moves, on one time base.
-    foot_force : ndarray, shape (N, 3), optional
-        In double support: what the ground does to the second foot of the machine [N], (27). It
-        has to be measured or assumed: two feet on the ground leave it open.
-    foot : (str, (float, float, float))
-        Joint that moves that foot, and where the force acts in its frame [m].
 
     """
     geometry = pair.geometry(motion, other_motion)
-    forces = pair.forces(motion, other_motion, geometry)
+    forces = pair.forces(geometry.way)
     tau = inverse_dynamics(pair.robot, motion)
     tau -= np.einsum('nsxj,nsx->nj', geometry.jacobian, forces)
     other_tau = inverse_dynamics(pair.other, other_motion)
     other_tau += np.einsum('nsxj,nsx->nj', geometry.other_jacobian, forces)
-    if foot_force is not None:
-        _, jacobian = point_motion(pair.robot, foot[0], foot[1], motion.q)
-        tau -= np.einsum('nxj,nx->nj', jacobian, foot_force)
     return PairTorques(read_only(tau), read_only(other_tau), read_only(forces))
 
 

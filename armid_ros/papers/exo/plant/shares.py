@@ -46,12 +46,14 @@ def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
     place, taken = place[..., _PLANE], taken[..., _PLANE]
     trunk = floating(robot)[2]
     legs = [columns(robot, side) for side in SIDES]
-    left, right = trunk_shares(place[:, trunk], place[:, legs[1][0]], place[:, legs[0][0]])
+    # shares of the trunk, (20) to (22): the leg whose thigh is nearer carries more
+    far = np.linalg.norm(place[:, [leg[0] for leg in legs]] - place[:, [trunk]], axis=-1)
+    shares = far[:, ::-1] / far.sum(axis=1, keepdims=True)
     springs = cycle.torques.forces[..., _PLANE] * (1.0 if not other else -1.0)
     feet = np.empty((len(motion), 2, 2))
-    for foot, (own, share) in enumerate(zip(legs, (right, left), strict=True)):
+    for foot, own in enumerate(legs):
         pulled = [k for k, tie in enumerate(cycle.pair.ties) if tie.name.startswith(SIDES[foot])]
-        feet[:, foot] = taken[:, own].sum(axis=1) + share[:, np.newaxis] * taken[:, trunk]
+        feet[:, foot] = taken[:, own].sum(axis=1) + shares[:, [foot]] * taken[:, trunk]
         feet[:, foot] -= springs[:, pulled].sum(axis=1)
     bearing = cycle.feet(other=other)[:, :, 1] > 0.0
     for foot in range(2):
@@ -73,26 +75,3 @@ def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     whole = up.sum(axis=2, keepdims=True)
     part = np.where(whole > 0.0, up / np.where(whole > 0.0, whole, 1.0), 0.5)
     return np.asarray((part[..., np.newaxis] * feet[:, :, np.newaxis]).reshape(-1, 4, 2))
-
-
-def trunk_shares(
-    trunk: FloatArray, swing_thigh: FloatArray, stance_thigh: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Split the trunk's mass between the legs by the distances of their thighs, (20) to (22).
-
-    Parameters
-    ----------
-    trunk, swing_thigh, stance_thigh : ndarray, shape (..., 2)
-        Centroids [m].
-
-    Returns
-    -------
-    swing, stance : ndarray, shape (...)
-        Shares that add to 1; the leg whose thigh is nearer carries more.
-
-    """
-    to_swing = np.linalg.norm(swing_thigh - trunk, axis=-1)
-    to_stance = np.linalg.norm(stance_thigh - trunk, axis=-1)
-    swing = np.asarray(to_stance / (to_swing + to_stance))
-    return swing, 1.0 - swing

@@ -9,14 +9,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.assumptions import read_assumptions
-from armid_ros.papers.exo.plant.gait import Gait, read_gait
-from armid_ros.papers.exo.plant.leg_pair import (
-    leg_pair,
-    pair_torques,
-    PairMotion,
-    stepping,
-    TiedPair,
-)
+from armid_ros.papers.exo.plant.gait import Gait
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, stepping, TiedPair
 from armid_ros.papers.exo.plant.torque_driven import drive_by_torque
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
@@ -81,14 +75,14 @@ class SimulatedPair:
 
     Parameters
     ----------
-    pair : TiedPair, optional
-        The machines and their springs; the shipped ones by default.
-    gait : Gait, optional
-        The shipped one by default.
+    pair : TiedPair
+        The machines and their springs.
+    gait : Gait
+        Of one leg.
     driven : sequence of str
         Joints of the machine that follow torques.
-    torque_rate : float, optional
-        Torque samples per second [Hz]; by default what is assumed of the source.
+    torque_rate : float
+        Torque samples per second [Hz].
     rate : float
         Samples per second [Hz].
     sensors : PairSensors, optional
@@ -105,30 +99,27 @@ class SimulatedPair:
 
     def __init__(
         self,
-        pair: TiedPair | None = None,
-        gait: Gait | None = None,
+        pair: TiedPair,
+        gait: Gait,
         *,
         driven: Sequence[str] = (),
-        torque_rate: float | None = None,
+        torque_rate: float = 100.0,
         rate: float = 1000.0,
         sensors: PairSensors | None = None,
         rng: np.random.Generator,
     ) -> None:
-        known = read_assumptions()
-        self.pair = leg_pair() if pair is None else pair
+        self.pair = pair
         self.driven = tuple(driven)
         self._columns = [self.pair.robot.index(joint) for joint in self.driven]
-        self._gait = read_gait() if gait is None else gait
+        self._gait = gait
         self._rate = rate
         self._sensors = sensors or PairSensors()
         self._rng = rng
-        period = float(known['stepping_period'].value)
-        knots = np.linspace(
-            0.0, period, round(period * (torque_rate or known['torque_rate'].value))
-        )
+        period = float(read_assumptions()['stepping_period'].value)
+        knots = np.linspace(0.0, period, round(period * torque_rate))
         tau = np.array(pair_torques(self.pair, *stepping(self.pair, self._gait, knots)).tau)
         tau[-1] = tau[0]
-        self._torque = CubicSpline(knots, tau, bc_type='periodic')
+        self._torque = CubicSpline(knots, tau[:, self._columns], bc_type='periodic')
         self.reset()
 
     def reset(self) -> None:
@@ -176,7 +167,7 @@ class SimulatedPair:
             return PairMotion(own, other), pair_torques(self.pair, own, other).tau
         own = self._driven(own)
         tau = np.array(pair_torques(self.pair, own, other).tau)
-        tau[:, self._columns] = self._torque(t)[:, self._columns]
+        tau[:, self._columns] = self._torque(t)
         return PairMotion(own, other), tau
 
     def _driven(self, own: Motion) -> Motion:
@@ -187,7 +178,7 @@ class SimulatedPair:
             q, dq = np.array(prescribed.q), np.array(prescribed.dq)
             q[0, self._columns], dq[0, self._columns] = self._state
             prescribed = replace(prescribed, q=q, dq=dq)
-        moved = drive_by_torque(self.pair, prescribed, other, self.driven, self._driving_torque)
+        moved = drive_by_torque(self.pair, prescribed, other, self.driven, self._torque)
         self._state = np.array([moved.q[-1, self._columns], moved.dq[-1, self._columns]])
         q, dq, ddq = (np.array(part) for part in (own.q, own.dq, own.ddq))
         far = moved.q[-1, self._columns] - q[-1, self._columns]
@@ -197,6 +188,3 @@ class SimulatedPair:
         for values, curve in ((q, path(own.t)), (dq, speed(own.t)), (ddq, speed(own.t, 1))):
             values[:, self._columns] = curve[:, self._columns]
         return replace(own, q=q, dq=dq, ddq=ddq)
-
-    def _driving_torque(self, t: float) -> FloatArray:
-        return np.asarray(self._torque(t))[self._columns]

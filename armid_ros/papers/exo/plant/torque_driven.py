@@ -18,7 +18,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.contact import Ground
-from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.papers.exo.plant.walkers import contacts, leg_length
 import numpy as np
 import pinocchio as pin
@@ -163,8 +163,7 @@ class _Machine:
         self._data = self._model.createData()
         joints = [tie.other_joint for tie in ties]
         points = np.array([tie.other_point for tie in ties]).reshape(-1, 3)
-        self._far, jacobian = points_motion(pair.other, joints, points, motions.other.q)
-        self._far_speed = np.einsum('nsxj,nj->nsx', jacobian, motions.other.dq)
+        self._far, _ = points_motion(pair.other, joints, points, motions.other.q)
 
     def rate(self, k: int, x: FloatArray, tau: FloatArray) -> FloatArray:
         """Return speeds and accelerations of the free joints at sample k, shape (2 d,)."""
@@ -181,13 +180,10 @@ class _Machine:
         jacobian = np.array(
             [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in self._frames]
         )
-        speed = jacobian @ dq
         force = np.zeros_like(place)
-        force[:tied] = self._pair.law(
-            place[:tied] - self._far[k], speed[:tied] - self._far_speed[k]
-        )
+        force[:tied] = self._pair.forces(place[:tied] - self._far[k])
         if self._ground is not None:
-            feet, moving = place[tied:], speed[tied:]
+            feet, moving = place[tied:], jacobian[tied:] @ dq
             force[tied:, ::2] = self._ground.force(feet[:, 2], moving[:, 2], moving[:, 0])
         push = tau - load[free] + np.einsum('cxj,cx->j', jacobian, force)[free]
         return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])
@@ -227,30 +223,3 @@ class GaitCheck:
     def most(self) -> float:
         """How far it is off at most [deg]."""
         return float(np.degrees(np.abs(self.error).max()))
-
-
-def check_gait(
-    pair: TiedPair, motions: PairMotion, joint: str, rate: float, believed: TiedPair | None = None
-) -> GaitCheck:
-    """
-    Let one joint of the machine walk by its torque, as the source does.
-
-    Parameters
-    ----------
-    pair : TiedPair
-        The machines as they are.
-    motions : PairMotion
-        What was prescribed.
-    joint : str
-        The joint that follows its torque.
-    rate : float
-        Torque samples per second, joined by cubic splines.
-    believed : TiedPair, optional
-        The machines that the torques are computed for; by default those that there are.
-
-    """
-    own, other = motions
-    column = pair.robot.index(joint)
-    tau = pair_torques(believed or pair, own, other).tau[:, [column]]
-    moved = drive_by_torque(pair, own, other, [joint], splined(own.t, tau, rate))
-    return GaitCheck(joint, own.q[::2, column], moved)

@@ -66,8 +66,6 @@ class WalkableGait:
     hips : ndarray, shape (N, 2)
         Path of the hips forward and up over a cycle, evenly sampled, the way at even speed left
         out [m].
-    sliding : float
-        How far a foot on the ground is from where it stands, root mean square [m].
 
     """
 
@@ -75,7 +73,6 @@ class WalkableGait:
     lean: float
     stride: float
     hips: FloatArray
-    sliding: float
 
 
 def foot_points(
@@ -158,14 +155,11 @@ def walkable(
     start[-3:] = 0.15 if lean is None else lean, 1.6 * (leg.thigh + leg.shank), 0.3
     found = least_squares(residual, start, x_scale='jac').x
     angles, hips, own_lean, own_stride = curves.of(found)
-    heel, toe, _ = feet(found)
-    away = np.vstack([heel[heel_down], toe[toe_down]])
     return WalkableGait(
         Gait.fit(phase, angles, harmonics=_HARMONICS),
         own_lean,
         own_stride,
         hips - np.array([found[-1], 0.0]),
-        float(np.sqrt(np.mean(np.sum(away**2, axis=1)))),
     )
 
 

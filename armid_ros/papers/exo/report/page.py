@@ -4,17 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 from armid_ros.identification.ties.stiffness import Interaction
-from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.assumptions import Assumption
-from armid_ros.papers.exo.plant.gait_cycle import GaitCycle
-from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.papers.exo.plant.leg_pair import TiedPair
 from armid_ros.papers.exo.report.poses import draw_poses
-from armid_ros.papers.exo.report.sections import Assumptions, Forces, Poses, Stiffness
-from armid_ros.papers.exo.report.walk import ByTorque, CycleByTorque, FootForces, Walk
+from armid_ros.papers.exo.report.sections import (
+    assumptions_section,
+    forces_section,
+    ShownMotion,
+    stiffness_section,
+)
+from armid_ros.papers.exo.report.walk import by_torque_section, feet_section, SimulatedWalk, Walk
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
@@ -25,59 +26,12 @@ _POSES = 6
 _NARROW = 0.1
 
 
-@dataclass(frozen=True)
-class ShownMotion:
-    """
-    The motion that is shown.
-
-    Attributes
-    ----------
-    motions : PairMotion
-        Of both.
-    abscissa : ndarray, shape (N,)
-        What it is drawn over.
-    name : str
-        Name and unit of the abscissa.
-
-    """
-
-    motions: PairMotion
-    abscissa: FloatArray
-    name: str
-
-
-@dataclass(frozen=True)
-class SimulatedWalk:
-    """
-    What is known of a pair that was simulated; nothing of one that was recorded.
-
-    Attributes
-    ----------
-    truth : mapping of str to float
-        True stiffnesses [N/m].
-    gait : ByTorque or None
-        Joints driven by torque in single support.
-    cycle : GaitCycle or None
-        A whole cycle of walking.
-    whole : CycleByTorque or None
-        Joints driven by torque over that.
-
-    """
-
-    truth: Mapping[str, float] = field(default_factory=dict)
-    gait: ByTorque | None = None
-    cycle: GaitCycle | None = None
-    whole: CycleByTorque | None = None
-
-
 def exo_report(
     pair: TiedPair,
     shown: ShownMotion,
     found: Sequence[Interaction],
-    walked: SimulatedWalk | None = None,
-    *,
-    assumptions: Mapping[str, Assumption] | None = None,
-    provenance: Provenance | None = None,
+    walked: SimulatedWalk | None,
+    provenance: Provenance,
 ) -> str:
     """
     Return report.html of a tied pair.
@@ -90,50 +44,40 @@ def exo_report(
         The motion that is shown.
     found : sequence of Interaction
         One stiffness for all, then one for each.
-    walked : SimulatedWalk, optional
-        What is known of simulated data.
-    assumptions : mapping, optional
-        What was assumed.
-    provenance : Provenance, optional
+    walked : SimulatedWalk or None
+        What is known of simulated data; None of recorded ones.
+    provenance : Provenance
         Files, versions, settings, seed.
 
     """
     motions, abscissa = shown.motions, shown.abscissa
-    walked = walked or SimulatedWalk()
-    torques = pair_torques(pair, *motions)
-    alone = pair_torques(pair.with_stiffness(0.0), *motions)
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
-    sections: list[Section] = [_verdict(found, walked), Stiffness(found, walked.truth)]
-    if walked.cycle is not None and walked.whole is not None:
-        cycle, whole = walked.cycle, walked.whole
-        sections += [Walk(cycle, whole.driven), whole, FootForces(cycle)]
-    if walked.gait is not None:
-        sections.append(walked.gait)
-    sections += [
-        Forces(
-            abscissa,
-            shown.name,
-            torques.forces,
-            pair.segments,
-            torques.tau,
-            alone.tau,
-            pair.robot.joints,
-        ),
-        Poses(draw_poses(pair, motions, samples, captions)),
+    sections: list[Section] = [
+        _verdict(found, walked),
+        stiffness_section(found, walked.truth if walked else {}),
     ]
-    if assumptions:
-        sections.append(Assumptions(assumptions))
-    sections.append(Origin(provenance or Provenance()))
+    if walked is not None:
+        sections += [
+            Walk(walked.cycle, walked.driven),
+            by_torque_section(walked),
+            feet_section(walked.cycle),
+        ]
+    sections += [
+        forces_section(pair, shown),
+        draw_poses(pair, motions, samples, captions),
+        assumptions_section(),
+        Origin(provenance),
+    ]
     title = 'Springs between an exoskeleton and its wearer'
     return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
 
 
-def _verdict(found: Sequence[Interaction], walked: SimulatedWalk) -> VerdictSection:
+def _verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
-    true = set(walked.truth.values())
+    true = set(walked.truth.values()) if walked else set()
     truth = f'; {true.pop():.0f} N/m was simulated' if len(true) == 1 else ''
     sentences = [
         f'The straps between exoskeleton and wearer have {k:.0f} ± {reach:.0f} N/m{truth}.'
@@ -144,14 +88,12 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk) -> VerdictSect
         for name, value, std in zip(part.segments, part.stiffness, part.std, strict=True)
         if 1.96 * std > _NARROW * abs(value)
     ]
-    if walked.gait is not None:
-        each = ', '.join(f'{d.joint} {d.right.most:.1e}°' for d in walked.gait.driven)
+    if walked is not None:
+        each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)
         sentences.append(
-            f'On one foot, joints driven by the computed torque are off by at most: {each}.'
+            f'Over a whole walking cycle, joints driven by the computed torque are off by at most: '
+            f'{each}.'
         )
-    if walked.whole is not None:
-        each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.whole.driven)
-        sentences.append(f'Over a whole walking cycle, they are off by at most: {each}.')
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from armid_ros.model import point_motion
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
+from armid_ros.report.page import Section
 from armid_ros.report.strip import SIDE, Strip, svg_points
 from armid_ros.robots import Robot
 import numpy as np
@@ -22,9 +24,9 @@ _BASE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Drawing:
+class Poses(Section):
     """
-    A strip of poses.
+    Both bodies at instants of the motion, side by side.
 
     Attributes
     ----------
@@ -39,6 +41,10 @@ class Drawing:
 
     """
 
+    title: ClassVar[str] = 'Poses'
+    package: ClassVar[str] = 'armid_ros.papers.exo.report'
+    template: ClassVar[str] = 'poses.html'
+
     width: float
     height: float
     own: tuple[str, ...]
@@ -49,7 +55,7 @@ class Drawing:
 
 def draw_poses(
     pair: TiedPair, motions: PairMotion, samples: Sequence[int], captions: Sequence[str]
-) -> Drawing:
+) -> Poses:
     """Draw a pair at some samples of its motion, side by side."""
     rows = np.asarray(samples)
     lines = [
@@ -76,7 +82,7 @@ def draw_poses(
         for pose in range(len(rows))
         for start, way in zip(geometry.other_position[pose], geometry.way[pose], strict=True)
     ]
-    return Drawing(*strip.size, drawn[0], drawn[1], tuple(ties), strip.captions(captions))
+    return Poses(*strip.size, drawn[0], drawn[1], tuple(ties), strip.captions(captions))
 
 
 def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:

@@ -1,32 +1,58 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A machine and its wearer: stiffness of the ties, gait by torque, forces, poses, assumptions."""
+"""A machine and its wearer: stiffness of the ties, forces, assumptions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
 from armid_ros.motion import FloatArray
-from armid_ros.papers.exo.assumptions import Assumption
-from armid_ros.papers.exo.report.poses import Drawing
+from armid_ros.papers.exo.assumptions import Assumption, read_assumptions
+from armid_ros.papers.exo.plant.leg_pair import pair_torques, PairMotion, TiedPair
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    FactList,
+    Fold,
+    Panels,
+    Paragraph,
+)
 from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import measured
-from armid_ros.report.page import Section
 import numpy as np
 
 _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
 
 
 @dataclass(frozen=True)
-class Stiffness(Section):
+class ShownMotion:
     """
-    What ties the two, with intervals.
+    The motion that is shown.
 
     Attributes
+    ----------
+    motions : PairMotion
+        Of both.
+    abscissa : ndarray, shape (N,)
+        What it is drawn over.
+    name : str
+        Name and unit of the abscissa.
+
+    """
+
+    motions: PairMotion
+    abscissa: FloatArray
+    name: str
+
+
+def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) -> ContentSection:
+    """
+    Show what ties the two, with intervals.
+
+    Parameters
     ----------
     found : sequence of Interaction
         One stiffness for all, then one for each.
@@ -34,40 +60,28 @@ class Stiffness(Section):
         True stiffness by segment [N/m], where the data were simulated; empty otherwise.
 
     """
-
-    title: ClassVar[str] = 'Stiffness'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'stiffness.html'
-
-    found: Sequence[Interaction]
-    truth: Mapping[str, float]
-
-    @property
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """Segment, stiffness, half width of the 95 % interval, bias without correction, truth."""
-        rows = []
-        for found in self.found:
-            for k, segment in enumerate(found.segments):
-                true = self.truth.get(segment)
-                rows.append(
-                    (
-                        segment.replace('_', ' '),
-                        *measured(found.stiffness[k], HALF_WIDTH * found.std[k]),
-                        f'{100.0 * found.bias[k] / found.stiffness[k]:+.2f} %',
-                        '' if true is None else f'{true:g}',
-                    )
-                )
-        return rows
-
-    @property
-    def noise(self) -> list[tuple[str, str]]:
-        """Noise that was found in the data."""
-        found = self.found[0]
-        angles = np.degrees(found.position_noise)
-        return [
-            ('Noise of the angles, as filtered', f'{_range(angles)}°'),
-            ('Noise of the torques, as filtered', f'{_range(found.torque_noise)} N m'),
+    heads = ['Spring', 'Stiffness [N/m]', '± 95 %', 'Bias of plain least squares']
+    rows = [
+        [
+            segment.replace('_', ' '),
+            *measured(part.stiffness[k], HALF_WIDTH * part.std[k]),
+            f'{100.0 * part.bias[k] / part.stiffness[k]:+.2f} %',
+            *([f'{truth[segment]:g}' if segment in truth else ''] if truth else []),
         ]
+        for part in found
+        for k, segment in enumerate(part.segments)
+    ]
+    noise = [
+        ('Noise of the angles, as filtered', f'{_range(np.degrees(found[0].position_noise))}°'),
+        ('Noise of the torques, as filtered', f'{_range(found[0].torque_noise)} N m'),
+    ]
+    text = (
+        'Springs are drawn out by millimetres, the small difference of measured angles. Noise in '
+        'the angles makes plain least squares wrong in a direction that more data do not heal. '
+        'The noise was measured in the recording and its effect taken out.'
+    )
+    table = DataTable([*heads, 'Simulated with'] if truth else heads, rows)
+    return ContentSection('Stiffness', [table, FactList(noise), Paragraph(text, 'hint')])
 
 
 def _range(values: FloatArray) -> str:
@@ -76,130 +90,46 @@ def _range(values: FloatArray) -> str:
     return ' to '.join(ends)
 
 
-@dataclass(frozen=True)
-class Forces(Section):
-    """
-    What each segment feels of the other machine.
-
-    Attributes
-    ----------
-    abscissa : ndarray, shape (N,)
-        Gait cycle or time.
-    abscissa_name : str
-        What it is, with its unit.
-    forces : ndarray, shape (N, S, 3)
-        On the machine [N].
-    segments : sequence of str
-        Their names.
-    tau, without : ndarray, shape (N, n)
-        Torques of the machine's joints with springs and without [N m].
-    joints : sequence of str
-        Names of the joints.
-
-    """
-
-    title: ClassVar[str] = 'Interaction'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'forces.html'
-
-    abscissa: FloatArray
-    abscissa_name: str
-    forces: FloatArray
-    segments: Sequence[str]
-    tau: FloatArray
-    without: FloatArray
-    joints: Sequence[str]
-
-    @property
-    def chart(self) -> Chart:
-        """Force of every spring."""
-        size = np.linalg.norm(self.forces, axis=2)
-        return Chart(
-            self.abscissa,
-            [
-                Series(name.replace('_', ' '), size[:, k], _ROLES[k % len(_ROLES)])
-                for k, name in enumerate(self.segments)
-            ],
-            self.abscissa_name,
-            'force [N]',
-            height=260,
-        )
-
-    @property
-    def torques(self) -> list[tuple[str, Chart]]:
-        """Torque of every joint with springs and without."""
-        return [
-            (
-                joint,
-                Chart(
-                    self.abscissa,
-                    [
-                        Series('alone', self.without[:, k], 'measured'),
-                        Series('with springs', self.tau[:, k], 'residual'),
-                    ],
-                    self.abscissa_name,
-                    'torque [N m]',
-                    height=180,
-                    link='torques',
-                ),
-            )
-            for k, joint in enumerate(self.joints)
+def forces_section(pair: TiedPair, shown: ShownMotion) -> ContentSection:
+    """Show what each segment feels of the other machine, and what that makes of the torques."""
+    motions, abscissa = shown.motions, shown.abscissa
+    torques = pair_torques(pair, *motions)
+    alone = pair_torques(pair.with_stiffness(0.0), *motions)
+    size = np.linalg.norm(torques.forces, axis=2)
+    names = [name.replace('_', ' ') for name in pair.segments]
+    series = [Series(name, size[:, k], _ROLES[k % len(_ROLES)]) for k, name in enumerate(names)]
+    rows = [
+        (name, f'{size[:, k].mean():.0f}', f'{size[:, k].max():.0f}')
+        for k, name in enumerate(names)
+    ]
+    panels = []
+    for k, joint in enumerate(pair.robot.joints):
+        both = [
+            Series('alone', alone.tau[:, k], 'measured'),
+            Series('with springs', torques.tau[:, k], 'residual'),
         ]
-
-    @property
-    def rows(self) -> list[tuple[str, str, str]]:
-        """Segment, mean and largest force."""
-        size = np.linalg.norm(self.forces, axis=2)
-        return [
-            (name.replace('_', ' '), f'{size[:, k].mean():.0f}', f'{size[:, k].max():.0f}')
-            for k, name in enumerate(self.segments)
-        ]
-
-
-@dataclass(frozen=True)
-class Poses(Section):
-    """
-    Both bodies at instants of the motion.
-
-    Attributes
-    ----------
-    drawing : Drawing
-        Lines of both and where the springs are.
-
-    """
-
-    title: ClassVar[str] = 'Poses'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'poses.html'
-
-    drawing: Drawing
+        chart = Chart(abscissa, both, shown.name, 'torque [N m]', height=180, link='torques')
+        panels.append((joint, '', [chart]))
+    return ContentSection(
+        'Interaction',
+        [
+            Paragraph('Force of each spring on the machine; the wearer feels the opposite.'),
+            Chart(abscissa, series, shown.name, 'force [N]', height=260),
+            DataTable(['Segment', 'Mean [N]', 'Largest [N]'], rows),
+            Fold('What the springs make of the joint torques', [Panels(panels)]),
+        ],
+    )
 
 
-@dataclass(frozen=True)
-class Assumptions(Section):
-    """
-    What the source leaves open.
-
-    Attributes
-    ----------
-    assumptions : mapping of str to Assumption
-        By name.
-
-    """
-
-    title: ClassVar[str] = 'Assumptions'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'assumptions.html'
-
-    assumptions: Mapping[str, Assumption]
-
-    @property
-    def rows(self) -> list[tuple[str, str, str]]:
-        """Name, value with unit, reason."""
-        return [
-            (name.replace('_', ' '), _shown(entry), entry.reason)
-            for name, entry in self.assumptions.items()
-        ]
+def assumptions_section() -> ContentSection:
+    """Show what the source leaves open: name, value with unit, reason."""
+    rows = [
+        (name.replace('_', ' '), _shown(entry), entry.reason)
+        for name, entry in read_assumptions().items()
+    ]
+    text = 'What the literature leaves open and what was assumed instead.'
+    table = DataTable(['Quantity', 'Value', 'Reason'], rows, words=(0, 1, 2))
+    return ContentSection('Assumptions', [Paragraph(text), table])
 
 
 def _shown(entry: Assumption) -> str:

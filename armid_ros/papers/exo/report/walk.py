@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ from armid_ros.papers.exo.plant.gait_cycle import GaitCycle, weight
 from armid_ros.papers.exo.plant.shares import feet_by_shares
 from armid_ros.papers.exo.plant.torque_driven import GaitCheck
 from armid_ros.papers.exo.plant.walkers import columns, contacts, floating, leg_length, SIDES
+from armid_ros.report.blocks import ContentSection, DataTable, Panels, Paragraph
 from armid_ros.report.charts import Chart, Mark, Role, script_json, Series
 from armid_ros.report.page import Section
 from armid_ros.robots import Robot
@@ -26,6 +27,7 @@ _WIDTH, _HEIGHT, _SCALE, _HIPS, _GROUND = 640, 420, 260.0, 300.0, 385.0
 #: Springs are drawn so many times longer than they are; forces at so many px per newton.
 _MAGNIFIED, _FORCE = 4.0, 0.16
 _TRUNK = 0.55
+_ABSCISSA = 'gait cycle of the right leg'
 #: How far a joint may be off by the source, in degrees.
 SOURCE = {'hip': 1.5, 'knee': 2.5}
 
@@ -39,14 +41,14 @@ class Driven:
     ----------
     right, softer : GaitCheck
         With the torque that is right, and with that for springs that are too soft.
-    shared : GaitCheck or None
+    shared : GaitCheck
         With the torque for feet that bear what (20) to (22) say.
 
     """
 
     right: GaitCheck
     softer: GaitCheck
-    shared: GaitCheck | None = None
+    shared: GaitCheck
 
     @property
     def joint(self) -> str:
@@ -55,65 +57,35 @@ class Driven:
 
     @property
     def source(self) -> float:
-        """How far it is off at most by the source [deg]; NaN for what the source does not have."""
-        return SOURCE.get(self.joint.split('_')[-1], np.nan)
+        """How far it is off at most by the source [deg]."""
+        return SOURCE[self.joint.split('_')[-1]]
 
 
 @dataclass(frozen=True)
-class ByTorque(Section):
+class SimulatedWalk:
     """
-    Joints driven by their torques against the prescribed gait, in single support.
+    What is known of a pair that was simulated.
 
     Attributes
     ----------
+    truth : mapping of str to float
+        True stiffnesses [N/m].
+    cycle : GaitCycle
+        A whole cycle of walking.
     driven : sequence of Driven
-        Joints by their torque.
+        Joints by their torque over that.
     softer : float
         By which share springs were taken too soft.
-    phase : ndarray, shape (N,)
-        Phase of a leg at the samples of the checks.
     rate : float
         Torque samples per second.
 
     """
 
-    title: ClassVar[str] = 'Gait by torque'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'gait.html'
-    abscissa: ClassVar[str] = 'gait cycle of the swing leg'
-
+    truth: Mapping[str, float]
+    cycle: GaitCycle
     driven: Sequence[Driven]
     softer: float
-    phase: FloatArray
     rate: float
-
-    @property
-    def panels(self) -> list[tuple[str, str, Chart, Chart]]:
-        """Name, largest errors, angle and error of every joint."""
-        return [
-            (
-                d.joint,
-                f'at most {d.right.most:.1e}°; springs too soft {d.softer.most:.2f}°',
-                *self._charts(d),
-            )
-            for d in self.driven
-        ]
-
-    def _charts(self, d: Driven) -> tuple[Chart, Chart]:
-        """Draw angle and error of a joint."""
-        both: tuple[tuple[str, GaitCheck, Role], ...] = (
-            ('by its torque', d.right, 'residual'),
-            ('springs too soft', d.softer, 'predicted'),
-        )
-        angles = [
-            Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
-            *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
-        ]
-        errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
-        return Chart(self.phase, angles, '', 'angle [°]', link=d.joint), Chart(
-            self.phase, errors, self.abscissa, 'error [°]', height=150, link=d.joint,
-            symmetric=True, legend=False,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -209,95 +181,84 @@ class Walk(Section):
         return _whole(np.concatenate(arrows, axis=1))
 
 
-@dataclass(frozen=True)
-class FootForces(Section):
-    """
-    What feet bear over a cycle: by the ground, and by the source's rule.
-
-    Attributes
-    ----------
-    cycle : GaitCycle
-        How they walk.
-
-    """
-
-    title: ClassVar[str] = 'Feet'
-    package: ClassVar[str] = 'armid_ros.papers.exo.report'
-    template: ClassVar[str] = 'feet.html'
-
-    cycle: GaitCycle
-
-    @property
-    def panels(self) -> list[tuple[str, Chart]]:
-        """Name and chart of both machines."""
-        pair = self.cycle.pair
-        return [
-            (robot.name, self._chart(robot is pair.other)) for robot in (pair.robot, pair.other)
-        ]
-
-    def _chart(self, other: bool) -> Chart:
-        feet = self.cycle.feet(other=other)[..., 1]
-        rule = feet_by_shares(self.cycle, other=other)[..., 1]
-        two = self.cycle.support(other=other) == 2
+def feet_section(cycle: GaitCycle) -> ContentSection:
+    """Show what feet bear over a cycle: by the ground, and by the source's rule."""
+    text = (
+        "What the ground does to the feet, by the contact of the source's Table 3 "
+        '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: from one foot on the ground to '
+        'two and back. In double support the source splits the trunk between the legs by the '
+        'distances of the thighs, (20) to (22).'
+    )
+    off = '(20) to (22) off by [N rms]'
+    heads = ('Machine', 'Weight [N]', 'Most on a foot [N]', 'On both feet', off)
+    panels, rows = [], []
+    for robot, other in ((cycle.pair.robot, False), (cycle.pair.other, True)):
+        feet = cycle.feet(other=other)[..., 1]
+        rule = feet_by_shares(cycle, other=other)[..., 1]
+        two = cycle.support(other=other) == 2
         series = [
             Series('right foot', feet[:, 0], 'residual'),
             Series('left foot', feet[:, 1], 'predicted'),
             Series('right, by (20) to (22)', np.where(two, rule[:, 0], np.nan), 'measured'),
             Series('left, by (20) to (22)', np.where(two, rule[:, 1], np.nan), 'before'),
         ]
-        marks = [Mark(float(self.cycle.phase[k])) for k in np.flatnonzero(np.diff(two)) + 1]
-        return Chart(
-            self.cycle.phase,
-            series,
-            'gait cycle of the right leg',
-            'force up [N]',
-            height=240,
-            link='feet',
-            marks=marks,
+        marks = [Mark(float(cycle.phase[k])) for k in np.flatnonzero(np.diff(two)) + 1]
+        chart = Chart(
+            cycle.phase, series, _ABSCISSA, 'force up [N]', height=240, link='feet', marks=marks
         )
-
-    @property
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """Machine, weight, largest force on a foot, time on both feet, error of the rule."""
-        pair = self.cycle.pair
-        return [
-            self._row(robot, other) for robot, other in ((pair.robot, False), (pair.other, True))
-        ]
-
-    def _row(self, robot: Robot, other: bool) -> tuple[str, str, str, str, str]:
-        feet = self.cycle.feet(other=other)[..., 1]
-        two = self.cycle.support(other=other) == 2
-        off = (feet_by_shares(self.cycle, other=other)[..., 1] - feet)[two]
-        return (
-            robot.name,
-            f'{weight(robot):.0f}',
-            f'{feet.max():.0f}',
-            f'{100.0 * np.mean(two):.0f} %',
-            f'{np.sqrt(np.mean(off**2)):.0f}',
-        )
-
-
-@dataclass(frozen=True)
-class CycleByTorque(ByTorque):
-    """The same over the whole cycle, hips free, with what the source found."""
-
-    title: ClassVar[str] = 'Whole cycle by torque'
-    template: ClassVar[str] = 'cycle.html'
-    abscissa: ClassVar[str] = 'gait cycle of the right leg'
-
-    @property
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """Joint, error of the source, and ours: right, springs too soft, feet by the rule."""
-        return [
+        panels.append((robot.name, '', [chart]))
+        rows.append(
             (
-                d.joint,
-                f'{d.source:g}' if np.isfinite(d.source) else '',
-                f'{d.right.most:.2g}',
-                f'{d.softer.most:.2f}',
-                '' if d.shared is None else f'{d.shared.most:.2f}',
+                robot.name,
+                f'{weight(robot):.0f}',
+                f'{feet.max():.0f}',
+                f'{100.0 * np.mean(two):.0f} %',
+                f'{np.sqrt(np.mean((rule - feet)[two] ** 2)):.0f}',
             )
-            for d in self.driven
-        ]
+        )
+    return ContentSection('Feet', [Paragraph(text), Panels(panels), DataTable(heads, rows)])
+
+
+def by_torque_section(walked: SimulatedWalk) -> ContentSection:
+    """Show joints driven by their torques over the whole cycle, with what the source found."""
+    text = (
+        f'One joint follows its torque alone ({walked.rate:g} samples per second, cubic splines) '
+        'through swing and stance; hips are free, all other joints move as prescribed. Largest '
+        'errors over the cycle:'
+    )
+    soft = f'Springs {100.0 * walked.softer:g} % too soft [°]'
+    heads = ('Joint', 'Source [°]', 'Here [°]', soft, 'Feet by (20) to (22) [°]')
+    rows = [
+        (
+            d.joint,
+            f'{d.source:g}',
+            f'{d.right.most:.2g}',
+            f'{d.softer.most:.2f}',
+            f'{d.shared.most:.2f}',
+        )
+        for d in walked.driven
+    ]
+    panels = [(d.joint, '', _followed(d, walked.cycle.phase[::2])) for d in walked.driven]
+    return ContentSection(
+        'Whole cycle by torque', [Paragraph(text), DataTable(heads, rows), Panels(panels)]
+    )
+
+
+def _followed(d: Driven, phase: FloatArray) -> tuple[Chart, Chart]:
+    """Draw angle and error of a joint."""
+    both: tuple[tuple[str, GaitCheck, Role], ...] = (
+        ('by its torque', d.right, 'residual'),
+        ('springs too soft', d.softer, 'predicted'),
+    )
+    angles = [
+        Series('prescribed', np.degrees(d.right.prescribed), 'measured'),
+        *(Series(name, np.degrees(check.followed), role) for name, check, role in both),
+    ]
+    errors = [Series(name, np.degrees(check.error), role) for name, check, role in both]
+    return Chart(phase, angles, '', 'angle [°]', link=d.joint), Chart(
+        phase, errors, _ABSCISSA, 'error [°]', height=150, link=d.joint, symmetric=True,
+        legend=False,
+    )  # fmt: skip
 
 
 def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:

@@ -91,13 +91,6 @@ def test_rotor_and_friction_are_what_the_motor_keeps_for_itself(found):
         np.testing.assert_allclose(one.motor, [0.02, 0.2, 0.15], rtol=0.08)
 
 
-def test_frequencies_are_those_of_a_motor_and_a_link_on_a_spring(found):
-    one = found[0]
-    k, link, rotor = one.transmission.stiffness[0], one.inertia, one.motor[0]
-    assert one.antiresonance == pytest.approx(np.sqrt(k / link) / (2.0 * np.pi))
-    assert one.resonance == pytest.approx(np.sqrt(k / link + k / rotor) / (2.0 * np.pi))
-
-
 def test_the_document_is_as_its_schema_says(found):
     document = json.loads(json_text(springs_document(found, 'humanoid_arm')))
     assert faults('springs', document) == []

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 
-from armid_ros.errors import IdentificationError
 from armid_ros.papers.elastic.identification.output import elastic_document
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.run import ElasticSensors
@@ -50,8 +49,3 @@ def test_document_holds_parameters_with_deviations(result, truth) -> None:
     assert stiffness['unit'] == 'N m/rad'
     total = document['total_damping'][0]
     assert total['std'] < rows['dl', 'joint1']['std'] / 3.0
-
-
-def test_no_experiments_are_refused(truth) -> None:
-    with pytest.raises(IdentificationError, match='no experiments'):
-        identify_two_inertia([], truth)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from armid_ros.errors import IdentificationError
 from armid_ros.papers.elastic.identification.names import pack, unpack
 from armid_ros.papers.elastic.identification.response import (
     ringing,
@@ -129,8 +128,3 @@ def test_an_arm_that_still_rings_has_no_other_springs_for_it(
 def test_friction_of_motor_and_link_is_not_known_apart(tuned) -> None:
     relative = tuned.estimate.std / tuned.estimate.values
     assert np.all(relative[7:11] > 10.0 * relative[:7].max())
-
-
-def test_no_steps_are_refused() -> None:
-    with pytest.raises(IdentificationError, match='none'):
-        tune([], START, LOOP)
