@@ -8,7 +8,6 @@ import sqlite3
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
-    iter_raw,
     joint_state_cdr,
     read_recording,
     read_robot_description,
@@ -25,7 +24,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_typestore, Stores
 import yaml
 
-from .conftest import JOINTS, sqlite_bag
+from .conftest import iter_raw, JOINTS, sqlite_bag
 
 
 @pytest.fixture

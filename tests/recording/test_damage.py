@@ -5,13 +5,13 @@
 import struct
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import iter_raw, read_recording, ReadSettings, recover, write_recording
+from armid_ros.recording import read_recording, ReadSettings, recover, write_recording
 from armid_ros.recording.mcap.content import walk
 from armid_ros.recording.mcap.records import map_file, MESSAGE
 import numpy as np
 import pytest
 
-from .conftest import JOINTS, sqlite_bag
+from .conftest import iter_raw, JOINTS, sqlite_bag
 
 
 @pytest.fixture(params=['none', 'zstd', 'lz4'])
