@@ -187,11 +187,11 @@ def _encoded(
                 f'{name} has shape {values.shape}, but {len(stamps)} stamps of {n} joints need '
                 f'{(len(stamps), n)}'
             )
+    frame = frame_id.encode()
     counts = tuple(0 if values is None else n for values in fields)
-    layout = JointStateLayout.make(joints, frame_id, (counts[0], counts[1], counts[2]))
+    layout = JointStateLayout('<', len(frame) + 1, joints, counts)
     template = np.zeros(1, layout.dtype(layout.end))
-    frame = np.frombuffer(frame_id.encode(), np.uint8)
-    template.view(np.uint8)[16 : 16 + len(frame)] = frame
+    template.view(np.uint8)[16 : 16 + len(frame)] = np.frombuffer(frame, np.uint8)
     template['encapsulation'] = 1
     template['frame_length'] = layout.frame_length
     template['names'] = layout.names_pattern[0]
