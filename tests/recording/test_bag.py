@@ -192,16 +192,6 @@ def test_what_is_no_bag_is_refused_with_its_name(tmp_path, name, content, proble
         read_recording(tmp_path / name, joints=JOINTS)
 
 
-def test_random_bytes_are_refused_whatever_they_are(tmp_path):
-    rng = np.random.default_rng(11)
-    for suffix, head in (('.mcap', b'\x89MCAP0\r\n'), ('.db3', b'SQLite format 3\0')):
-        for number in range(50):
-            path = tmp_path / f'{number}{suffix}'
-            path.write_bytes(head * (number % 2) + rng.bytes(int(rng.integers(1, 4000))))
-            with pytest.raises(RecordingError, match=str(path)):
-                read_recording(path, joints=JOINTS)
-
-
 def test_directories_that_are_no_bags_are_refused_with_what_they_hold(swinging, tmp_path):
     with pytest.raises(RecordingError, match='absent: there is no such bag'):
         read_recording(tmp_path / 'absent', joints=JOINTS)

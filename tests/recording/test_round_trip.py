@@ -37,11 +37,6 @@ def test_what_is_written_is_read_back_exactly(
     assert (back.report.messages, back.report.samples) == (500, 500)
 
 
-def test_the_bare_file_holds_the_same(swinging, tmp_path, assert_same):
-    write_recording(tmp_path / 'bag', swinging)
-    assert_same(read_recording(tmp_path / 'bag' / 'bag_0.mcap', joints=swinging.joints), swinging)
-
-
 def test_a_motion_is_written_with_a_start_of_ones_choice(tmp_path):
     t = np.linspace(0.0, 1.0, 11)
     motion = Motion(('elbow',), t, t[:, None], np.ones((11, 1)), np.zeros((11, 1)))

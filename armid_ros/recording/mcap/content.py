@@ -52,9 +52,14 @@ class Gathered:
         self._parts, self._offsets, self._size, self._count = [], [], 0, 0
 
 
+def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
+    """Return the heads of the messages whose records begin there, as `MESSAGE`."""
+    return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+
+
 def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
     """Return the messages whose records begin there."""
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    rows = heads(data, offsets)
     return MessageBlock(
         data,
         offsets + MESSAGE.itemsize,
@@ -90,7 +95,7 @@ def tiled(
     """
     if not len(offsets) or offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
         return None
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    rows = heads(data, offsets)
     lengths = rows['length'].astype(np.uint64)
     if (rows['opcode'] != Opcode.MESSAGE).any():
         return None

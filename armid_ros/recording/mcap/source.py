@@ -18,19 +18,24 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.mcap.chunks import Content, Contents
-from armid_ros.recording.mcap.content import BLOCK_MESSAGES, Gathered, message_block, tiled, walk
+from armid_ros.recording.mcap.content import (
+    BLOCK_MESSAGES,
+    Gathered,
+    heads,
+    message_block,
+    tiled,
+    walk,
+)
 from armid_ros.recording.mcap.records import (
     add_definition,
     Chunk,
     FileMap,
     map_file,
-    MESSAGE,
-    RECORD_HEADER,
 )
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, records_at, Topic
+from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, Topic
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
@@ -111,7 +116,7 @@ class McapSource:
                 raw = heapq.heappop(pending)[2]
                 size -= len(raw.cdr) + _OVERHEAD
                 yield raw
-            block, channels = message_block(content, offsets), _heads(content, offsets)['channel']
+            block, channels = message_block(content, offsets), heads(content, offsets)['channel']
             times = zip(
                 channels.tolist(),
                 block.log_time.tolist(),
@@ -137,12 +142,13 @@ class McapSource:
         for chunk, unpacked in self._contents.of(chunks):
             content, offsets, rows = self._messages_in(chunk, unpacked)
             yield chunk.start_time, content, self._possible(offsets, rows, channels)
-        loose = self._possible(self._loose(), _heads(data, self._loose()), channels)
+        loose = np.array(self._found.loose, np.int64)
+        loose = self._possible(loose, heads(data, loose), channels)
         if by_time:
-            loose = loose[np.argsort(_heads(data, loose)['log_time'], kind='stable')]
+            loose = loose[np.argsort(heads(data, loose)['log_time'], kind='stable')]
         for at in range(0, len(loose), BLOCK_MESSAGES):
             some = loose[at : at + BLOCK_MESSAGES]
-            yield int(_heads(data, some)['log_time'][0]), data, some
+            yield int(heads(data, some)['log_time'][0]), data, some
 
     def _survey(self) -> dict[int, int]:
         """Make sure all channels are known, and return the number of messages of each."""
@@ -154,7 +160,7 @@ class McapSource:
             return self._counts
         counts: dict[int, int] = {}
         inside = (self._channels_in(unpacked) for _, unpacked in self._contents.of(found.chunks))
-        loose = _heads(found.data, self._loose())['channel']
+        loose = heads(found.data, np.array(found.loose, np.int64))['channel']
         for rows in (loose, *inside):
             for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
                 counts[int(channel)] = counts.get(int(channel), 0) + int(count)
@@ -167,7 +173,7 @@ class McapSource:
         offsets, definitions, _ = walk(content, begin, end)
         for opcode, start, stop in definitions:
             add_definition(self._found, opcode, content[start:stop])
-        return _heads(content, offsets)['channel'].copy()
+        return heads(content, offsets)['channel'].copy()
 
     def _is_without(self, chunk: Chunk, wanted: Collection[int]) -> bool:
         """Tell whether a chunk has no message of some channels, by an index that is compared."""
@@ -196,7 +202,7 @@ class McapSource:
                 f'the chunk at byte {chunk.begin} is damaged: '
                 f'some messages {self._found.span(chunk)} are lost'
             )
-        return content, offsets, _heads(content, offsets)
+        return content, offsets, heads(content, offsets)
 
     def _indexed(self, chunk: Chunk) -> IntArray:
         """
@@ -255,15 +261,6 @@ class McapSource:
         )
         qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
         return Topic(channel.topic, described, qos, count, channel.message_encoding)
-
-    def _loose(self) -> IntArray:
-        """Return where records of messages outside chunks begin."""
-        return np.array([begin - RECORD_HEADER for begin, _ in self._found.loose], np.int64)
-
-
-def _heads(data: bytes | mmap.mmap, offsets: IntArray) -> _Rows:
-    """Return the heads of the messages that begin there, as `MESSAGE`."""
-    return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
 
 
 def _map(path: Path) -> bytes | mmap.mmap:
