@@ -54,9 +54,7 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
 def offered(profiles: Sequence[Qos], depth: int = DEPTH) -> QoSProfile:
     """Return the profile to publish a recorded topic with: the least that all recorded offer."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
-    latched = bool(profiles) and all(
-        p.durability is QosDurability.TRANSIENT_LOCAL for p in profiles
-    )
+    latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(depth, not best_effort, latched)
 
 
