@@ -80,7 +80,7 @@ def read_recording(
         raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
     with Bag(path, settings) as bag:
         chosen = choose_topics(bag, joints, topic)
-        decoder = JointStateDecoder(joints)
+        decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
         name = ' + '.join(one.name for one in chosen)
         where = f'{path}: {name}'
         with reading(path, RecordingError):

@@ -241,7 +241,27 @@ def _stacked(
         np.full((len(part), len(part.joints)), np.nan) if values is None else values
         for values, part in zip(arrays, parts, strict=True)
     ]
-    return np.concatenate(whole, axis=axis)
+    together = None if axis else _adjacent(whole)
+    return np.concatenate(whole, axis=axis) if together is None else together
+
+
+def _adjacent(arrays: Sequence[FloatArray]) -> FloatArray | None:
+    """Return the part of an array that others are, each behind the one before; or None."""
+    whole = arrays[0].base
+    if not isinstance(whole, np.ndarray) or whole.ndim != 2:
+        return None
+    first = at = arrays[0].ctypes.data
+    for array in arrays:
+        if (
+            array.base is not whole
+            or array.ctypes.data != at
+            or array.shape[1:] != whole.shape[1:]
+        ):
+            return None
+        at += array.nbytes
+    row = whole.strides[0]
+    begin = whole.ctypes.data
+    return whole[(first - begin) // row : (at - begin) // row]
 
 
 def longest_run(stamps: IntArray) -> slice | None:

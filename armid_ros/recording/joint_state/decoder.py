@@ -16,6 +16,8 @@ import numpy.typing as npt
 # A topic of more layouts in one block is not one publisher's; messages are then read one by one.
 _LAYOUTS_A_BLOCK = 32
 _FIELDS = ('position', 'velocity', 'effort')
+#: What is reserved at once of a quantity, as counts of damaged files may be anything [bytes].
+_MOST_ROOM = 1 << 30
 
 
 @dataclass(frozen=True)
@@ -91,9 +93,20 @@ class JointStateDecoder:
 
     """
 
-    def __init__(self, joints: Sequence[str]) -> None:
-        """Decode the values of these joints, as far as messages name them."""
+    def __init__(self, joints: Sequence[str], expected: int = 0) -> None:
+        """
+        Decode the values of these joints, as far as messages name them.
+
+        Parameters
+        ----------
+        joints : sequence of str
+            The joints.
+        expected : int
+            How many messages are put together in the end, for which room is made at once.
+
+        """
         self._wanted = tuple(joints)
+        self._room = _Room(expected)
         self._plans: dict[int, list[_Plan]] = {}
         self._names: dict[str, None] = {}
         self.others: dict[str, tuple[float, float]] = {}
@@ -154,7 +167,7 @@ class JointStateDecoder:
         for joint, lowest, highest in plan.ranges_of_others(rows):
             known = self.others.get(joint, (lowest, highest))
             self.others[joint] = (min(known[0], lowest), max(known[1], highest))
-        yield from plan.read(rows, numbers, receive)
+        yield from plan.read(rows, numbers, receive, self._room)
 
     def _plan_for(self, first: npt.NDArray[np.void]) -> _Plan | None:
         """Return how to read a message; None, and the message counted, if there is no way."""
@@ -174,6 +187,25 @@ class JointStateDecoder:
         known.insert(0, plan)
         del known[_LAYOUTS_A_BLOCK:]
         return plan
+
+
+class _Room:
+    """Room for the values of messages, so that those of one kind follow each other in memory."""
+
+    def __init__(self, expected: int) -> None:
+        self._expected = expected
+        self._free: dict[tuple[str, int], FloatArray] = {}
+
+    def take(self, name: str, count: int, joints: int) -> FloatArray:
+        """Return an array of shape (count, joints), behind the one before if there is room."""
+        expected = min(self._expected, _MOST_ROOM // (8 * joints))
+        free = self._free.get((name, joints))
+        if free is None:
+            free = np.empty((expected, joints))
+        if count > len(free):
+            return np.empty((count, joints))
+        self._free[name, joints] = free[count:]
+        return free[:count]
 
 
 @dataclass(frozen=True)
@@ -221,7 +253,7 @@ class _Plan:
             yield self.others[k], float(lowest[k]), float(highest[k])
 
     def read(
-        self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray
+        self, rows: npt.NDArray[np.void], numbers: IntArray, receive: IntArray, room: _Room
     ) -> Iterator[JointSamples]:
         """Yield the values of messages of this layout, if there is a joint asked for in them."""
         if not self.joints:
@@ -229,8 +261,10 @@ class _Plan:
         header = rows['sec'].astype(np.int64)
         header *= 10**9
         header += rows['nanosec']
-        values = tuple(
-            np.array(rows[name][:, self.columns], np.float64) if count else None
-            for name, count in zip(_FIELDS, self.layout.counts, strict=True)
-        )
-        yield JointSamples(self.joints, header, values, receive, numbers)
+        values: list[FloatArray | None] = []
+        for name, count in zip(_FIELDS, self.layout.counts, strict=True):
+            place = room.take(name, len(rows), len(self.joints)) if count else None
+            if place is not None:
+                place[:] = rows[name][:, self.columns]
+            values.append(place)
+        yield JointSamples(self.joints, header, tuple(values), receive, numbers)
