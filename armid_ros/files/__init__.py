@@ -11,7 +11,7 @@ error of the package with the path. Every writer of results goes through `write_
 """
 
 from armid_ros.files.documents import finite, load_json, load_yaml, parsed_yaml, reading, yaml_line
-from armid_ros.files.limits import available_memory, default_memory_limit, size_text
+from armid_ros.files.limits import default_memory_limit, size_text
 from armid_ros.files.output import json_text, result_folder, write_file
 from armid_ros.files.own import settled
 from armid_ros.files.regular import is_file, open_regular, read_text
@@ -33,7 +33,6 @@ __all__ = [
     'Staged',
     'staged',
     'settled',
-    'available_memory',
     'default_memory_limit',
     'size_text',
 ]

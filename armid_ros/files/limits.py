@@ -13,8 +13,8 @@ _SHARE = 4
 _CONTROL_GROUP = Path('/sys/fs/cgroup/memory.max')
 
 
-def available_memory() -> int:
-    """Return the memory that this process may use [bytes]: of the machine or of its limits."""
+def default_memory_limit() -> int:
+    """Return what one input may take [bytes]: a quarter of the memory of machine or process."""
     bounds = [os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES')]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY:
@@ -23,12 +23,7 @@ def available_memory() -> int:
         bounds.append(int(_CONTROL_GROUP.read_text(encoding='ascii')))
     except (OSError, ValueError):  # no control group, or 'max'
         pass
-    return min(bounds)
-
-
-def default_memory_limit() -> int:
-    """Return what one input may take when nothing else is said [bytes]: a quarter of memory."""
-    return available_memory() // _SHARE
+    return min(bounds) // _SHARE
 
 
 def size_text(size: int) -> str:

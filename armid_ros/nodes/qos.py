@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from armid_ros.recording.qos import QosProfile
+from armid_ros.recording.qos import VOLATILE
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rosbags.interfaces import Qos, QosDurability, QosReliability
 
 #: Commands, /clock and diagnostics.
 STREAM = QoSProfile(depth=10)
@@ -39,21 +40,21 @@ def matching(publishers: Sequence[TopicEndpointInfo], depth: int = DEPTH) -> QoS
     return _profile(depth, reliable, latched)
 
 
-def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[QosProfile, ...]:
+def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
     """Return what the publishers of a topic offer, as a bag keeps it."""
     return tuple(
-        QosProfile(
-            reliability=publisher.qos_profile.reliability.name.lower(),
-            durability=publisher.qos_profile.durability.name.lower(),
+        VOLATILE._replace(
+            reliability=QosReliability[publisher.qos_profile.reliability.name],
+            durability=QosDurability[publisher.qos_profile.durability.name],
         )
         for publisher in publishers
     )
 
 
-def offered(profiles: Sequence[QosProfile], depth: int = DEPTH) -> QoSProfile:
+def offered(profiles: Sequence[Qos], depth: int = DEPTH) -> QoSProfile:
     """Return the profile to publish a recorded topic with: the least that all recorded offer."""
-    best_effort = any(p.reliability == 'best_effort' for p in profiles)
-    latched = bool(profiles) and all(p.latched for p in profiles)
+    best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
+    latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
     return _profile(depth, not best_effort, latched)
 
 

@@ -4,19 +4,19 @@
 Recordings of joints, and the rosbag2 bags they are kept in.
 
 Nothing else in the package knows a file format. ``read_recording`` takes any bag with JointState
-messages apart, ``write_recording`` makes one; ``BagWriter`` and ``iter_raw`` carry raw messages
-for the nodes; none of it needs ROS.
+messages apart, ``write_recording`` makes one; ``BagWriter`` and ``Bag`` carry raw messages for
+the nodes; none of it needs ROS.
 
 """
 
-from armid_ros.recording.bag import Bag, iter_raw, topics
+from armid_ros.recording.bag import Bag, topics
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
     write_recording,
 )
 from armid_ros.recording.mcap.recover import recover, RecoveryReport
-from armid_ros.recording.qos import LATCHED, QosProfile
+from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import (
     given_twice,
@@ -33,7 +33,6 @@ from armid_ros.recording.source import RawMessage, Topic
 from armid_ros.recording.string_message import read_robot_description, string_cdr
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
-    read_joint_trajectory,
     read_waypoints,
     write_joint_trajectory,
 )
@@ -53,11 +52,9 @@ __all__ = [
     'read_robot_description',
     'write_recording',
     'BagWriter',
-    'QosProfile',
     'LATCHED',
     'joint_trajectory_cdr',
     'write_joint_trajectory',
-    'read_joint_trajectory',
     'read_waypoints',
     'recover',
     'RecoveryReport',
@@ -68,5 +65,4 @@ __all__ = [
     'Topic',
     'RawMessage',
     'topics',
-    'iter_raw',
 ]

@@ -50,22 +50,6 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
         return bag.topics()
 
 
-def iter_raw(path: str | Path, settings: ReadSettings = DEFAULT) -> Iterator[RawMessage]:
-    """
-    Yield all messages of a bag in the order they were logged, as raw CDR.
-
-    Only a few chunks are in memory at a time.
-
-    Raises
-    ------
-    RecordingError
-        There is no bag that can be read.
-
-    """
-    with Bag(path, settings) as bag:
-        yield from bag.messages()
-
-
 class Bag:
     """All files of a bag, as one source; a context manager."""
 
@@ -149,7 +133,7 @@ class Bag:
             )
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order they were logged."""
+        """Yield all messages in the order they were logged, a few chunks in memory at a time."""
         limit = self._settings.memory_limit
         streams = [source.messages() for source in self._sources]
         with reading(self.path, RecordingError):

@@ -87,8 +87,6 @@ _ZSTD = _Zstd()
 
 def partly_decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     """Return what can be had of a frame that is cut off, at most a number of bytes."""
-    if compression not in ('zstd', 'lz4'):
-        return bytes(stored[:size])
     content = bytearray()
     try:
         _decompress_into(content, stored, compression, size)

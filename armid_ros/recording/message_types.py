@@ -11,7 +11,6 @@ this Python, or given as text.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 import os
 from pathlib import Path
@@ -78,7 +77,7 @@ def message_type(name: str, definition: str | None = None) -> MessageType:
     store = get_typestore(Stores.ROS2_JAZZY)
     if definition is not None or name not in store.fielddefs:
         store = Typestore()
-        _register(store, name, definition, os.environ)
+        _register(store, name, definition)
     text, _ = store.generate_msgdef(name, ros_version=2)
     return MessageType(name, text, 'ros2msg', store.hash_rihs01(name))
 
@@ -94,19 +93,17 @@ def store_for(described: MessageType) -> Typestore:
     if described.encoding == 'ros2idl':
         store.register(get_types_from_idl(described.definition))
     else:
-        _register(store, described.name, described.definition, os.environ)
+        _register(store, described.name, described.definition)
     return store
 
 
-def _register(
-    store: Typestore, name: str, definition: str | None, environment: Mapping[str, str]
-) -> None:
+def _register(store: Typestore, name: str, definition: str | None) -> None:
     """Register a type and, recursively, those it contains."""
     known = get_typestore(Stores.ROS2_JAZZY).fielddefs
     if definition is None and name in known:
         types = {name: known[name]}
     else:
-        text = definition if definition is not None else _installed(name, environment)
+        text = definition if definition is not None else _installed(name)
         try:
             types = dict(get_types_from_msg(text, name))
         except (TypesysError, ValueError) as error:
@@ -120,12 +117,12 @@ def _register(
             if part[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
                 part = part[1][0]
             if part[0] == Nodetype.NAME and part[1] not in store.fielddefs:
-                _register(store, part[1], None, environment)
+                _register(store, part[1], None)
 
 
-def _installed(name: str, environment: Mapping[str, str]) -> str:
+def _installed(name: str) -> str:
     """Return the text of an installed .msg file."""
-    listed = environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    listed = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     prefixes = [prefix for prefix in (*listed, sys.prefix) if prefix]
     package, _, rest = name.partition('/')
     for prefix in prefixes:

@@ -98,8 +98,8 @@ def bag_information(
     }
 
 
-def dump(information: Mapping[str, Any]) -> str:
-    """Return a map as YAML."""
+def dump(information: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> str:
+    """Return a map, or a list of them, as YAML."""
     # The dumper in C, where there is one, takes 1 ms; the other 10 ms, while messages wait.
     dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
     return str(yaml.dump(information, Dumper=dumper, sort_keys=False, allow_unicode=True))

@@ -16,9 +16,9 @@ import mmap
 from typing import NamedTuple, Protocol
 
 from armid_ros.recording.message_types import MessageType
-from armid_ros.recording.qos import QosProfile
 import numpy as np
 import numpy.typing as npt
+from rosbags.interfaces import Qos
 
 IntArray = npt.NDArray[np.int64]
 #: Problems said one by one; a file that is damaged all over is not described byte by byte.
@@ -36,7 +36,7 @@ class Topic:
         Such as '/joint_states'.
     message_type : MessageType
         Its type, as the bag describes it.
-    qos : tuple of QosProfile
+    qos : tuple of rosbags.interfaces.Qos
         What its publishers offered; empty when unknown.
     count : int
         Number of messages.
@@ -49,7 +49,7 @@ class Topic:
 
     name: str
     message_type: MessageType
-    qos: tuple[QosProfile, ...] = ()
+    qos: tuple[Qos, ...] = ()
     count: int = 0
     encoding: str = 'cdr'
     joints: tuple[str, ...] = ()
@@ -115,10 +115,6 @@ class Damage:
 
     def __init__(self) -> None:
         self._problems: dict[str, None] = {}
-
-    def __bool__(self) -> bool:
-        """Return whether something is wrong."""
-        return bool(self._problems)
 
     def __str__(self) -> str:
         """Return what is wrong; empty when nothing is."""

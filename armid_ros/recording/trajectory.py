@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import reading
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import Measured
 from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING
@@ -122,13 +122,13 @@ def write_joint_trajectory(
         writer.write(_TOPIC, joint_trajectory_cdr(motion), _LOG_TIME)
 
 
-def read_joint_trajectory(
+def read_waypoints(
     path: str | Path,
     joints: Sequence[str],
     *,
     topic: str | None = None,
     settings: ReadSettings = DEFAULT,
-) -> Motion:
+) -> ReadWaypoints:
     """
     Read the last JointTrajectory of a bag.
 
@@ -145,9 +145,8 @@ def read_joint_trajectory(
 
     Returns
     -------
-    Motion
-        The reference, with the effort it has. Velocities and accelerations that the message does
-        not give are differences of positions and velocities.
+    ReadWaypoints
+        What the message has itself; None for rates and efforts that it does not give.
 
     Raises
     ------
@@ -155,20 +154,6 @@ def read_joint_trajectory(
         There is no such bag or topic, or the trajectory does not name a joint or is not valid.
 
     """
-    read = read_waypoints(path, joints, topic=topic, settings=settings)
-    dq = np.gradient(read.q, read.t, axis=0) if read.dq is None else read.dq
-    ddq = np.gradient(dq, read.t, axis=0) if read.ddq is None else read.ddq
-    return Motion(read.joints, read.t, read.q, dq, ddq, read.tau)
-
-
-def read_waypoints(
-    path: str | Path,
-    joints: Sequence[str],
-    *,
-    topic: str | None = None,
-    settings: ReadSettings = DEFAULT,
-) -> ReadWaypoints:
-    """Read what the last JointTrajectory of a bag says itself; see `read_joint_trajectory`."""
     with Bag(path, settings) as bag:
         chosen = _choose_topic(bag, topic)
         cdr = b''

@@ -25,12 +25,13 @@ from armid_ros.recording.mcap.records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap.writer import Compression, McapWriter, message_record
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
-from armid_ros.recording.qos import dump_qos_text, QosProfile
+from armid_ros.recording.qos import dump_qos, VOLATILE
 from armid_ros.recording.source import IntArray, Source, Topic
 from armid_ros.version import __version__
 from mcap.opcode import Opcode
 import numpy as np
 import numpy.typing as npt
+from rosbags.interfaces import Qos
 
 # At 3 kHz of JointState, 1 MB/s, the age of a chunk closes it, not its size.
 DEFAULT_CHUNK_SIZE = 512 * 1024
@@ -187,7 +188,7 @@ class BagWriter:
         name: str,
         type_name: str,
         *,
-        qos: Sequence[QosProfile] = (),
+        qos: Sequence[Qos] = (),
         definition: str | None = None,
         type_hash: str | None = None,
         encoding: str = 'ros2msg',
@@ -201,7 +202,7 @@ class BagWriter:
             Such as '/joint_states'.
         type_name : str
             Such as 'sensor_msgs/msg/JointState'.
-        qos : sequence of QosProfile
+        qos : sequence of rosbags.interfaces.Qos
             What its publishers offer; by default one reliable, volatile publisher.
         definition : str, optional
             Text of the type's .msg file, with or without its dependencies; needed for types that
@@ -230,7 +231,7 @@ class BagWriter:
             described = MessageType(type_name, definition, encoding, type_hash)
         else:
             described = message_type(type_name, definition)
-        topic = Topic(name, described, tuple(qos) or (QosProfile(),))
+        topic = Topic(name, described, tuple(qos) or (VOLATILE,))
         if described not in self._schemas:
             number, record = self._mcap.add_schema(
                 described.name,
@@ -243,7 +244,7 @@ class BagWriter:
             name,
             self._schemas[described],
             {
-                'offered_qos_profiles': dump_qos_text(topic.qos),
+                'offered_qos_profiles': dump(dump_qos(topic.qos)).strip(),
                 'topic_type_hash': described.type_hash,
             },
         )

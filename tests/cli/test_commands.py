@@ -16,7 +16,7 @@ from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
 from armid_ros.excitation.schedule import MAX_DURATION
 from armid_ros.identification.fitting.least_squares import ESTIMATORS
-from armid_ros.recording import read_joint_trajectory, read_recording
+from armid_ros.recording import read_recording, read_waypoints
 from armid_ros.recording.tables.settings import TIME_UNITS
 from armid_ros.robots import load_robot
 import numpy as np
@@ -121,7 +121,7 @@ def test_excite_simulate_identify_in_three_lines(tmp_path):
     excitation = load_excitation(plan / 'excitation.yaml')
     np.testing.assert_allclose(excitation.duration, 10.0)
     robot = load_robot(ROBOT, gravity='moon')
-    assert read_joint_trajectory(plan / 'trajectory', joints=robot.joints).joints == robot.joints
+    assert read_waypoints(plan / 'trajectory', joints=robot.joints).joints == robot.joints
     effect = 'viscous_friction:viscous_coefficient=0.05'
     arguments = ('--robot', ROBOT, '--gravity', 'moon', '--effect', effect, '--rate', 200)
     trajectory = plan / 'excitation.yaml'

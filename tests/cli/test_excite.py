@@ -12,7 +12,8 @@ from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import check_limits, ClearanceModel, design, Limits, load_excitation
 from armid_ros.excitation.geometry.heights import lowest_point
-from armid_ros.recording import read_joint_trajectory, read_recording
+from armid_ros.motion import Motion
+from armid_ros.recording import read_recording, read_waypoints
 from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def excite(robot, out, *options, code=0):
 
 
 def plan_of(robot, out):
-    return read_joint_trajectory(out / 'trajectory', joints=load_robot(robot).joints)
+    return Motion(**vars(read_waypoints(out / 'trajectory', load_robot(robot).joints)))
 
 
 @pytest.fixture(scope='module')

@@ -9,7 +9,6 @@ import zlib
 
 from armid_ros.errors import ArmidError
 from armid_ros.recording import (
-    iter_raw,
     read_recording,
     ReadSettings,
     Recording,
@@ -40,6 +39,7 @@ from tests.fuzz.mutants import (
     TREE_EDIT,
 )
 from tests.fuzz.property import judge
+from tests.recording.conftest import iter_raw
 
 JOINTS = ('shoulder', 'elbow')
 SETTINGS = ReadSettings(memory_limit=200_000_000)

@@ -4,8 +4,9 @@
 
 import sqlite3
 
-from armid_ros.recording import BagWriter, joint_state_cdr, Recording
+from armid_ros.recording import Bag, BagWriter, joint_state_cdr, Recording
 from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.settings import DEFAULT
 import numpy as np
 import pytest
 
@@ -45,6 +46,12 @@ def sqlite_bag(path, messages, columns=', offered_qos_profiles TEXT'):
     )
     database.commit()
     return database
+
+
+def iter_raw(path, settings=DEFAULT):
+    """Yield all messages of a bag as raw CDR."""
+    with Bag(path, settings) as bag:
+        yield from bag.messages()
 
 
 @pytest.fixture

@@ -14,7 +14,8 @@ import lz4.frame
 import pytest
 import zstandard
 
-JOINTS = ('shoulder', 'elbow', 'wrist')
+from .conftest import JOINTS
+
 SMALL = ReadSettings(memory_limit=10_000_000)
 FAR_TOO_MUCH = 400_000_000
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
-JOINTS = ('shoulder', 'elbow', 'wrist')
+from .conftest import JOINTS
 
 
 def test_joints_come_in_the_order_asked_whatever_the_order_of_the_messages(

@@ -3,9 +3,11 @@
 """A real robot's bag: UR10, Humble, SQLite, without metadata."""
 
 from armid_ros.errors import RecordingError
-from armid_ros.recording import iter_raw, read_recording, read_robot_description, topics
+from armid_ros.recording import read_recording, read_robot_description, topics
 import numpy as np
 import pytest
+
+from .conftest import iter_raw
 
 JOINTS = (
     'shoulder_pan_joint',

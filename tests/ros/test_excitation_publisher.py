@@ -23,7 +23,7 @@ from armid_ros.nodes import arm_watch
 from armid_ros.nodes.excitation_publisher import ExcitationPublisherNode
 from armid_ros.nodes.qos import STREAM
 from armid_ros.nodes.trajectory.messages import read_trajectory
-from armid_ros.recording import read_joint_trajectory
+from armid_ros.recording import read_waypoints
 from armid_ros.robots import load_robot
 from builtin_interfaces.msg import Time
 from click.testing import CliRunner
@@ -504,7 +504,7 @@ def test_a_file_is_loaded(bench, plans):
 
 @pytest.mark.parametrize('speed', ['slow', 'fast'])
 def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plans, robot, speed):
-    planned = read_joint_trajectory(plans / speed / 'trajectory', joints=robot.joints)
+    planned = read_waypoints(plans / speed / 'trajectory', joints=robot.joints)
     excitation = load_excitation(plans / speed / 'excitation.yaml')
     file = str(plans / speed / 'excitation.yaml')
     node = waiting_publisher(bench, None, file=file, rate=50.0)

@@ -9,7 +9,7 @@ import shutil
 
 from armid_ros.errors import RecordingError
 from armid_ros.nodes.recorder import RecorderNode
-from armid_ros.recording import iter_raw, read_recording, topics
+from armid_ros.recording import read_recording, topics
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -18,6 +18,7 @@ from rosidl_generator_py.import_type_support_impl import UnsupportedTypeSupport
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty, String
 
+from tests.recording.conftest import iter_raw
 from tests.ros.controller import joint_state
 
 SECOND = 10**9
@@ -47,7 +48,7 @@ def test_every_message_is_in_the_bag_with_its_stamp(bench, tmp_path, reliability
     assert recording.report.clean and len(recording) == 500
     assert recording.tau[499, 1] == 499.0
     (topic,) = topics(tmp_path / 'bag')
-    assert topic.qos[0].durability == durability.name.lower()
+    assert topic.qos[0].durability.name == durability.name
     first = next(iter_raw(tmp_path / 'bag'))
     assert first.publish_time_ns == 100 * SECOND
     assert deserialize_message(first.cdr, JointState) == state(0)

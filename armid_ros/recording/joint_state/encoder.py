@@ -110,7 +110,6 @@ def write_recording(
     path: str | Path,
     measured: Measured,
     *,
-    joint_names: Sequence[str] | None = None,
     topic: str = '/joint_states',
     start_ns: int | None = None,
     robot_description: str | None = None,
@@ -126,8 +125,6 @@ def write_recording(
         The bag directory to be made; it must not exist.
     measured : Recording, Motion or alike
         What was measured or simulated; velocities and torques may be None.
-    joint_names : sequence of str, optional
-        Names for the columns; by default those of ``measured``.
     topic : str
         Topic of the messages.
     start_ns : int, optional
@@ -154,7 +151,7 @@ def write_recording(
     True
 
     """
-    joints = tuple(measured.joints if joint_names is None else joint_names)
+    joints = tuple(measured.joints)
     if measured.q.shape != (len(measured.t), len(joints)):
         raise RecordingError(
             f'{path}: {len(measured.t)} samples of {len(joints)} joints ({", ".join(joints)}) '
@@ -190,11 +187,11 @@ def _encoded(
                 f'{name} has shape {values.shape}, but {len(stamps)} stamps of {n} joints need '
                 f'{(len(stamps), n)}'
             )
+    frame = frame_id.encode()
     counts = tuple(0 if values is None else n for values in fields)
-    layout = JointStateLayout.make(joints, frame_id, (counts[0], counts[1], counts[2]))
+    layout = JointStateLayout('<', len(frame) + 1, joints, counts)
     template = np.zeros(1, layout.dtype(layout.end))
-    frame = np.frombuffer(frame_id.encode(), np.uint8)
-    template.view(np.uint8)[16 : 16 + len(frame)] = frame
+    template.view(np.uint8)[16 : 16 + len(frame)] = np.frombuffer(frame, np.uint8)
     template['encapsulation'] = 1
     template['frame_length'] = layout.frame_length
     template['names'] = layout.names_pattern[0]

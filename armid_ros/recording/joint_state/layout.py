@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 # Encapsulation 4, stamp 8, then the length of frame_id.
 _FRAME = 12
+_FIELDS = ('position', 'velocity', 'effort')
 
 
 class MalformedMessage(ValueError):
@@ -45,19 +46,13 @@ class JointStateLayout:
         Joint names.
     counts : tuple of int
         Number of positions, velocities and efforts.
-    offsets : tuple of int
-        Where their values begin; of no meaning where there are none.
-    end : int
-        Where the last value ends.
 
     """
 
     order: str
     frame_length: int
     names: tuple[str, ...]
-    counts: tuple[int, int, int]
-    offsets: tuple[int, int, int]
-    end: int
+    counts: tuple[int, ...]
 
     @classmethod
     def of(cls, cdr: bytes) -> JointStateLayout:
@@ -73,66 +68,25 @@ class JointStateLayout:
         order = BYTE_ORDERS.get(cdr[:2])
         if order is None:
             raise MalformedMessage(f'encapsulation {cdr[:2].hex(" ")!r} is not plain CDR')
+        counts: list[int] = []
         try:
             (frame_length,) = struct.unpack_from(order + 'I', cdr, _FRAME)
-            names, position = _read_names(cdr, order, _align(_FRAME + 4 + frame_length, 4))
-            counts, offsets = [], []
-            for _ in range(3):
-                position = _align(position, 4)
-                (count,) = struct.unpack_from(order + 'I', cdr, position)
-                position += 4
-                start = _align(position, 8) if count else position
-                position = start + 8 * count
-                counts.append(count)
-                offsets.append(start)
+            names = _read_names(cdr, order, _align(_FRAME + 4 + frame_length, 4))
+            for field in range(3):
+                layout = cls(order, frame_length, names, (*counts, *[0] * (3 - field)))
+                counts += struct.unpack_from(order + 'I', cdr, layout.places[field][0])
         except (struct.error, UnicodeDecodeError) as error:
             raise MalformedMessage(f'not a JointState: {error}') from error
+        layout = cls(order, frame_length, names, tuple(counts))
         # A writer reserves room to align what follows, and for each empty sequence as well.
-        if not 0 <= len(cdr) - position <= 7 + 4 * counts.count(0):
-            raise MalformedMessage(f'{len(cdr)} bytes where a JointState has {position}')
-        return cls(
-            order,
-            frame_length,
-            names,
-            (counts[0], counts[1], counts[2]),
-            (offsets[0], offsets[1], offsets[2]),
-            position,
-        )
-
-    @classmethod
-    def make(
-        cls, names: tuple[str, ...], frame_id: str, counts: tuple[int, int, int]
-    ) -> JointStateLayout:
-        """Return the layout of messages to be written."""
-        frame_length = len(frame_id.encode()) + 1
-        position = _align(_FRAME + 4 + frame_length, 4) + 4
-        for name in names:
-            position = _align(position, 4) + 4 + len(name.encode()) + 1
-        offsets = []
-        for count in counts:
-            position = _align(position, 4) + 4
-            start = _align(position, 8) if count else position
-            offsets.append(start)
-            position = start + 8 * count
-        return cls(
-            '<', frame_length, names, counts, (offsets[0], offsets[1], offsets[2]), position
-        )
+        if not 0 <= len(cdr) - layout.end <= 7 + 4 * counts.count(0):
+            raise MalformedMessage(f'{len(cdr)} bytes where a JointState has {layout.end}')
+        return layout
 
     @property
     def names_offset(self) -> int:
         """Where the count of names is."""
         return _align(_FRAME + 4 + self.frame_length, 4)
-
-    def count_offset(self, field: int) -> int:
-        """Where the number of values of a field (0 position, 1 velocity, 2 effort) is."""
-        if not self.counts[field]:
-            return self.offsets[field] - 4
-        # The values are aligned to 8, so the count before them may be followed by padding.
-        previous = self.names_end if field == 0 else self._end_of(field - 1)
-        return _align(previous, 4)
-
-    def _end_of(self, field: int) -> int:
-        return self.offsets[field] + 8 * self.counts[field]
 
     @cached_property
     def names_end(self) -> int:
@@ -141,6 +95,23 @@ class JointStateLayout:
         for name in self.names:
             position = _align(position, 4) + 4 + len(name.encode()) + 1
         return position
+
+    @cached_property
+    def places(self) -> tuple[tuple[int, int], ...]:
+        """Where the number of positions, velocities and efforts is, and where they begin."""
+        places, position = [], self.names_end
+        for count in self.counts:
+            at = _align(position, 4)
+            # Values are aligned to 8, so the count before them may be followed by padding.
+            begin = _align(at + 4, 8) if count else at + 4
+            places.append((at, begin))
+            position = begin + 8 * count
+        return tuple(places)
+
+    @property
+    def end(self) -> int:
+        """Where the last value ends."""
+        return self.places[-1][1] + 8 * self.counts[-1]
 
     def dtype(self, length: int) -> np.dtype[np.void]:
         """Return messages of this layout and a total length as a numpy record."""
@@ -152,11 +123,10 @@ class JointStateLayout:
             'frame_length': (self.order + 'u4', _FRAME),
             'names': (('<u4', (words,)), self.names_offset),
         }
-        for field, name in enumerate(('position', 'velocity', 'effort')):
-            fields['n_' + name] = (self.order + 'u4', self.count_offset(field))
-            if self.counts[field]:
-                values = (self.order + 'f8', (self.counts[field],))
-                fields[name] = (values, self.offsets[field])
+        for name, count, place in zip(_FIELDS, self.counts, self.places, strict=True):
+            fields['n_' + name] = (self.order + 'u4', place[0])
+            if count:
+                fields[name] = ((self.order + 'f8', (count,)), place[1])
         return np.dtype(
             {
                 'names': list(fields),
@@ -199,13 +169,13 @@ class JointStateLayout:
             same[rest] = ((names[rest] & mask) == expected).all(axis=1)
         same &= rows['encapsulation'] == (1 if self.order == '<' else 0)
         same &= rows['frame_length'] == self.frame_length
-        for field, name in enumerate(('n_position', 'n_velocity', 'n_effort')):
-            same &= rows[name] == self.counts[field]
+        for name, count in zip(_FIELDS, self.counts, strict=True):
+            same &= rows['n_' + name] == count
         return np.asarray(same)
 
 
-def _read_names(cdr: bytes, order: str, position: int) -> tuple[tuple[str, ...], int]:
-    """Return the joint names and where they end."""
+def _read_names(cdr: bytes, order: str, position: int) -> tuple[str, ...]:
+    """Return the joint names, of which the count is at a position."""
     (count,) = struct.unpack_from(order + 'I', cdr, position)
     position += 4
     if count > len(cdr):
@@ -214,12 +184,11 @@ def _read_names(cdr: bytes, order: str, position: int) -> tuple[tuple[str, ...],
     for _ in range(count):
         position = _align(position, 4)
         (length,) = struct.unpack_from(order + 'I', cdr, position)
-        position += 4
-        names.append(cdr[position : position + max(length - 1, 0)].decode())
-        position += length
-        if position > len(cdr):
+        position += 4 + length
+        if not length or position > len(cdr):
             raise MalformedMessage('a joint name does not end within the message')
-    return tuple(names), position
+        names.append(cdr[position - length : position - 1].decode())
+    return tuple(names)
 
 
 def _align(position: int, size: int) -> int:

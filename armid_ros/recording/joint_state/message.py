@@ -75,11 +75,12 @@ class _Fields:
         self._code = b'\x00\x01' if order == '<' else b'\x00\x00'
         self._count = struct.Struct(order + 'I').unpack_from
         self._stamp = struct.Struct(order + 'iI').unpack_from
-        counts = [(layout.count_offset(k), (count,)) for k, count in enumerate(layout.counts)]
-        self._counts = [(12, (layout.frame_length,)), *counts]
+        counts = zip(layout.places, layout.counts, strict=True)
+        self._counts = [(12, (layout.frame_length,)), *((at, (n,)) for (at, _), n in counts)]
         self._end = layout.end
         self._type = np.dtype(order + 'f8')
-        self._places = list(zip(layout.counts, layout.offsets, strict=True))
+        begins = (begin for _, begin in layout.places)
+        self._places = list(zip(layout.counts, begins, strict=True))
 
     def fit(self, data: bytes) -> bool:
         """Return whether a message is of this layout; bytes of padding may be anything."""

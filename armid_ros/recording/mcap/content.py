@@ -29,24 +29,19 @@ class Gathered:
         self._offsets: list[IntArray] = []
         self._size = self._count = 0
 
-    def add(self, content: bytes, offsets: IntArray) -> Iterator[MessageBlock]:
-        """Add messages of a content of their own."""
-        if not self._parts:
+    def add(self, content: bytes | mmap.mmap, offsets: IntArray) -> Iterator[MessageBlock]:
+        """Add messages of a content of their own, or that lie in the file as they are."""
+        own = isinstance(content, bytes) and content is not self._file
+        if own != bool(self._parts):
             yield from self.flush()
-        self._parts.append(content)
-        self._offsets.append(offsets + self._size)
-        self._size += len(content)
+        if own:
+            self._parts.append(bytes(content))
+            self._offsets.append(offsets + self._size)
+            self._size += len(content)
+        else:
+            self._offsets.append(offsets)
         self._count += len(offsets)
-        if self._size > _BLOCK_BYTES:
-            yield from self.flush()
-
-    def add_in_place(self, offsets: IntArray) -> Iterator[MessageBlock]:
-        """Add messages that lie in the file as they are."""
-        if self._parts:
-            yield from self.flush()
-        self._offsets.append(offsets)
-        self._count += len(offsets)
-        if self._count > BLOCK_MESSAGES:
+        if self._size > _BLOCK_BYTES or (not own and self._count > BLOCK_MESSAGES):
             yield from self.flush()
 
     def flush(self) -> Iterator[MessageBlock]:
@@ -57,9 +52,14 @@ class Gathered:
         self._parts, self._offsets, self._size, self._count = [], [], 0, 0
 
 
+def heads(data: bytes | mmap.mmap, offsets: IntArray) -> npt.NDArray[np.void]:
+    """Return the heads of the messages whose records begin there, as `MESSAGE`."""
+    return records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+
+
 def message_block(data: bytes | mmap.mmap, offsets: IntArray) -> MessageBlock:
     """Return the messages whose records begin there."""
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    rows = heads(data, offsets)
     return MessageBlock(
         data,
         offsets + MESSAGE.itemsize,
@@ -95,7 +95,7 @@ def tiled(
     """
     if not len(offsets) or offsets[0] < begin or offsets[-1] + MESSAGE.itemsize > end:
         return None
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
+    rows = heads(data, offsets)
     lengths = rows['length'].astype(np.uint64)
     if (rows['opcode'] != Opcode.MESSAGE).any():
         return None

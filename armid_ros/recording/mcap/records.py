@@ -96,8 +96,8 @@ class FileMap:
         The file.
     chunks : list of Chunk
         Its chunks, in order.
-    loose : list of (int, int)
-        Beginning and end of messages outside chunks: channel, sequence, times, then the CDR.
+    loose : list of int
+        Where the records of messages outside chunks begin.
     schemas, channels : dict
         Those met outside chunks, which in a finished file are all.
     statistics : Statistics, optional
@@ -111,7 +111,7 @@ class FileMap:
 
     data: bytes | mmap.mmap
     chunks: list[Chunk] = field(default_factory=list)
-    loose: list[tuple[int, int]] = field(default_factory=list)
+    loose: list[int] = field(default_factory=list)
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     statistics: Statistics | None = None
@@ -274,7 +274,7 @@ def _add_loose(found: FileMap, begin: int, end: int) -> None:
     if end - begin < MESSAGE_HEADER:
         found.damage.add(f'the message at byte {begin} is too short for one')
         return
-    found.loose.append((begin, end))
+    found.loose.append(begin - RECORD_HEADER)
 
 
 #: What is noted of records as they come.

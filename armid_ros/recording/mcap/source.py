@@ -18,19 +18,24 @@ from pathlib import Path
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.mcap.chunks import Content, Contents
-from armid_ros.recording.mcap.content import BLOCK_MESSAGES, Gathered, message_block, tiled, walk
+from armid_ros.recording.mcap.content import (
+    BLOCK_MESSAGES,
+    Gathered,
+    heads,
+    message_block,
+    tiled,
+    walk,
+)
 from armid_ros.recording.mcap.records import (
     add_definition,
     Chunk,
     FileMap,
     map_file,
-    MESSAGE,
-    RECORD_HEADER,
 )
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, records_at, Topic
+from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, Topic
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
@@ -89,24 +94,13 @@ class McapSource:
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
         self._survey()
-        wanted = sorted(c.id for c in self._found.channels.values() if c.topic == topic)
-        gathered, count = Gathered(self._found.data), 0
-        read = [chunk for chunk in self._found.chunks if not self._is_without(chunk, wanted)]
-        for chunk, unpacked in self._contents.of(read):
-            content, offsets, rows = self._messages_in(chunk, unpacked)
-            offsets = self._possible(offsets, rows, wanted)
+        found = self._found
+        wanted = sorted(c.id for c in found.channels.values() if c.topic == topic)
+        gathered, count = Gathered(found.data), 0
+        read = [chunk for chunk in found.chunks if not self._is_without(chunk, wanted)]
+        for _, content, offsets in self._pieces(read, wanted):
             count += len(offsets)
-            if isinstance(content, bytes):
-                yield from gathered.add(content, offsets)
-            else:
-                yield from gathered.add_in_place(offsets)
-        loose = self._loose()
-        if len(loose):
-            rows = records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)
-            loose = self._possible(loose, rows, wanted)
-            count += len(loose)
-            for at in range(0, len(loose), BLOCK_MESSAGES):
-                yield from gathered.add_in_place(loose[at : at + BLOCK_MESSAGES])
+            yield from gathered.add(content, offsets)
         yield from gathered.flush()
         self._compare_count(topic, wanted, count)
 
@@ -116,11 +110,13 @@ class McapSource:
         names = {channel.id: channel.topic for channel in self._found.channels.values()}
         pending: list[tuple[int, int, RawMessage]] = []
         number = size = 0
-        for start_time, block, channels in self._pieces(sorted(names)):
+        in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
+        for start_time, content, offsets in self._pieces(in_order, sorted(names), by_time=True):
             while pending and pending[0][0] < start_time:
                 raw = heapq.heappop(pending)[2]
                 size -= len(raw.cdr) + _OVERHEAD
                 yield raw
+            block, channels = message_block(content, offsets), heads(content, offsets)['channel']
             times = zip(
                 channels.tolist(),
                 block.log_time.tolist(),
@@ -139,25 +135,20 @@ class McapSource:
         self._compare_count('all topics', list(names), number)
 
     def _pieces(
-        self, channels: Sequence[int]
-    ) -> Iterator[tuple[int, MessageBlock, npt.NDArray[np.uint16]]]:
-        """Yield messages of all channels by chunk, chunks by their first log time."""
-        in_order = sorted(self._found.chunks, key=lambda chunk: chunk.start_time)
-        for chunk, unpacked in self._contents.of(in_order):
+        self, chunks: Sequence[Chunk], channels: Sequence[int], *, by_time: bool = False
+    ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
+        """Yield first log time, content, and where in it messages of some channels begin."""
+        data = self._found.data
+        for chunk, unpacked in self._contents.of(chunks):
             content, offsets, rows = self._messages_in(chunk, unpacked)
-            offsets = self._possible(offsets, rows, channels)
-            if len(offsets):
-                yield chunk.start_time, *_piece(content, offsets)
-        loose = self._loose()
-        if len(loose):
-            data = self._found.data
-            rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
-            loose = self._possible(loose, rows, channels)
-            rows = records_at(data, loose, MESSAGE.itemsize).view(MESSAGE)
-            loose = loose[np.argsort(rows['log_time'], kind='stable')]
-            for at in range(0, len(loose), BLOCK_MESSAGES):
-                block, of = _piece(data, loose[at : at + BLOCK_MESSAGES])
-                yield int(block.log_time[0]), block, of
+            yield chunk.start_time, content, self._possible(offsets, rows, channels)
+        loose = np.array(self._found.loose, np.int64)
+        loose = self._possible(loose, heads(data, loose), channels)
+        if by_time:
+            loose = loose[np.argsort(heads(data, loose)['log_time'], kind='stable')]
+        for at in range(0, len(loose), BLOCK_MESSAGES):
+            some = loose[at : at + BLOCK_MESSAGES]
+            yield int(heads(data, some)['log_time'][0]), data, some
 
     def _survey(self) -> dict[int, int]:
         """Make sure all channels are known, and return the number of messages of each."""
@@ -169,7 +160,8 @@ class McapSource:
             return self._counts
         counts: dict[int, int] = {}
         inside = (self._channels_in(unpacked) for _, unpacked in self._contents.of(found.chunks))
-        for rows in (self._loose_channels(), *inside):
+        loose = heads(found.data, np.array(found.loose, np.int64))['channel']
+        for rows in (loose, *inside):
             for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):
                 counts[int(channel)] = counts.get(int(channel), 0) + int(count)
         self._counts = counts
@@ -181,7 +173,7 @@ class McapSource:
         offsets, definitions, _ = walk(content, begin, end)
         for opcode, start, stop in definitions:
             add_definition(self._found, opcode, content[start:stop])
-        return records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)['channel'].copy()
+        return heads(content, offsets)['channel'].copy()
 
     def _is_without(self, chunk: Chunk, wanted: Collection[int]) -> bool:
         """Tell whether a chunk has no message of some channels, by an index that is compared."""
@@ -210,7 +202,7 @@ class McapSource:
                 f'the chunk at byte {chunk.begin} is damaged: '
                 f'some messages {self._found.span(chunk)} are lost'
             )
-        return content, offsets, records_at(content, offsets, MESSAGE.itemsize).view(MESSAGE)
+        return content, offsets, heads(content, offsets)
 
     def _indexed(self, chunk: Chunk) -> IntArray:
         """
@@ -269,22 +261,6 @@ class McapSource:
         )
         qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
         return Topic(channel.topic, described, qos, count, channel.message_encoding)
-
-    def _loose(self) -> IntArray:
-        """Return where records of messages outside chunks begin."""
-        return np.array([begin - RECORD_HEADER for begin, _ in self._found.loose], np.int64)
-
-    def _loose_channels(self) -> npt.NDArray[np.uint16]:
-        """Return the channel of each message outside chunks."""
-        loose = self._loose()
-        return records_at(self._found.data, loose, MESSAGE.itemsize).view(MESSAGE)['channel']
-
-
-def _piece(
-    data: bytes | mmap.mmap, offsets: IntArray
-) -> tuple[MessageBlock, npt.NDArray[np.uint16]]:
-    rows = records_at(data, offsets, MESSAGE.itemsize).view(MESSAGE)
-    return message_block(data, offsets), rows['channel']
 
 
 def _map(path: Path) -> bytes | mmap.mmap:

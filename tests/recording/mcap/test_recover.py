@@ -7,7 +7,6 @@ import re
 from armid_ros.errors import RecordingError
 from armid_ros.recording import (
     BagWriter,
-    iter_raw,
     joint_state_cdr,
     LATCHED,
     read_recording,
@@ -25,7 +24,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import Reader
 
-JOINTS = ('shoulder', 'elbow', 'wrist')
+from ..conftest import iter_raw, JOINTS
 
 
 @pytest.fixture(params=['zstd', 'lz4', 'none'])

@@ -234,10 +234,6 @@ def unnamed(path, motion):
     path.write_text('\n'.join(lines))
 
 
-def words(path, _motion):
-    path.write_text('nothing\nto see\n')
-
-
 def holes(path, motion):
     lines = text(motion).splitlines()
     lines[50:150] = [line.rsplit(',', 1)[0] + ',' for line in lines[50:150]]
@@ -260,7 +256,6 @@ def counter(path, motion):
         broken_cell: r"run.csv: line 2, column time: 'oops' is no number",
         ragged: r'run.csv: line 8 has 8 values, the others 7',
         unnamed: r'run.csv: 3 names \(time, q1, q2 ...\) stand above 7 values in line 2',
-        words: r'run.csv: no line of numbers in 2 lines',
         holes: r'run.csv: column tau2 has no number in 100 of 200 rows, first in line 51',
         still_clock: r'run.csv: column time does not increase',
         counter: r'run.csv: column time counts 1, 2, 3; give its unit with --time-unit',

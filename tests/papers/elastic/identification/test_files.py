@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_typestore, Stores
 
+from tests.recording.conftest import iter_raw
+
 ROBOT = load_robot('two_link_elastic')
 SENSORS = Accelerometers.on(ROBOT, [0.4, 0.3])
 
@@ -64,8 +66,6 @@ def test_imu_messages_are_what_ros_reads(tmp_path) -> None:
     acceleration = np.arange(12.0).reshape(4, 3)
     with BagWriter(tmp_path / 'imu') as writer:
         write_accelerations(writer, '/imu', 'a_link', [1, 10**9, 2 * 10**9, 3], acceleration)
-    from armid_ros.recording import iter_raw
-
     store = get_typestore(Stores.ROS2_JAZZY)
     messages = [
         store.deserialize_cdr(m.cdr, 'sensor_msgs/msg/Imu') for m in iter_raw(tmp_path / 'imu')
