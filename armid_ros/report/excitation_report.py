@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
+    ClearanceModel,
     CollisionScene,
     CRITERIA,
     Design,
@@ -86,7 +87,7 @@ def excitation_report(
     if obstacles:
         bodies['arm from its environment'] = obstacles_alone(collision, obstacles)
     curves = {
-        name: model.path_clearance(motion.q)
+        name: ClearanceModel.of(model).smallest(motion.q)
         for name, model in bodies.items()
         if len(model.geometry.collisionPairs)
     }
