@@ -91,11 +91,10 @@ def excitation_report(
         for name, model in bodies.items()
         if len(model.geometry.collisionPairs)
     }
-    whole = with_obstacles(collision, obstacles)
     said = (*collision.notes, *filter(None, [collision.excluded]))
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     poses = draw_poses(
-        whole,
+        with_obstacles(collision, obstacles),
         excitation.at(instants).q,
         [f'{t:.1f} s' for t in instants],
         excitation.trajectory.one_period(_WAY).q,

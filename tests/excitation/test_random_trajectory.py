@@ -28,14 +28,6 @@ def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision, with
         assert path_clearance(humanoid_collision, motion.q).min() >= 0.01
 
 
-def test_same_seed_gives_the_same_trajectory(two_link_arm):
-    limits = Limits.of(two_link_arm.robot)
-    first, second = (
-        random_feasible(two_link_arm, limits, 6.0, 3, np.random.default_rng(5)) for _ in range(2)
-    )
-    np.testing.assert_array_equal(first.a, second.a)
-
-
 def test_torque_limit_below_gravity_is_named(two_link_arm):
     limits = Limits.of(two_link_arm.robot)
     pinned = replace(
