@@ -33,7 +33,7 @@ from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, simulate, SimulatedArm
-from armid_ros.simulation.plant import middle_position, Plant
+from armid_ros.simulation.plant import Plant
 import numpy as np
 from scipy import signal
 
@@ -107,7 +107,7 @@ def working_motion(duration: float, speed: float, rng: np.random.Generator) -> R
     fade = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
     slope = 30.0 * x**2 * (1.0 - x) ** 2 * sign
     bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * sign**2
-    middle = middle_position(robot)
+    middle = robot.middle_pose
     return Reference(
         robot.joints,
         t[:, 0],

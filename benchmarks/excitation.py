@@ -137,11 +137,11 @@ def narrow(arm, problem, clearance, rng):
 
 def held_out_error(problem, trajectory, unseen, rng):
     """Return mean over joints of RMSE / peak against the true torque [%], 200 noise draws."""
-    w = problem.weighted_regressor(trajectory.one_period(LUNAR_SAMPLES))
+    w = problem.columns(trajectory.one_period(LUNAR_SAMPLES))[:, problem.base.independent]
     errors = np.linalg.pinv(w) @ rng.normal(size=(len(w), REPEATS))
     shares = []
     for motion in unseen:
-        wrong = problem.weighted_regressor(motion) @ errors
+        wrong = problem.columns(motion)[:, problem.base.independent] @ errors
         wrong = wrong.reshape(len(motion), -1, REPEATS) * problem.noise[:, np.newaxis]
         rmse = np.sqrt(np.mean(wrong**2, axis=0)).mean(axis=1)
         shares.append(rmse / np.abs(problem.arm.torque(motion)).max(axis=0))
@@ -219,7 +219,7 @@ def print_scatter(problem, result, rng):
     rate = settings.rate
     run, slices = result.excitation.motion(rate), result.excitation.period_slices(rate)
     motion = run.select(slice(slices[0].start, slices[-1].stop))
-    w = problem.weighted_regressor(motion)
+    w = problem.columns(motion)[:, problem.base.independent]
     scatter = (np.linalg.pinv(w) @ rng.normal(size=(len(w), REPEATS))).std(axis=1)
     ratio = result.information.std / scatter
     print(

@@ -31,7 +31,6 @@ from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot, Robot
-from armid_ros.simulation.plant import middle_position
 import numpy as np
 
 from benchmarks.real_recordings import example_robot
@@ -59,7 +58,7 @@ def exciting_motion(robot: Robot, seconds: float, rng: np.random.Generator) -> M
     angle = w * t[:, None] + rng.uniform(0.0, 2.0 * np.pi, (5, 1, robot.n_joints))
     shares = (size / w * np.sin(angle), size * np.cos(angle), -size * w * np.sin(angle))
     q, dq, ddq = (share.sum(axis=0) for share in shares)
-    return Motion(robot.joints, t, q + middle_position(robot), dq, ddq)
+    return Motion(robot.joints, t, q + robot.middle_pose, dq, ddq)
 
 
 def update_times(arm: ArmModel, motion: Motion, tau: FloatArray, settings: OnlineSettings) -> str:

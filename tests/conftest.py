@@ -3,6 +3,7 @@
 """What every test may ask for: recordings of real machines, and a ROS 2 domain of its own."""
 
 from contextlib import ExitStack
+from importlib.metadata import files
 from itertools import chain
 import os
 from pathlib import Path
@@ -79,3 +80,22 @@ def real_data():
     if not Path(folder).is_dir():
         pytest.fail(f'ARMID_DATA is {folder}, which is no folder')
     return Path(folder)
+
+
+@pytest.fixture(scope='session')
+def example_robot():
+    """Return a function that finds a URDF of example-robot-data by its file name."""
+    paths = [entry for entry in files('example-robot-data') or () if entry.suffix == '.urdf']
+
+    def find(name):
+        return next(Path(str(path.locate())) for path in paths if path.name == name)
+
+    return find
+
+
+@pytest.fixture(scope='session')
+def humanoid():
+    """Return the shipped humanoid arm on Earth."""
+    from armid_ros.robots import load_robot
+
+    return load_robot('humanoid_arm')

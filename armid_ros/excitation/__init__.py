@@ -18,11 +18,17 @@ from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.gate import MotionGate
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.geometry.environment import Obstacle, obstacles_alone, with_obstacles
-from armid_ros.excitation.geometry.environment_file import load_environment
 from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
 from armid_ros.excitation.geometry.heights import LowestPoint
-from armid_ros.excitation.joint_limits import with_joint_limits
-from armid_ros.excitation.limits import check_limits, Limits, SPEED_CLASSES, used_shares, Violation
+from armid_ros.excitation.geometry.planning_scene import load_environment
+from armid_ros.excitation.limits import (
+    check_limits,
+    Limits,
+    SPEED_CLASSES,
+    used_shares,
+    Violation,
+    with_joint_limits,
+)
 from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible

@@ -52,15 +52,6 @@ class Faults:
         """List them all in a line."""
         return '; '.join(map(str, (*self.violations, *self.approaches)))
 
-    @property
-    def first(self) -> str:
-        """Name the first one without its numbers."""
-        if self.violations:
-            return f'{self.violations[0].limit} of joint {self.violations[0].joint}'
-        if self.approaches:
-            return f'clearance of {self.approaches[0].first} and {self.approaches[0].second}'
-        return 'nothing'
-
 
 def trajectory_faults(
     arm: ArmModel,

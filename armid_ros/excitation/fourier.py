@@ -11,6 +11,9 @@ from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
 
+#: Samples before and after a period that columns of effects may depend on.
+MARGIN = 8
+
 
 @dataclass(frozen=True)
 class FourierTrajectory:
@@ -75,6 +78,17 @@ class FourierTrajectory:
                     'is not a finite number'
                 )
 
+    @classmethod
+    def of(cls, joints: tuple[str, ...], period: float, x: FloatArray) -> FourierTrajectory:
+        """Return the trajectory with coefficients (q0, a, b), shape (n, 1 + 2 H)."""
+        middle = (x.shape[1] + 1) // 2
+        return cls(joints, period, x[:, 0], x[:, 1:middle], x[:, middle:])
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """Return (q0, a, b), shape (n, 1 + 2 H)."""
+        return np.column_stack([self.q0, self.a, self.b])
+
     @property
     def n_joints(self) -> int:
         """Return the number of joints n."""
@@ -107,12 +121,17 @@ class FourierTrajectory:
         """
         time = np.asarray(t, dtype=float)
         q, dq, ddq = fourier_basis(time, self.period, self.harmonics)
-        x = np.column_stack([self.q0, self.a, self.b]).T
+        x = self.coefficients.T
         return Motion(self.joints, time, q @ x, dq @ x, ddq @ x)
 
     def one_period(self, n_samples: int) -> Motion:
         """Return n_samples equally spaced samples of one period, the end left out."""
         return self.motion(np.arange(n_samples) * (self.period / n_samples))
+
+    def with_margins(self, n_samples: int) -> Motion:
+        """Return the samples of one period, and `MARGIN` more before and after it."""
+        step = self.period / n_samples
+        return self.motion(np.arange(-MARGIN, n_samples + MARGIN) * step)
 
     def shifted(self, time: float) -> FourierTrajectory:
         """Return the same orbit entered later, by a time [s]: its beginning is the motion then."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.fourier import FourierTrajectory
+from armid_ros.excitation.fourier import FourierTrajectory, MARGIN
 from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.search.criteria import (
     Criterion,
@@ -23,9 +23,6 @@ from armid_ros.model import BaseParameters, group_columns, levelled, random_moti
 from armid_ros.motion import FloatArray, Motion, read_only
 import numpy as np
 import numpy.typing as npt
-
-#: Samples before and after a period that columns may depend on.
-_MARGIN = 8
 
 #: Share of the torque limit that a sensor's noise is taken to be when nothing is known of it.
 NOISE_SHARE = 0.01
@@ -124,14 +121,9 @@ class DesignProblem:
 
     def periodic_columns(self, trajectory: FourierTrajectory, n_samples: int) -> FloatArray:
         """Return the weighted columns of one period, shape (N n, P), of a motion without ends."""
-        step = trajectory.period / n_samples
-        motion = trajectory.motion(np.arange(-_MARGIN, n_samples + _MARGIN) * step)
-        rows = self.columns(motion).reshape(len(motion), -1)[_MARGIN : _MARGIN + n_samples]
+        motion = trajectory.with_margins(n_samples)
+        rows = self.columns(motion).reshape(len(motion), -1)[MARGIN:-MARGIN]
         return rows.reshape(n_samples * trajectory.n_joints, -1)
-
-    def weighted_regressor(self, motion: Motion) -> FloatArray:
-        """Return W, shape (N n, r): the base parameters, rows divided by the noise."""
-        return self.columns(motion)[:, self.base.independent]
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
@@ -145,7 +137,7 @@ class DesignProblem:
             Number of samples that will be recorded; by default those of the motion.
 
         """
-        w = self.weighted_regressor(motion)
+        w = self.columns(motion)[:, self.base.independent]
         weight = 1.0 if n_recorded is None else n_recorded / len(motion)
         return Information(self.base.parameters, weight * (w.T @ w), self.scale)
 

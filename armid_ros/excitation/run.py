@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
+from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.geometry.unwinding import unwound
+from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.transfer import Transfer, TransferPlanner
 from armid_ros.motion import FloatArray, Motion
@@ -17,6 +18,11 @@ import numpy.typing as npt
 
 #: How far the end of the way there may be from the start of the excitation [rad or m].
 _GAP = 1e-9
+_TURN = 2.0 * np.pi
+#: Samples of the period at which range and torque are looked at.
+_SAMPLES = 400
+#: Torques that differ by less are the same, as a share of the largest.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -88,18 +94,8 @@ class Run:
 
     def motion(self) -> Motion:
         """Sample the whole run, from time 0 on."""
-        ways = [self._sampled(self.approach), self.excitation.motion(self.rate)]
-        if self.back is not None:
-            ways.append(self._sampled(self.back))
-        q, dq, ddq = (
-            np.vstack([getattr(way, name)[min(number, 1) :] for number, way in enumerate(ways)])
-            for name in ('q', 'dq', 'ddq')
-        )
-        return Motion(self.joints, np.arange(len(q)) / self.rate, q, dq, ddq)
-
-    def _sampled(self, way: Transfer) -> Motion:
-        count = round(way.duration * self.rate) + 1
-        return way.at(np.arange(count) / self.rate)
+        t = np.arange(round(self.duration * self.rate) + 1) / self.rate
+        return replace(self.at(t), t=t)
 
 
 def plan_run(
@@ -144,3 +140,41 @@ def plan_run(
     there = planner(start, first, shortest, seed)
     home = planner(start, last, shortest, seed).reversed() if back else None
     return Run(there, excitation, home, rate)
+
+
+def unwound(
+    excitation: Excitation, arm: ArmModel, limits: Limits, start: FloatArray
+) -> Excitation:
+    """
+    Return an excitation whose joints are as few turns from a start as the limits allow.
+
+    A joint that may turn twice reaches most poses in two ways, and above a floor one of them is
+    often cut off: the shoulder would have to swing through the ground.
+
+    Parameters
+    ----------
+    excitation : Excitation
+        What is to be run.
+    arm : ArmModel
+        Prior model; where it tells whole turns apart, as springs do, nothing is changed.
+    limits : Limits
+        Position limits in force.
+    start : ndarray, shape (n,)
+        Where the arm stands [rad or m].
+
+    """
+    trajectory = excitation.trajectory
+    q = trajectory.one_period(_SAMPLES).q
+    low, high = q.min(axis=0), q.max(axis=0)
+    wanted = np.round((start - 0.5 * (low + high)) / _TURN)
+    least = np.ceil((limits.lower - low) / _TURN)
+    most = np.floor((limits.upper - high) / _TURN)
+    turns = np.clip(wanted, np.minimum(least, 0.0), np.maximum(most, 0.0))
+    turns = np.where(limits.prismatic, 0.0, turns)
+    if not turns.any():
+        return excitation
+    moved = replace(trajectory, q0=trajectory.q0 + _TURN * turns)
+    before, after = (arm.joint_torque(path.one_period(_SAMPLES)) for path in (trajectory, moved))
+    if np.abs(after - before).max() > _SAME * np.abs(before).max():
+        return excitation
+    return replace(excitation, trajectory=moved)

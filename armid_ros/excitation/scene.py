@@ -10,10 +10,9 @@ from pathlib import Path
 
 from armid_ros.excitation.fitness import not_checked
 from armid_ros.excitation.geometry.environment import Obstacle, with_obstacles
-from armid_ros.excitation.geometry.environment_file import load_environment
 from armid_ros.excitation.geometry.floor import find_floor, Floor, floor_obstacles
-from armid_ros.excitation.joint_limits import require_radians
-from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.geometry.planning_scene import load_environment
+from armid_ros.excitation.limits import Limits, require_radians
 from armid_ros.robots import collision_model, CollisionModel, Robot
 
 

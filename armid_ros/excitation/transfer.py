@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.geometry.paths import clear_line, find_path, PathError
+from armid_ros.excitation.geometry.paths import clear_line, find_path
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY, SPEED_CLASSES
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
@@ -154,17 +154,14 @@ class TransferPlanner:
             fault = self.fault(q)
             if fault:
                 raise TrajectoryError(f'the pose that {name} is not free: {fault}')
-        try:
-            poses = find_path(
-                self.clearance,
-                self.margin,
-                (start, goal),
-                (self.limits.lower, self.limits.upper),
-                lambda q: not self._overload(q),
-                np.random.default_rng(seed),
-            )
-        except PathError as error:
-            raise TrajectoryError(f'no way to the trajectory was found: {error}') from None
+        poses = find_path(
+            self.clearance,
+            self.margin,
+            (start, goal),
+            (self.limits.lower, self.limits.upper),
+            lambda q: not self._overload(q),
+            np.random.default_rng(seed),
+        )
         return self._timed(poses, shortest)
 
     def fault(self, q: FloatArray) -> str:

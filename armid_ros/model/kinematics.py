@@ -145,9 +145,7 @@ class LinkFrames:
     @classmethod
     def in_the_middle(cls, robot: Robot) -> LinkFrames:
         """Follow no motion: all joints in the middle of their range, at 0 where there is none."""
-        limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-        lower, upper = (np.where(limited, end, 0.0) for end in (robot.lower, robot.upper))
-        return cls.of(robot, (lower + upper)[np.newaxis] / 2)
+        return cls.of(robot, robot.middle_pose[np.newaxis])
 
     def places(self, joint: str, offset: FloatArray) -> FloatArray:
         """Return where a point (3,) of the link that a joint moves is, shape (N, 3) [m]."""

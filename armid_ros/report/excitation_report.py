@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import (
+    ClearanceModel,
     CollisionScene,
     CRITERIA,
     Design,
@@ -86,15 +87,14 @@ def excitation_report(
     if obstacles:
         bodies['arm from its environment'] = obstacles_alone(collision, obstacles)
     curves = {
-        name: model.path_clearance(motion.q)
+        name: ClearanceModel.of(model).smallest(motion.q)
         for name, model in bodies.items()
         if len(model.geometry.collisionPairs)
     }
-    whole = with_obstacles(collision, obstacles)
     said = (*collision.notes, *filter(None, [collision.excluded]))
     instants = excitation.run_in + np.arange(_POSES) * excitation.trajectory.period / _POSES
     poses = draw_poses(
-        whole,
+        with_obstacles(collision, obstacles),
         excitation.at(instants).q,
         [f'{t:.1f} s' for t in instants],
         excitation.trajectory.one_period(_WAY).q,

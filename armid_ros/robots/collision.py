@@ -11,12 +11,10 @@ from pathlib import Path
 
 from armid_ros.errors import RobotError
 from armid_ros.files import read_text
-from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.description import parse_xml
 from armid_ros.robots.geometry import collision_geometry
 from armid_ros.robots.robot import Robot
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 RANGE_SAMPLES = 73  # every 5 deg of a full turn
@@ -57,62 +55,23 @@ class CollisionModel:
         numbers = range(len(self.geometry.collisionPairs))
         return tuple(sorted({_links(self.robot, self.geometry, number) for number in numbers}))
 
-    def path_clearance(self, q: npt.ArrayLike) -> FloatArray:
-        """
-        Return the smallest clearance in each pose of a path.
-
-        Parameters
-        ----------
-        q : array_like, shape (N, n)
-            Poses [rad or m].
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Clearances [m]; negative in collision, infinite when no pair of links is checked.
-
-        Raises
-        ------
-        RobotError
-            If the poses do not have a position for each driven joint.
-
-        """
-        q = np.asarray(q, dtype=np.float64)
-        model = self.robot.model
-        if q.ndim != 2 or q.shape[1] != model.nq:
-            raise RobotError(
-                f'{self.robot.name}: poses of shape {q.shape} do not fit {model.nq} driven joints'
-            )
-        clearances = np.full(len(q), np.inf)
-        if len(self.geometry.collisionPairs) > 0:
-            data, placed = model.createData(), self.geometry.createData()
-            for sample, pose in enumerate(q):
-                closest = pin.computeDistances(model, data, self.geometry, placed, pose)
-                clearances[sample] = placed.distanceResults[closest].min_distance
-        return read_only(clearances)
-
 
 def collision_model(
-    robot: Robot,
-    *,
-    srdf: str | Path | None = None,
-    progress: Callable[[float], None] | None = None,
+    robot: Robot, *, progress: Callable[[float], None] | None = None
 ) -> CollisionModel:
     """
     Return the collision bodies of a robot and the pairs of links that may touch.
 
     Not checked are links that cannot move against each other, links joined by a joint, pairs that
-    one joint moves and that do not touch anywhere in its range, and pairs that the SRDF
-    disables. Without an SRDF, pairs that touch when the robot stands at
-    zero (or its limits nearest to it) are left out and noted: they are bodies drawn too large.
+    one joint moves and that do not touch anywhere in its range, and pairs that the SRDF disables:
+    the one with the URDF's or the robot's name (or the only one) beside the URDF or in ../srdf.
+    Without an SRDF, pairs that touch when the robot stands at zero (or its limits nearest to it)
+    are left out and noted: they are bodies drawn too large.
 
     Parameters
     ----------
     robot : Robot
         The robot.
-    srdf : str or Path, optional
-        File with <disable_collisions>. By default the one with the URDF's or the robot's name
-        (or the only one) beside the URDF or in ../srdf.
     progress : callable, optional
         Called with the share that is done, 0 to 1, while meshes become convex bodies.
 
@@ -123,7 +82,7 @@ def collision_model(
 
     """
     geometry, missing = collision_geometry(robot, progress)
-    path = _find_srdf(robot) if srdf is None else Path(srdf)
+    path = _find_srdf(robot)
     disabled = _disabled_pairs(robot, path)
     description = robot.description
     joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}

@@ -182,6 +182,13 @@ class Robot:
         """Return where all joints are at zero, or at the limits nearest to it, shape (n,)."""
         return np.clip(np.zeros(self.n_joints), self.lower, self.upper)
 
+    @property
+    def middle_pose(self) -> FloatArray:
+        """Return the middle of the range of every joint, 0 where there is none, shape (n,)."""
+        limited = np.isfinite(self.lower) & np.isfinite(self.upper)
+        lower, upper = (np.where(limited, end, 0.0) for end in (self.lower, self.upper))
+        return np.asarray((lower + upper) / 2)
+
     def position_range(self) -> tuple[FloatArray, FloatArray]:
         """Return the position limits, shape (n,); `UNLIMITED_HALF_RANGE` where there is none."""
         return (

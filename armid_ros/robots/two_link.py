@@ -163,7 +163,7 @@ def planar_pair(robot: Robot) -> bool:
     return bool(crossed.max() < 1e-6)
 
 
-def two_link_set(name: str = 'after', path: Path | None = None) -> TwoLinkSet:
+def two_link_set(name: str) -> TwoLinkSet:
     """
     Read a shipped parameter set of the two-link arm, 'before' or 'after' tuning.
 
@@ -173,8 +173,7 @@ def two_link_set(name: str = 'after', path: Path | None = None) -> TwoLinkSet:
         If there is no such set.
 
     """
-    default = resources.files('armid_ros.robots').joinpath(ROBOT, 'parameters.yaml')
-    path = path or Path(str(default))
+    path = Path(str(resources.files('armid_ros.robots').joinpath(ROBOT, 'parameters.yaml')))
     text = read_text(path, RobotError)
     with reading(path, RobotError):
         content = load_yaml(text)

@@ -32,14 +32,7 @@ PATIENCE = 300.0
 MEMORY_LIMIT = 2 << 30
 
 
-def expand_xacro(
-    path: Path,
-    arguments: Mapping[str, str],
-    packages: Mapping[str, str] | None = None,
-    *,
-    time_limit: float = TIME_LIMIT,
-    patience: float = PATIENCE,
-) -> str:
+def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str, str]) -> str:
     """
     Return what a xacro file expands to.
 
@@ -49,12 +42,8 @@ def expand_xacro(
         The file; it is trusted as a program is, except for time and memory.
     arguments : mapping of str to str
         Values of <xacro:arg>.
-    packages : mapping of str to str, optional
+    packages : mapping of str to str
         Folders of packages by name, where `package_folders` would not find them.
-    time_limit : float
-        Processor time that it may take [s].
-    patience : float
-        How long it may last [s].
 
     Raises
     ------
@@ -65,8 +54,8 @@ def expand_xacro(
     request = {
         'path': str(path),
         'arguments': dict(arguments),
-        'packages': dict(packages or {}),
-        'seconds': time_limit,
+        'packages': dict(packages),
+        'seconds': TIME_LIMIT,
         'memory': MEMORY_LIMIT,
         'characters': TEXT_LIMIT,
     }
@@ -78,16 +67,16 @@ def expand_xacro(
             capture_output=True,
             encoding='utf-8',
             errors='replace',
-            timeout=patience,
+            timeout=PATIENCE,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise RobotError(f'{path}: xacro: not expanded within {patience:g} s') from error
+        raise RobotError(f'{path}: xacro: not expanded within {PATIENCE:g} s') from error
     except OSError as error:
         raise RobotError(f'{path}: xacro: cannot be started: {error.strerror}') from error
     if -done.returncode in (signal.SIGPROF, signal.SIGXCPU, signal.SIGKILL):
         raise RobotError(
-            f'{path}: xacro: not expanded within {time_limit:g} s of processor time and '
+            f'{path}: xacro: not expanded within {TIME_LIMIT:g} s of processor time and '
             f'{MEMORY_LIMIT >> 20} MiB'
         )
     answer: dict[str, Any] = {}

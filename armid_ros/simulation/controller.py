@@ -10,12 +10,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
-from armid_ros.simulation.plant import middle_position
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 #: Natural frequency of the closed loop [rad/s]: 8 Hz, stiff for an arm, and slow enough for 1 kHz
@@ -119,7 +116,7 @@ class ComputedTorque(Controller):
     """
     Inverse dynamics of a nominal arm, with feedback on the acceleration.
 
-    tau = ID(q, dq, ddq_d + 2 zeta omega (dq_d - dq) + omega^2 (q_d - q)) + friction at dq_d.
+    tau = ID(q, dq, ddq_d + 2 omega (dq_d - dq) + omega^2 (q_d - q)) + friction at dq_d.
     Source: Siciliano et al. 2009, section 8.5.2.
 
     Attributes
@@ -127,30 +124,23 @@ class ComputedTorque(Controller):
     arm : ArmModel
         What the controller believes of the arm. Its friction is compensated at the reference
         velocity.
-    bandwidth : float or ndarray, shape (n,)
-        Natural frequency omega of every joint [rad/s].
-    damping_ratio : float or ndarray, shape (n,)
-        Damping ratio zeta.
+    bandwidth : float
+        Natural frequency omega of every joint [rad/s], critically damped.
 
     """
 
     arm: ArmModel
-    bandwidth: float | FloatArray = BANDWIDTH
-    damping_ratio: float | FloatArray = 1.0
+    bandwidth: float = BANDWIDTH
     _robot: Robot = field(init=False, repr=False)
     _data: pin.Data = field(init=False, repr=False)
-    _gains: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
     _inertia: FloatArray | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the gains and collect what the effects of the nominal arm do."""
+        """Collect what the effects of the nominal arm do."""
         action = self.arm.action()
         robot = action.robot or self.arm.robot
-        omega = _per_joint(self.bandwidth, robot, 'bandwidth')
-        zeta = _per_joint(self.damping_ratio, robot, 'damping ratio')
         object.__setattr__(self, '_robot', robot)
         object.__setattr__(self, '_data', robot.model.createData())
-        object.__setattr__(self, '_gains', (omega**2, 2.0 * zeta * omega))
         object.__setattr__(self, '_inertia', action.inertia)
 
     def feedforward(self, desired: Motion) -> FloatArray:
@@ -166,9 +156,8 @@ class ComputedTorque(Controller):
     ) -> FloatArray:
         """Return the computed torque, shape (n,)."""
         q_desired, dq_desired, ddq_desired = desired
-        stiffness, damping = self._gains
-        ddq = stiffness * (q_desired - q)
-        ddq += damping * (dq_desired - dq)
+        ddq = self.bandwidth**2 * (q_desired - q)
+        ddq += 2.0 * self.bandwidth * (dq_desired - dq)
         ddq += ddq_desired
         tau: FloatArray = pin.rnea(self._robot.model, self._data, q, dq, ddq)
         if self._inertia is not None:
@@ -183,61 +172,42 @@ class GravityPD(Controller):
     A spring and a damper on every joint, and the torque that holds the nominal arm.
 
     tau = kp (q_d - q) + kd (dq_d - dq) + g(q). Source: Siciliano et al. 2009, section 8.5.1.
+    Each joint on its own, in the middle of the range of motion, is critically damped at 50 rad/s.
 
     Attributes
     ----------
     arm : ArmModel
         What the controller believes of the arm; only its gravity torque is used.
-    stiffness : float or ndarray, shape (n,), or None
-        kp [N m/rad or N/m]; None for a natural frequency of 50 rad/s of the joint on its own, in
-        the middle of the range of motion.
-    damping : float or ndarray, shape (n,), or None
-        kd [N m s/rad or N s/m]; None for critical damping of that joint.
+    stiffness, damping : ndarray, shape (n,)
+        kp [N m/rad or N/m] and kd [N m s/rad or N s/m].
 
     """
 
     arm: ArmModel
-    stiffness: float | FloatArray | None = None
-    damping: float | FloatArray | None = None
+    stiffness: FloatArray = field(init=False)
+    damping: FloatArray = field(init=False)
     _robot: Robot = field(init=False, repr=False)
     _data: pin.Data = field(init=False, repr=False)
-    _gains: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the gains, or choose them."""
+        """Choose the gains."""
         action = self.arm.action()
         robot = action.robot or self.arm.robot
         data = robot.model.createData()
-        inertia = np.diag(pin.crba(robot.model, data, middle_position(robot))).copy()
+        inertia = np.diag(pin.crba(robot.model, data, robot.middle_pose)).copy()
         if action.inertia is not None:
             inertia += np.diag(action.inertia)
         stiffness = inertia * BANDWIDTH**2
-        if self.stiffness is not None:
-            stiffness = _per_joint(self.stiffness, robot, 'stiffness')
-        damping = 2.0 * np.sqrt(inertia * stiffness)
-        if self.damping is not None:
-            damping = _per_joint(self.damping, robot, 'damping')
         object.__setattr__(self, '_robot', robot)
         object.__setattr__(self, '_data', data)
-        object.__setattr__(self, '_gains', (stiffness, damping))
+        object.__setattr__(self, 'stiffness', read_only(stiffness))
+        object.__setattr__(self, 'damping', read_only(2.0 * np.sqrt(inertia * stiffness)))
 
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Return spring, damper and gravity, shape (n,)."""
-        stiffness, damping = self._gains
         tau = pin.computeGeneralizedGravity(self._robot.model, self._data, q)
-        tau += stiffness * (desired[0] - q)
-        tau += damping * (desired[1] - dq)
+        tau += self.stiffness * (desired[0] - q)
+        tau += self.damping * (desired[1] - dq)
         return np.asarray(tau)
-
-
-def _per_joint(value: npt.ArrayLike, robot: Robot, what: str) -> FloatArray:
-    array = np.asarray(value, dtype=float)
-    n = robot.n_joints
-    if array.shape not in ((), (n,)) or not np.all(np.isfinite(array)) or np.any(array < 0.0):
-        raise ModelError(
-            f'{robot.name}: {what} has to be one number, or one for each of {n} joints, finite '
-            f'and not negative; got {array.tolist()}'
-        )
-    return read_only(np.broadcast_to(array, (n,)))

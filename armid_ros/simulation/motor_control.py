@@ -11,7 +11,7 @@ from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.simulation.controller import BANDWIDTH, Controller, Desired, Targets
-from armid_ros.simulation.plant import middle_position, Plant
+from armid_ros.simulation.plant import Plant
 import numpy as np
 import pinocchio as pin
 
@@ -91,7 +91,7 @@ class MotorControl(Controller):
         if springs is None:
             raise ModelError(f'{robot.name}: its joints are rigid; use ComputedTorque')
         joints, e = springs.joints, len(springs.joints)
-        link = np.diag(pin.crba(robot.model, robot.model.createData(), middle_position(robot)))
+        link = np.diag(pin.crba(robot.model, robot.model.createData(), robot.middle_pose))
         rotor = np.array(np.diag(springs.rotors)[e:])
         rotor[joints] = np.diag(springs.rotors)[:e]
         inertia = link + rotor

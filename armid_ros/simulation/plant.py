@@ -162,7 +162,7 @@ class Plant:
         inertia = zero if action.inertia is None else action.inertia
         friction, constant = split_constant(action.dry_friction, n)
         data = robot.model.createData()
-        mass = np.array(pin.crba(robot.model, data, middle_position(robot)))
+        mass = np.array(pin.crba(robot.model, data, robot.middle_pose))
         moved = np.abs(np.diag(mass + inertia))
         still = int(np.argmin(moved))
         if moved[still] < 1e-15:
@@ -303,13 +303,6 @@ def limit_slack(robot: Robot) -> FloatArray:
     """Return how far beyond a position limit is rounding [rad or m], shape (n,)."""
     span = robot.upper - robot.lower
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
-
-
-def middle_position(robot: Robot) -> FloatArray:
-    """Return the middle of the range of every joint, 0 where there is none, shape (n,)."""
-    limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    lower, upper = (np.where(limited, end, 0.0) for end in (robot.lower, robot.upper))
-    return np.asarray((lower + upper) / 2)
 
 
 def _both(motors: TorqueLaw | None, links: TorqueLaw | None) -> TorqueLaw | None:

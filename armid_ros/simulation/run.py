@@ -12,9 +12,8 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import ElasticRun, FloatArray, Motion, read_only
 from armid_ros.simulation.controller import Controller
 from armid_ros.simulation.plant import Plant
-from armid_ros.simulation.readings import readings
 from armid_ros.simulation.reference import Reference
-from armid_ros.simulation.sensors import Sensors
+from armid_ros.simulation.sensors import readings, Sensors
 from armid_ros.simulation.simulated_arm import SimulatedArm
 import numpy as np
 

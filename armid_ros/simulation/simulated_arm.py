@@ -15,10 +15,9 @@ from armid_ros.simulation.closed_loop import command, run, Trace
 from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
 from armid_ros.simulation.course import Course
 from armid_ros.simulation.motor_control import MotorControl
-from armid_ros.simulation.plant import middle_position, Plant, State
-from armid_ros.simulation.readings import RecentPast
+from armid_ros.simulation.plant import Plant, State
 from armid_ros.simulation.reference import Reference
-from armid_ros.simulation.sensors import Sensors
+from armid_ros.simulation.sensors import RecentPast, Sensors
 import numpy as np
 import numpy.typing as npt
 
@@ -126,7 +125,7 @@ class SimulatedArm:
         self.sensors = sensors or Sensors()
         self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
         self.rng = rng
-        start = middle_position(self.plant.robot) if start is None else start
+        start = self.plant.robot.middle_pose if start is None else start
         self._home = self.plant.state(start).q
         self._course = Course(self.plant.robot, self.plant.dt)
         self._state: State

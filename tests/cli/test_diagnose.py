@@ -17,6 +17,7 @@ from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
 
+from tests.clearance import path_clearance
 from tests.diagnosis.conftest import Bench, URDF
 
 from .conftest import armid
@@ -79,7 +80,7 @@ def test_a_provisional_name_comes_with_a_run_that_tells_it_from_the_next_best(
     robot = load_robot(str(urdf))
     motion = excitation.motion(100.0)
     assert not check_limits(Limits.of(robot, speed=1.0, torque_fraction=1.0), motion)
-    assert collision_model(robot).path_clearance(motion.q).min() > 0.0
+    assert path_clearance(collision_model(robot), motion.q).min() > 0.0
     assert run['duration'] == pytest.approx(excitation.duration)
     names = {effect['name'] for effect in document['effects']}
     assert {pair['name'] for pair in run['separates']} <= names

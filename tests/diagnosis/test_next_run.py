@@ -29,6 +29,7 @@ from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
 import pytest
 
+from tests.clearance import path_clearance
 from tests.diagnosis.conftest import LINK, POSITION_NOISE, TORQUE_NOISE
 from tests.diagnosis.test_floor import cut
 
@@ -112,7 +113,7 @@ def test_the_arm_can_make_the_run_without_hitting_its_own_pedestal(bench, chosen
     run = chosen.excitation
     assert not trajectory_faults(bench.arm, limits, run.trajectory, clearance, CLEARANCE)
     assert not excitation_faults(bench.arm, limits, run)
-    assert bodies.path_clearance(run.motion(100.0).q).min() >= CLEARANCE
+    assert path_clearance(bodies, run.motion(100.0).q).min() >= CLEARANCE
     assert run.n_periods == 2
 
 
@@ -123,10 +124,10 @@ def test_every_motion_to_choose_from_keeps_clear_where_careless_ones_do_not(benc
         random_feasible(bench.arm, Limits.of(bench.robot, speed=0.4), 10.0, 5, rng)
         for _ in range(12)
     ]
-    assert min(bodies.path_clearance(t.one_period(200).q).min() for t in careless) < 0.0
+    assert min(path_clearance(bodies, t.one_period(200).q).min() for t in careless) < 0.0
     for template in templates(('elbow',)):
         motion = template.draw(bench.arm, ClearanceModel.of(bodies), rng).one_period(400)
-        assert bodies.path_clearance(motion.q).min() >= CLEARANCE
+        assert path_clearance(bodies, motion.q).min() >= CLEARANCE
         still = np.ptp(motion.q, axis=0) == 0.0
         assert list(still) == ([True, False] if template.joints else [False, False])
 

@@ -2,13 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small arms and problems for the excitation tests."""
 
-from importlib.metadata import files
-from pathlib import Path
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import DesignSettings
-from armid_ros.robots import collision_model, load_robot, robot_from_urdf
+from armid_ros.robots import collision_model, robot_from_urdf
 import pytest
 
 _LINK = (
@@ -90,12 +87,6 @@ def two_link_arm(two_link, with_effects):
 
 
 @pytest.fixture(scope='session')
-def humanoid():
-    """Load the shipped arm."""
-    return load_robot('humanoid_arm')
-
-
-@pytest.fixture(scope='session')
 def humanoid_collision(humanoid):
     """Return its collision bodies."""
     return collision_model(humanoid)
@@ -113,14 +104,3 @@ def quick():
         iterations=30,
         processes=1,
     )
-
-
-@pytest.fixture(scope='session')
-def example_robot():
-    """Return a function that finds a URDF of example-robot-data by its name."""
-    paths = [entry for entry in files('example-robot-data') if entry.suffix == '.urdf']
-
-    def find(name):
-        return next(Path(str(p.locate())) for p in paths if p.name == name)
-
-    return find

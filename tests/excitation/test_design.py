@@ -27,8 +27,7 @@ def test_a_run_of_more_than_a_day_is_refused_before_it_is_searched_for():
 
 
 def coefficients(result):
-    trajectory = result.excitation.trajectory
-    return np.column_stack([trajectory.q0, trajectory.a, trajectory.b])
+    return result.excitation.trajectory.coefficients
 
 
 @pytest.fixture(scope='module')
@@ -91,7 +90,7 @@ def test_predicted_deviations_are_the_scatter_of_repeats(humanoid_design):
     run = result.excitation.motion(20.0)
     slices = result.excitation.period_slices(20.0)
     motion = run.select(slice(slices[0].start, slices[-1].stop))
-    w = problem.weighted_regressor(motion)
+    w = problem.columns(motion)[:, problem.base.independent]
     inverse = np.linalg.pinv(w)
     scatter = (inverse @ rng.normal(size=(len(w), 400))).std(axis=1)
     np.testing.assert_allclose(predicted, scatter, rtol=0.2)

@@ -31,7 +31,7 @@ def coefficients(problem, rng):
     trajectory = random_feasible(
         problem.arm, problem.limits, settings.period, settings.harmonics, rng
     )
-    return np.column_stack([trajectory.q0, trajectory.a, trajectory.b])
+    return trajectory.coefficients
 
 
 @ROBOTS

@@ -13,6 +13,8 @@ from armid_ros.robots import collision_model
 import numpy as np
 import pytest
 
+from tests.clearance import path_clearance
+
 
 def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision, with_effects):
     arm, limits = with_effects(humanoid), Limits.of(humanoid)
@@ -23,15 +25,7 @@ def test_random_trajectories_keep_every_limit(humanoid, humanoid_collision, with
         )
         motion = trajectory.one_period(3000)
         assert not check_limits(limits, motion, arm.torque(motion))
-        assert humanoid_collision.path_clearance(motion.q).min() >= 0.01
-
-
-def test_same_seed_gives_the_same_trajectory(two_link_arm):
-    limits = Limits.of(two_link_arm.robot)
-    first, second = (
-        random_feasible(two_link_arm, limits, 6.0, 3, np.random.default_rng(5)) for _ in range(2)
-    )
-    np.testing.assert_array_equal(first.a, second.a)
+        assert path_clearance(humanoid_collision, motion.q).min() >= 0.01
 
 
 def test_torque_limit_below_gravity_is_named(two_link_arm):
@@ -83,5 +77,5 @@ def test_trajectory_in_a_narrow_gap_touches_no_wall(two_link_arm):
     limits, rng = Limits.of(robot), np.random.default_rng(0)
     trajectory = random_feasible(two_link_arm, limits, 6.0, 3, rng, collision=between, margin=0.01)
     q = trajectory.one_period(3000).q
-    assert between.path_clearance(q).min() >= 0.01
+    assert path_clearance(between, q).min() >= 0.01
     assert np.ptp(q, axis=0).min() > 0.0

@@ -20,7 +20,7 @@ from armid_ros.excitation import (
     TransferPlanner,
     with_obstacles,
 )
-from armid_ros.excitation.geometry.unwinding import unwound
+from armid_ros.excitation.run import unwound
 from armid_ros.robots import collision_model, robot_from_urdf
 import numpy as np
 import pinocchio as pin

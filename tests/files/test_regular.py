@@ -11,8 +11,7 @@ from armid_ros.files import read_text
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.recording import Bag, read_recording, recover
-from armid_ros.robots import collision_model, load_robot
-from armid_ros.robots.two_link import two_link_set
+from armid_ros.robots import load_robot
 import pytest
 
 READERS = {
@@ -24,8 +23,6 @@ READERS = {
     'robot.urdf': load_robot,
     'robot.urdf.xacro': load_robot,
     'gait.csv': read_gait,
-    'parameters.yaml': lambda path: two_link_set('after', path),
-    'robot.srdf': lambda path: collision_model(load_robot('humanoid_arm'), srdf=path),
     'bag.mcap': Bag,
     'bag.db3': Bag,
     'bag.mcap.zstd': Bag,

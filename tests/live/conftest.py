@@ -9,7 +9,6 @@ from armid_ros.effects import parse_effect
 from armid_ros.recording import Recording
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference, Sensors, SimulatedArm
-from armid_ros.simulation.plant import middle_position
 import numpy as np
 import pytest
 
@@ -39,7 +38,7 @@ def moving(robot, duration, rng):
     dq = np.gradient(q, 0.01, axis=0)
     dq[[0, -1]] = 0.0
     ddq = np.gradient(dq, 0.01, axis=0)
-    return Reference(robot.joints, t[:, 0], middle_position(robot) + q, dq, ddq)
+    return Reference(robot.joints, t[:, 0], robot.middle_pose + q, dq, ddq)
 
 
 def recorded(before, after, then=None):

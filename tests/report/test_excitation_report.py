@@ -24,6 +24,8 @@ from armid_ros.robots import collision_model, load_robot, robot_from_urdf
 import numpy as np
 import pytest
 
+from tests.clearance import path_clearance
+
 TABLE = Obstacle('table <b>', 'box', (1.0, 1.0, 0.1), (0.0, 0.0, -1.5))
 BARE = (
     '<robot name="bare"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 0.4"/>'
@@ -87,7 +89,7 @@ def test_clearance_is_that_of_links_and_that_of_the_environment(case, plan, html
     own, around = (np.array(series['y']) / 100.0 for series in chart['series'])
     robot = case.truth.robot
     q = plan.run.at(np.linspace(0.0, plan.run.duration, 600)).q
-    np.testing.assert_allclose(own, collision_model(robot).path_clearance(q), atol=1e-4)
+    np.testing.assert_allclose(own, path_clearance(collision_model(robot), q), atol=1e-4)
     assert around.min() > 0.0
 
 

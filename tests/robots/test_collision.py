@@ -13,6 +13,8 @@ from armid_ros.robots.meshes import convex_bodies
 import numpy as np
 import pytest
 
+from tests.clearance import path_clearance
+
 SPHERE = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
 TABLE = '<collision><origin xyz="0 0 -1"/><geometry><box size="4 4 1.6"/></geometry></collision>'
 BALL = '<sphere radius="0.05"/>'
@@ -73,7 +75,7 @@ def dumbbell(tmp_path: Path) -> Path:
 
 def distance(model: CollisionModel, *q: float) -> float:
     """Return the smallest clearance in one pose [m]."""
-    return float(model.path_clearance([q])[0])
+    return float(path_clearance(model, np.array([q]))[0])
 
 
 class TestDistances:
@@ -88,25 +90,12 @@ class TestDistances:
         model = collision_model(robot_from_urdf(arm()))
         assert distance(model, 0.3, 0.0) == pytest.approx(0.2 - np.sin(0.3) - 0.05, abs=1e-4)
 
-    def test_a_path_has_the_clearance_of_each_pose(self) -> None:
-        model = collision_model(robot_from_urdf(arm()))
-        path = np.linspace((-0.5, 0.0), (0.1, 0.2), 20)
-        clearances = model.path_clearance(path)
-        assert clearances.shape == (20,)
-        assert int(np.argmin(clearances)) == 19
-        assert clearances[19] == distance(model, *path[19])
-
     def test_progress_is_said_link_by_link(self) -> None:
         shares: list[float] = []
         collision_model(load_robot('humanoid_arm'), progress=shares.append)
         assert shares == sorted(shares)
         assert shares[0] == 0.0
         assert len(shares) > 6
-
-    def test_poses_must_fit_the_robot(self) -> None:
-        model = collision_model(robot_from_urdf(arm()))
-        with pytest.raises(RobotError, match='do not fit 2 driven joints'):
-            distance(model, 0.0, 0.0, 0.0)
 
     def test_a_robot_without_collision_bodies_is_always_free(self) -> None:
         bare = arm(base='').replace(f'<collision>{at_tip(BALL)}</collision>', '')
@@ -136,10 +125,6 @@ class TestPairs:
             '<robot name="swing"><disable_collisions link1="lower" link2="base"/></robot>'
         )
         assert collision_model(load_robot(path)).pairs == ()
-
-    def test_an_srdf_that_is_not_there(self, tmp_path: Path) -> None:
-        with pytest.raises(RobotError, match=r'no\.srdf'):
-            collision_model(robot_from_urdf(arm()), srdf=tmp_path / 'no.srdf')
 
     def test_a_pair_that_one_joint_moves_counts_only_if_it_can_touch(self) -> None:
         post = '<collision><origin xyz="-0.5 0 0"/><geometry>{}</geometry></collision>'
@@ -236,7 +221,7 @@ class TestHumanoidArm:
     def test_most_of_its_range_is_free(self) -> None:
         robot = load_robot('humanoid_arm')
         poses = np.random.default_rng(2).uniform(robot.lower, robot.upper, (500, 6))
-        free = np.mean(collision_model(robot).path_clearance(poses) > 0.0)
+        free = np.mean(path_clearance(collision_model(robot), poses) > 0.0)
         assert 0.9 < free < 1.0
 
 

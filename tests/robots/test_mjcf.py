@@ -12,6 +12,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.clearance import path_clearance
+
 from .mjcf_arms import ARMS
 
 G = (0.0, 0.0, -9.81)
@@ -103,7 +105,7 @@ def test_shapes_are_collision_bodies_of_their_size(written):
         'size="0.1 0.3"/></body><body name="b" pos="0 0 2"><joint axis="0 0 1"/><geom type="box" '
         'size="1 1 0.5"/></body></worldbody></mujoco>'
     )
-    clearance = collision_model(load_robot(written(two))).path_clearance(np.zeros((1, 2)))
+    clearance = path_clearance(collision_model(load_robot(written(two))), np.zeros((1, 2)))
     assert clearance == pytest.approx(1.1)
 
 

@@ -27,6 +27,7 @@ from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
+from tests.clearance import path_clearance
 from tests.ros.controller import Controller, SECOND
 
 ROBOT = load_robot('humanoid_arm')
@@ -148,7 +149,7 @@ class Bed:
             speed = np.abs(self.arm.state(self.arm.now).dq).max()
             if speed > 1e-3:
                 self.violations.append(f'not at rest after the end: {speed}')
-        nearest = SCENE.bodies.path_clearance(np.array(self.set_points)).min()
+        nearest = path_clearance(SCENE.bodies, np.array(self.set_points)).min()
         if nearest <= 0.0:
             self.violations.append(f'bodies or the floor were met: {nearest:.4f} m')
 

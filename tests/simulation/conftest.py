@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import files
-from pathlib import Path
 
 from armid_ros.robots import load_robot, Robot
 import pytest
@@ -80,20 +78,3 @@ def pendulum() -> Callable[..., Robot]:
         return load_robot(text + '</robot>')
 
     return make
-
-
-@pytest.fixture(scope='session')
-def humanoid() -> Robot:
-    """Return the shipped arm on Earth."""
-    return load_robot('humanoid_arm')
-
-
-@pytest.fixture(scope='session')
-def example_robot() -> Callable[[str], Path]:
-    """Return a function that finds a URDF of example-robot-data by its file name."""
-    paths = [entry for entry in files('example-robot-data') or [] if entry.suffix == '.urdf']
-
-    def find(name: str) -> Path:
-        return next(Path(str(p.locate())) for p in paths if p.name == name)
-
-    return find

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.motion import Motion
 from armid_ros.simulation import Reference
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -24,21 +23,14 @@ def curves(degree: int) -> list[Polynomial]:
     return [Polynomial(rng.normal(size=degree + 1)) for _ in range(2)]
 
 
-def test_a_quintic_passes_through_positions_velocities_and_accelerations() -> None:
-    p = curves(5)
-    dp, ddp = [c.deriv() for c in p], [c.deriv(2) for c in p]
-    motion = Reference(('a', 'b'), T, along(p, T), along(dp, T), along(ddp, T)).sample(FINE)
-    np.testing.assert_allclose(motion.q, along(p, FINE), atol=1e-12)
-    np.testing.assert_allclose(motion.dq, along(dp, FINE), atol=1e-11)
-    np.testing.assert_allclose(motion.ddq, along(ddp, FINE), atol=1e-10)
-
-
-def test_a_cubic_passes_through_positions_and_velocities() -> None:
-    p = curves(3)
-    dp = [c.deriv() for c in p]
-    motion = Reference(('a', 'b'), T, along(p, T), along(dp, T)).sample(FINE)
-    np.testing.assert_allclose(motion.q, along(p, FINE), atol=1e-12)
-    np.testing.assert_allclose(motion.dq, along(dp, FINE), atol=1e-11)
+@pytest.mark.parametrize('degree', [3, 5])
+def test_a_cubic_has_the_velocities_of_waypoints_and_a_quintic_their_accelerations(degree) -> None:
+    p = curves(degree)
+    given = [[c.deriv(order) for c in p] for order in range(3)]
+    waypoints = [along(curve, T) for curve in given[: (degree + 1) // 2]]
+    motion = Reference(('a', 'b'), T, *waypoints).sample(FINE)
+    for values, curve in zip((motion.q, motion.dq, motion.ddq), given, strict=True):
+        np.testing.assert_allclose(values, along(curve, FINE), atol=1e-10)
 
 
 def test_positions_alone_are_joined_by_lines() -> None:
@@ -63,16 +55,6 @@ def test_one_point_is_a_pose_to_hold() -> None:
     motion = Reference(('a', 'b'), np.zeros(1), np.array([[0.1, 0.2]])).sample(FINE)
     np.testing.assert_array_equal(motion.q, np.tile([0.1, 0.2], (len(FINE), 1)))
     np.testing.assert_array_equal(motion.dq, 0.0)
-
-
-def test_the_reference_of_a_motion_passes_through_its_samples() -> None:
-    rng = np.random.default_rng(0)
-    q, dq, ddq = rng.normal(size=(3, 5, 2))
-    motion = Motion(('a', 'b'), 7.0 + np.arange(5.0), q, dq, ddq)
-    again = Reference.of(motion).sample(np.arange(5.0))
-    np.testing.assert_allclose(again.q, q, atol=1e-12)
-    np.testing.assert_allclose(again.dq, dq, atol=1e-12)
-    np.testing.assert_allclose(again.ddq, ddq, atol=1e-11)
 
 
 def test_joints_are_matched_by_name(humanoid) -> None:

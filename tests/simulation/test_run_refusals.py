@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cannot be simulated is refused with its name, and arms of one joint are arms."""
 
+import re
+
 from armid_ros.arm import ArmModel
 from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
@@ -65,6 +67,13 @@ def test_what_makes_an_inertia_matrix_impossible_is_named(link):
         simulate(arm, sine(robot.joints), rng=np.random.default_rng(0))
 
 
+def test_a_joint_that_moves_nothing_cannot_be_simulated():
+    text = ONE_JOINT.format(kind='revolute', mass=1)
+    text = re.sub('<inertial>.*</inertial>', '', text, flags=re.DOTALL)
+    with pytest.raises(ModelError, match=r"hinge'.* 'arm'"):
+        Plant(ArmModel(robot_from_urdf(text)))
+
+
 class Pushing(Controller):
     """Always more of what there is."""
 
@@ -78,7 +87,6 @@ class Pushing(Controller):
 
 
 def test_an_arm_that_flies_away_does_not_follow_and_warns_of_nothing():
-    robot = one_joint('continuous')
     robot = robot_from_urdf(
         ONE_JOINT.format(kind='continuous', mass=1.0).replace('effort="20"', 'effort="1e300"'),
         source='one.urdf',

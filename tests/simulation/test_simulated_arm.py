@@ -103,13 +103,6 @@ def test_it_goes_to_a_first_point_that_is_later(arm) -> None:
     np.testing.assert_allclose(arm.state.q, HOME + 0.3, atol=5e-3)
 
 
-def test_positions_alone_are_followed_too(arm) -> None:
-    points = np.stack([HOME, HOME + 0.2])
-    arm.set_trajectory(Reference(arm.joints, np.array([0.0, 1.0]), points))
-    arm.advance(1500)
-    np.testing.assert_allclose(arm.state.q, HOME + 0.2, atol=5e-3)
-
-
 def test_a_new_trajectory_takes_the_place_of_the_old_one(arm) -> None:
     arm.set_trajectory(there_and_back(arm.joints, first=0.1))
     arm.advance(700)

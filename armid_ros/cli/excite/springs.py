@@ -11,7 +11,7 @@ from armid_ros.api.excitation import BAG, SCHEMA
 from armid_ros.cli import options
 from armid_ros.cli.terminal import say
 from armid_ros.errors import RecordingError
-from armid_ros.excitation import CollisionScene, Limits, not_checked
+from armid_ros.excitation import ClearanceModel, CollisionScene, Limits, not_checked
 from armid_ros.files.own import is_plan
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
@@ -57,11 +57,11 @@ def write_course(
     robot = space.collision.robot
     require_free(out)
     staged = options.stage(out, SCHEMA, robot.name)
-    bodies = space.bodies
+    bodies, margin = ClearanceModel.of(space.bodies), space.clearance
 
     def clear(q: FloatArray) -> bool:
         inside = np.all((q >= robot.lower) & (q <= robot.upper))
-        return bool(inside) and float(bodies.path_clearance(q).min()) >= space.clearance
+        return bool(inside) and float(bodies.smallest(q, margin).min()) >= margin
 
     rng = np.random.default_rng(seed)
     course = COURSES[kind](robot, duration, share, rng, clear)

@@ -122,40 +122,30 @@ def floor_obstacles(
     margin : float
         Clearance to keep [m].
 
-    """
-    if floor.height is None:
-        return ()
-    position = floor.height * floor.up
-    x, y, z = floor.up
-    rpy = (-math.asin(float(np.clip(y, -1.0, 1.0))), math.atan2(x, z), 0.0)
-    touching = touching_links(collision, floor, margin)
-    return (Obstacle(FLOOR, 'plane', (), tuple(position), rpy, ignore=touching),)
-
-
-def touching_links(collision: CollisionModel, floor: Floor, margin: float) -> tuple[str, ...]:
-    """
-    Return the moving links that no pose takes further from the floor than a margin [m].
-
     Raises
     ------
     TrajectoryError
-        If that are all links: the floor is above the arm.
+        If no pose takes any link above the floor.
 
     """
-    assert floor.height is not None
+    if floor.height is None:
+        return ()
     robot = collision.robot
     size = (_POSES, robot.n_joints)
     q = np.random.default_rng(_SEED).uniform(*robot.position_range(), size)
     highest: dict[str, FloatArray] = {}
     for link, lowest, _ in link_heights(collision, floor.up, q):
         highest[link] = np.minimum(highest.get(link, np.inf), lowest)
-    touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
     if all(lowest.max() < floor.height for lowest in highest.values()):
         raise TrajectoryError(
             f'{robot.name}: no pose takes any link above the floor, {floor}; --floor Z is its '
             'height above the origin of the base [m]'
         )
-    return touching
+    touching = tuple(k for k, lowest in highest.items() if lowest.max() < floor.height + margin)
+    x, y, z = floor.up
+    rpy = (-math.asin(float(np.clip(y, -1.0, 1.0))), math.atan2(x, z), 0.0)
+    position = tuple(floor.height * floor.up)
+    return (Obstacle(FLOOR, 'plane', (), position, rpy, ignore=touching),)
 
 
 def _height(text: str) -> float | None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
@@ -30,10 +31,6 @@ _CUTS = 60
 Held = Callable[[FloatArray], bool]
 #: Whether the straight line between two poses, shape (n,), may be taken.
 _Free = Callable[[FloatArray, FloatArray], bool]
-
-
-class PathError(Exception):
-    """No path was found; says what is in the straight way."""
 
 
 def find_path(
@@ -69,8 +66,8 @@ def find_path(
 
     Raises
     ------
-    PathError
-        If none was found.
+    TrajectoryError
+        If none was found; says what is in the straight way.
 
     """
     start, goal = ends
@@ -93,12 +90,13 @@ def find_path(
             return np.array(_shortened(path, free, rng))
         near, far = far, near
     blocked = clear_line(clearance, margin, start, goal)
-    raise PathError(
-        'some pose on the straight one is too heavy to hold'
-        if blocked is None
-        else f'on the straight one {blocked.first} and {blocked.second} come within '
-        f'{blocked.distance:.4f} m'
-    )
+    reason = 'some pose on the straight one is too heavy to hold'
+    if blocked is not None:
+        reason = (
+            f'on the straight one {blocked.first} and {blocked.second} come within '
+            f'{blocked.distance:.4f} m'
+        )
+    raise TrajectoryError(f'no way to the trajectory was found: {reason}')
 
 
 def clear_line(

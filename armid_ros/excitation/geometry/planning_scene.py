@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What MoveIt knows to stand around an arm, as obstacles.
+What stands around an arm, from files: obstacles, or what MoveIt knows.
 
-Two forms are read: what `ros2 topic echo --once --full-length` prints of a planning scene
+Two forms of MoveIt are read: what `ros2 topic echo --once --full-length` prints of a scene
 (moveit_msgs/PlanningScene, PlanningSceneWorld or CollisionObject), and the text file (.scene) that
 RViz exports. Cones become the cylinder around them and meshes the box around them in the frame of
 their object, which takes more room, never less. What is attached to the arm is not read.
@@ -14,10 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+import re
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation.geometry.environment import Obstacle
+from armid_ros.excitation.geometry.environment import Obstacle, parse_obstacles
+from armid_ros.files import load_yaml, read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -40,14 +43,44 @@ class _Shape:
     placement: pin.SE3
 
 
-def is_scene(document: Any) -> bool:
+def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obstacle, ...]:
+    """
+    Read obstacles from a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A YAML list of mappings with the attributes of `Obstacle`; what `ros2 topic echo --once
+        --full-length /monitored_planning_scene` prints, the world or a collision object of it, in
+        YAML or JSON; or a .scene file of MoveIt.
+    robot : Robot, optional
+        Whose frames a planning scene may name; without it all is taken to be in the base frame.
+
+    Raises
+    ------
+    TrajectoryError
+        If the file cannot be read or an entry is not an obstacle.
+
+    """
+    path = Path(path)
+    text = read_text(path, TrajectoryError)
+    with reading(path, TrajectoryError):
+        if path.suffix == '.scene':
+            return _read_scene_file(text)
+        document = load_yaml(re.split(r'^---$', text.removeprefix('---\n'), flags=re.M)[0])
+        if _is_scene(document):
+            return _scene_obstacles(document, robot)
+        return parse_obstacles(path, document)
+
+
+def _is_scene(document: Any) -> bool:
     """Return whether a YAML document is a planning scene, its world or a collision object."""
     return isinstance(document, dict) and bool(
         {'world', 'collision_objects', 'primitives'} & document.keys()
     )
 
 
-def scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[Obstacle, ...]:
+def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[Obstacle, ...]:
     """
     Return the collision objects of a planning scene.
 
@@ -166,7 +199,7 @@ def _named(name: str, shapes: Sequence[_Shape]) -> Iterator[Obstacle]:
         )
 
 
-def read_scene_file(text: str) -> tuple[Obstacle, ...]:
+def _read_scene_file(text: str) -> tuple[Obstacle, ...]:
     """
     Return the obstacles of a .scene file, as RViz exports and MoveIt imports them.
 

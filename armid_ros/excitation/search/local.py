@@ -14,17 +14,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
+from typing import Generic, TypeVar
 
 from armid_ros.excitation.feasibility import Faults, trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
+from armid_ros.excitation.limits import Limits
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import position_range, random_feasible
 from armid_ros.excitation.search.constraints import Constraints
 from armid_ros.excitation.search.objective import Objective
-from armid_ros.excitation.search.solver import coefficient_range, coefficient_scale, solve
 from armid_ros.motion import FloatArray
 import numpy as np
+import scipy.optimize
 
 #: Sharpness of the soft maximum, coarse for as long as that gains anything, then fine.
 _SHARPNESS = (60.0, 300.0)
@@ -50,6 +52,11 @@ _CANDIDATE_JOINTS = 10
 
 #: Factor by which a trajectory that is not quite feasible is made smaller, and how often.
 _SHRINK, _SHRINKS = 0.99, 12
+
+#: Stands in for an infinite cost, which a line search cannot work with.
+_NO_COST = 1e3
+
+_Result = TypeVar('_Result')
 
 
 @dataclass(frozen=True)
@@ -189,10 +196,10 @@ def _improve(
     """Run the solver in rounds, within a box about the last trajectory that was feasible."""
     problem = objective.problem
     settings = problem.settings
-    scale = coefficient_scale(problem.limits, settings.period, settings.harmonics)
-    lower, upper = coefficient_range(problem.limits, scale)
+    scale = _coefficient_scale(problem.limits, settings.period, settings.harmonics)
+    lower, upper = _coefficient_range(problem.limits, scale)
     watched = _watched(problem, clearance, rng)
-    x = np.column_stack([start.q0, start.a, start.b]) / scale
+    x = start.coefficients / scale
     left, times, box, sharpness = settings.iterations, np.empty(0), _BOX, _SHARPNESS[0]
     while left > 0:
         constraints = Constraints.of(
@@ -207,7 +214,7 @@ def _improve(
         def step(count: int, before: float = best.done) -> None:
             best.tell(before + count / settings.iterations)
 
-        z, used = solve(
+        z, used = _solve(
             objective,
             constraints,
             scale,
@@ -217,7 +224,7 @@ def _improve(
             step,
         )
         left -= used
-        trajectory = _trajectory(problem, z * scale)
+        trajectory = FourierTrajectory.of(problem.limits.joints, settings.period, z * scale)
         more = _faulty_times(problem, clearance, trajectory, settings.clearance)
         times = np.concatenate([times, more])
         feasible = _made_feasible(problem, clearance, trajectory)
@@ -225,7 +232,7 @@ def _improve(
             box /= 3.0
             continue
         gain = best.offer(feasible)
-        x = np.column_stack([feasible.q0, feasible.a, feasible.b]) / scale
+        x = feasible.coefficients / scale
         box = min(2.0 * box, _BOX)
         if gain < _SETTLED:
             if sharpness == _SHARPNESS[-1]:
@@ -243,13 +250,6 @@ def _watched(
     lower, upper = position_range(problem.limits)
     poses = rng.uniform(lower, upper, (_POSES, len(lower)))
     return clearance.watched(poses, problem.settings.clearance + _WATCHED)
-
-
-def _trajectory(problem: DesignProblem, x: FloatArray) -> FourierTrajectory:
-    h = problem.settings.harmonics
-    return FourierTrajectory(
-        problem.limits.joints, problem.settings.period, x[:, 0], x[:, 1 : 1 + h], x[:, 1 + h :]
-    )
 
 
 def _faulty_times(
@@ -291,3 +291,102 @@ def _smaller(trajectory: FourierTrajectory, faults: Faults) -> FourierTrajectory
     everywhere = len(own) < len(faults.violations) + len(faults.approaches)
     factor = [_SHRINK if everywhere or j in own else 1.0 for j in trajectory.joints]
     return trajectory.scaled(np.array(factor))
+
+
+def _solve(
+    objective: Objective,
+    constraints: Constraints,
+    scale: FloatArray,
+    x: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+    iterations: int,
+    step: Callable[[int], None],
+) -> tuple[FloatArray, int]:
+    """
+    Run SLSQP.
+
+    Parameters
+    ----------
+    objective, constraints : Objective, Constraints
+        What to make small, and what to keep.
+    scale, x : ndarray, shape (n, 1 + 2 H)
+        Unit of every coefficient, and where to begin in these units.
+    bounds : tuple of ndarray
+        Least and largest values, in these units.
+    iterations : int
+        How many at most.
+    step : callable
+        Told the number of iterations after each.
+
+    Returns
+    -------
+    z : ndarray, shape (n, 1 + 2 H)
+        Where it ended, in these units.
+    count : int
+        Iterations it took, one at least.
+
+    """
+    count = 0
+    cost = _Last(lambda z: objective.value(z.reshape(scale.shape) * scale))
+    limits = _Last(lambda z: constraints.value(z.reshape(scale.shape) * scale))
+
+    def counted(z: FloatArray) -> None:
+        nonlocal count
+        count += 1
+        step(count)
+
+    result = scipy.optimize.minimize(
+        lambda z: cost(z)[0] if np.isfinite(cost(z)[0]) else _NO_COST,
+        x.ravel(),
+        jac=lambda z: (cost(z)[1]() * scale).ravel(),
+        method='SLSQP',
+        bounds=scipy.optimize.Bounds(bounds[0].ravel(), bounds[1].ravel()),
+        constraints=[
+            {
+                'type': 'ineq',
+                'fun': lambda z: -limits(z)[0],
+                'jac': lambda z: -(limits(z)[1]() * scale).reshape(-1, scale.size),
+            }
+        ],
+        options={'maxiter': iterations, 'ftol': 1e-5},
+        callback=counted,
+    )
+    return np.asarray(result.x).reshape(scale.shape), max(count, 1)
+
+
+def _coefficient_scale(limits: Limits, period: float, harmonics: int) -> FloatArray:
+    """Size of every coefficient that alone reaches a limit, shape (n, 1 + 2 H)."""
+    lower, upper = position_range(limits)
+    half = 0.5 * (upper - lower)[:, np.newaxis]
+    k = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
+    largest = np.minimum(limits.velocity[:, np.newaxis], limits.acceleration[:, np.newaxis] / k)
+    amplitude = np.minimum(half * k, largest) / np.sqrt(harmonics)
+    return np.column_stack([half, amplitude, amplitude])
+
+
+def _coefficient_range(limits: Limits, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Bound the scaled coefficients by what no feasible trajectory can exceed.
+
+    The amplitude of a harmonic is at most 4 / pi times the largest value of the curve.
+
+    """
+    harmonics = (scale.shape[1] - 1) // 2
+    upper = np.full_like(scale, 4.0 / np.pi * np.sqrt(harmonics))
+    lower = -upper
+    low, high = position_range(limits)
+    lower[:, 0], upper[:, 0] = low / scale[:, 0], high / scale[:, 0]
+    return lower, upper
+
+
+class _Last(Generic[_Result]):
+    """A function that remembers the last point and what came out there."""
+
+    def __init__(self, function: Callable[[FloatArray], _Result]) -> None:
+        self._function = function
+        self._known: tuple[bytes, _Result] | None = None
+
+    def __call__(self, z: FloatArray) -> _Result:
+        if self._known is None or self._known[0] != z.tobytes():
+            self._known = z.tobytes(), self._function(z)
+        return self._known[1]

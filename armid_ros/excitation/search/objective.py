@@ -1,23 +1,23 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The cost of a trajectory and its gradient by the Fourier coefficients."""
+"""
+The cost of a trajectory and its gradient by the Fourier coefficients.
+
+Columns of effects that add to the rigid body are those of the body. All others are differentiated
+by finite differences, those that depend on nothing but the state of all samples at once.
+
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
+from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
 from armid_ros.effects.direction import BlurredMotion
-from armid_ros.excitation.fourier import fourier_basis
+from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.search.effect_gradient import (
-    columns_by_state,
-    EffectColumns,
-    Gradient,
-    rigid_columns,
-    STEP,
-)
 from armid_ros.excitation.search.rigid_gradient import RigidRegressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -25,8 +25,30 @@ import numpy as np
 #: The direction of motion is blurred below this share of a joint's velocity limit.
 _BLUR = 0.05
 
-#: Samples before and after the period for columns that depend on the motion around a sample.
-_MARGIN = 8
+#: Step of finite differences, of a state of size 1.
+_STEP = 1e-6
+
+#: Derivative of a number by the samples q, dq and ddq, each of shape (N, n).
+Gradient = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class EffectColumns:
+    """
+    Columns of one effect with their gradient.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (N, n, P)
+        Sensitivities.
+    pullback : callable
+        From derivatives of a number by the columns, shape (N, n, P), to those by the samples, or
+        to those by the Fourier coefficients, shape (n, 1 + 2 H).
+
+    """
+
+    columns: FloatArray
+    pullback: Callable[[FloatArray], Gradient | FloatArray]
 
 
 @dataclass(frozen=True)
@@ -44,8 +66,6 @@ class Objective:
         Sample times [s].
     basis : tuple of ndarray, each of shape (N, 1 + 2 H)
         q, dq and ddq per coefficient.
-    wide : tuple of ndarray
-        Times and basis with some samples more before and after the period.
     width : ndarray, shape (n,)
         Velocity below which the direction of motion is blurred [rad/s or m/s].
 
@@ -55,7 +75,6 @@ class Objective:
     prior: FloatArray | None
     t: FloatArray
     basis: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
-    wide: tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]] = field(repr=False)
     width: FloatArray
 
     @classmethod
@@ -65,9 +84,8 @@ class Objective:
         t: FloatArray = np.linspace(0.0, settings.period, settings.samples, endpoint=False)
         velocity = problem.limits.velocity
         width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
-        wide: FloatArray = np.arange(-_MARGIN, settings.samples + _MARGIN) * t[1]
-        bases = [fourier_basis(u, settings.period, settings.harmonics) for u in (t, wide)]
-        return cls(problem, prior, t, bases[0], (wide, bases[1]), width)
+        basis = fourier_basis(t, settings.period, settings.harmonics)
+        return cls(problem, prior, t, basis, width)
 
     def motion(self, x: FloatArray) -> Motion:
         """Return the samples of coefficients X."""
@@ -149,28 +167,67 @@ class Objective:
         rows = effect.adds_to(arm.robot)
         if rows:
             felt = arm.felt(motion)
-            return rigid_columns(rows, motion, RigidRegressor.of(arm.body, felt))
+            return _rigid_columns(rows, motion, RigidRegressor.of(arm.body, felt))
         if effect.instantaneous:
-            return columns_by_state(effect, motion, arm)
+            return _columns_by_state(effect, motion, arm)
         return self._columns_by_coefficient(effect, x)
 
     def _columns_by_coefficient(self, effect: Effect, x: FloatArray) -> EffectColumns:
         """Return columns that depend on the motion's past, with finite differences behind them."""
-        joints, (times, basis) = self.problem.limits.joints, self.wide
+        joints, period = self.problem.limits.joints, self.problem.settings.period
 
         def columns(y: FloatArray) -> FloatArray:
-            motion = Motion(joints, times, *(b @ y.T for b in basis))
-            return self.problem.arm.columns_of(effect, motion)[_MARGIN:-_MARGIN]
+            motion = FourierTrajectory.of(joints, period, y).with_margins(len(self.t))
+            return self.problem.arm.columns_of(effect, motion)[MARGIN:-MARGIN]
 
         here = columns(x)
 
         def pullback(weights: FloatArray) -> FloatArray:
             gradient = np.empty_like(x)
             for index in np.ndindex(*x.shape):
-                step = STEP * max(1.0, abs(float(x[index])))
+                step = _STEP * max(1.0, abs(float(x[index])))
                 moved = x.copy()
                 moved[index] += step
                 gradient[index] = np.sum(weights * (columns(moved) - here)) / step
             return gradient
 
         return EffectColumns(here, pullback)
+
+
+def _rigid_columns(rows: Sequence[int], motion: Motion, rigid: RigidRegressor) -> EffectColumns:
+    """Return the columns of what adds to rigid parameters: those of the parameters."""
+    pick = list(rows)
+
+    def pullback(weights: FloatArray) -> Gradient:
+        spread = np.zeros((*motion.q.shape, 10 * motion.n_joints))
+        spread[:, :, pick] = weights
+        return rigid.pullback(spread)
+
+    return EffectColumns(rigid.matrix()[:, :, pick], pullback)
+
+
+def _columns_by_state(effect: Effect, motion: Motion, arm: ArmModel) -> EffectColumns:
+    """Return columns that depend on nothing but the state, with finite differences behind them."""
+    n = motion.n_joints
+    state = np.array([motion.q, motion.dq, motion.ddq])
+    joints = np.arange(n)
+
+    def along(argument: int, step: float, weights: FloatArray) -> FloatArray:
+        """Return the weighted sum of the columns with each joint moved alone, (N, n)."""
+        moved = np.repeat(
+            state[:, np.newaxis], n, axis=1
+        )  # [argument, moved joint, sample, joint]
+        moved[argument, joints, :, joints] += step
+        q, dq, ddq = moved.reshape(3, -1, n)
+        samples = replace(motion, t=np.tile(motion.t, n), q=q, dq=dq, ddq=ddq)
+        columns = arm.columns_of(effect, samples).reshape(n, *weights.shape)
+        return np.asarray(np.einsum('jkrp,krp->kj', columns, weights))
+
+    def pullback(weights: FloatArray) -> Gradient:
+        by_q, by_dq, by_ddq = (
+            (along(argument, _STEP, weights) - along(argument, -_STEP, weights)) / (2.0 * _STEP)
+            for argument in range(3)
+        )
+        return by_q, by_dq, by_ddq
+
+    return EffectColumns(arm.columns_of(effect, motion), pullback)

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
-from armid_ros.simulation.plant import middle_position
 from armid_ros.simulation.reference import Reference
 import numpy as np
 import numpy.typing as npt
@@ -95,7 +94,7 @@ def multisine_course(
     """
     limit = _finite(robot, robot.torque_limit, 'torque')
     velocity = _finite(robot, robot.velocity_limit, 'velocity')
-    here, parts, stand = middle_position(robot), [], round(_STAND * _RATE)
+    here, parts, stand = robot.middle_pose, [], round(_STAND * _RATE)
     still = np.zeros((stand, robot.n_joints))
     samples = stand
     while True:
@@ -149,7 +148,7 @@ def step_course(
     limit = _finite(robot, robot.velocity_limit, 'velocity')
     n = robot.n_joints
     directions = [*np.eye(n), np.ones(n), (-1.0) ** np.arange(n)]
-    t, q, number = [0.0, _STAND], [middle_position(robot)] * 2, 0
+    t, q, number = [0.0, _STAND], [robot.middle_pose] * 2, 0
     while True:
         step = velocity * limit * directions[number % len(directions)] * _STEP
         there = _next_pose(robot, q[-1], rng, clear, step)
@@ -169,7 +168,7 @@ def _next_pose(
     robot: Robot, here: FloatArray, rng: np.random.Generator, clear: Clear, beyond: FloatArray
 ) -> FloatArray:
     """Draw a pose that can be gone to in a straight line, and by some way beyond."""
-    middle = middle_position(robot)
+    middle = robot.middle_pose
     lower = np.maximum(robot.lower, middle - _REACH)
     upper = np.minimum(robot.upper, middle + _REACH)
     room = 0.1 * (upper - lower)

@@ -17,6 +17,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from tests.clearance import path_clearance
+
 TETRAHEDRON = """solid t
 facet normal 0 0 0
 outer loop
@@ -82,7 +84,7 @@ def test_an_obstacle_is_checked_against_the_moving_links_alone():
 
 def test_smallest_distance_is_the_collision_models(clearance, humanoid_collision, poses):
     ours = clearance.smallest(poses)
-    np.testing.assert_allclose(ours, humanoid_collision.path_clearance(poses), atol=1e-6)
+    np.testing.assert_allclose(ours, path_clearance(humanoid_collision, poses), atol=1e-6)
 
 
 def test_near_pairs_are_all_pairs_within_reach(clearance, poses):

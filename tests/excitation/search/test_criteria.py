@@ -27,20 +27,11 @@ def test_information_predicts_the_scatter_of_least_squares(w):
     np.testing.assert_allclose(std, estimates.std(axis=1), rtol=0.05)
 
 
-def test_parameter_that_is_not_seen_has_infinite_deviation(w):
-    blind = w.copy()
-    blind[:, 2] = 0.0
-    std = Information(names(5), blind.T @ blind, np.ones(5)).std
-    assert np.isinf(std[2])
-    assert np.all(np.isfinite(np.delete(std, 2)))
-
-
-def test_confounded_parameters_have_infinite_deviation(w):
-    twins = w.copy()
-    twins[:, 1] = 3.0 * twins[:, 0]
-    std = Information(names(5), twins.T @ twins, np.ones(5)).std
-    assert np.all(np.isinf(std[:2]))
-    assert np.all(np.isfinite(std[2:]))
+@pytest.mark.parametrize(('factor', 'unseen'), [(0.0, [1]), (3.0, [0, 1])])
+def test_parameters_that_are_not_seen_or_confounded_have_infinite_deviations(w, factor, unseen):
+    w[:, 1] = factor * w[:, 0]
+    std = Information(names(5), w.T @ w, np.ones(5)).std
+    assert np.flatnonzero(np.isinf(std)).tolist() == unseen
 
 
 def test_condition_number_is_that_of_the_regressor_not_of_its_square(w):
@@ -83,13 +74,6 @@ def test_smooth_cost_is_just_above_the_cost(w, name):
     criterion = SpectralCriterion(name, np.ones(5))
     cost, smooth = criterion.cost(w.T @ w), criterion.smooth(w.T @ w)[0]
     assert cost <= smooth <= cost + np.log(5) / 12.0
-
-
-def test_more_data_never_costs_more(w):
-    once, twice = w.T @ w, 2.0 * w.T @ w
-    for name in ('D', 'A', 'E'):
-        criterion = SpectralCriterion(name, np.ones(5))
-        assert criterion.cost(twice) < criterion.cost(once)
 
 
 def test_subset_is_judged_with_the_others_fitted(w):
