@@ -86,10 +86,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         tick(0.0, 'playing the bag back')
         again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
         replay_lockstep(
-            bag,
-            again,
-            duration=end.duration,
-            on_progress=lambda now: tick(now.t / now.duration),
+            bag, again, duration=end.duration, on_progress=lambda now: tick(now.t / now.duration)
         )
         tick(0.0, 'identifying offline')
         recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
