@@ -40,6 +40,7 @@ from armid_ros.robots import load_robot
 from armid_ros.simulation import Reference
 import numpy as np
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 
 from benchmarks.changes import working_motion
 
@@ -191,7 +192,7 @@ class Bench:
         self.node = stage.add(LiveDiagnosisNode, self.live, self.helper)
         self._stage = stage
         stage.spin_until(self._connected, 'discovery')
-        self.plant.follow_reference(Reference(along.joints, along.t, along.q, along.dq, along.ddq))
+        self.plant._arm.set_trajectory(Reference.of(along))
 
     def _connected(self) -> bool:
         self.plant.publish_clock()
@@ -204,7 +205,7 @@ class Bench:
             stamp = self.plant.step()
             self.helper.now += 1.0 / RATE
             if self._direct:
-                self.node.take_joint_states(self.plant.joint_state)
+                self.node.take_joint_states(serialize_message(self.plant.joint_state))
             self._stage.spin_until(
                 lambda stamp=stamp: self.node.last_stamp_ns == stamp, 'joint_states'
             )
@@ -213,8 +214,7 @@ class Bench:
 
     def set_effect(self, text: str) -> None:
         """Let an effect appear."""
-        wanted = Parameter('effects', value=[*KNOWN, text])
-        result = self.plant.set_parameters([wanted])[0]
+        (result,) = self.plant.set_parameters([Parameter('effects', value=[*KNOWN, text])])
         assert result.successful, result.reason
 
     def said(self, t: float) -> str:
@@ -233,7 +233,7 @@ class Bench:
 @contextmanager
 def bench(along: Motion, direct: bool) -> Iterator[Bench]:
     """Make the nodes."""
-    with Stage(None) as stage:
+    with Stage() as stage:
         yield Bench(stage, along, direct)
 
 

@@ -210,7 +210,7 @@ def in_lock_step(rate, folder):
         used.append(time.process_time())
 
     end = run_lockstep(
-        plant, run, identifier, folder / f'bag_{rate:.0f}', rate=rate, on_progress=tell
+        plant, run, folder / f'bag_{rate:.0f}', identifier, rate=rate, on_progress=tell
     )
     by_processor = 1.0 / np.diff(used)
     bare = 1.0 / (rate * bare_round_trip())

@@ -45,11 +45,6 @@ Progress = Callable[..., None]
 USUAL = ','.join(USUAL_EFFECTS)
 
 
-def generator(rng: Rng) -> np.random.Generator:
-    """Return a random generator; an int is its seed."""
-    return rng if isinstance(rng, np.random.Generator) else np.random.default_rng(rng)
-
-
 def robot_of(robot: RobotLike) -> Robot:
     """Return the robot that is meant."""
     if isinstance(robot, ArmModel):

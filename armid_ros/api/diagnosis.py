@@ -12,7 +12,6 @@ from typing import Any, Literal, TYPE_CHECKING, TypeGuard, TypeVar
 
 from armid_ros.api.arguments import (
     arm_of,
-    generator,
     is_model,
     Progress,
     RecordingLike,
@@ -373,7 +372,7 @@ def diagnose(
         baseline=before,
         misfit=misfit,
         settings=settings,
-        rng=generator(rng),
+        rng=np.random.default_rng(rng),
         progress=progress,
     )
     found = DiagnosisResult(

@@ -11,7 +11,7 @@ from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
-from armid_ros.api.arguments import arm_of, generator, RecordingLike, recordings_of, Rng, RobotLike
+from armid_ros.api.arguments import arm_of, RecordingLike, recordings_of, Rng, RobotLike
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
@@ -349,7 +349,7 @@ def design_excitation(
     found = design(
         model,
         known,
-        generator(rng),
+        np.random.default_rng(rng),
         collision=scene.bodies,
         prior_information=_information(model, known, earlier, rng) if earlier else None,
         rival=rival,
@@ -395,7 +395,7 @@ def _information(
 ) -> FloatArray:
     """Return the information that recordings hold already, shape (r, r)."""
     used = conditioning(list(recordings), SignalSettings())
-    problem = DesignProblem.of(arm, settings, generator(rng))
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(rng))
     size = len(problem.base.parameters)
     matrix = np.zeros((size, size))
     for recording in recordings:

@@ -12,7 +12,6 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
     arm_of,
-    generator,
     Progress,
     RecordingLike,
     recordings_of,
@@ -363,7 +362,7 @@ def identify(
     )
     require_once(training, held_out)
     check_held_out(model.robot, held_out)
-    tick, source = progress or (lambda *_: None), generator(rng)
+    tick, source = progress or (lambda *_: None), np.random.default_rng(rng)
     known = PhysicalSettings() if physical is True else physical or None
     settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
     gains = None

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
-    generator,
     read_all_joints,
     RecordingLike,
     recordings_of,
@@ -33,6 +32,7 @@ from armid_ros.inspection import (
 from armid_ros.inspection import inspect as look
 from armid_ros.recording import Recording, Topic
 from armid_ros.robots import Robot
+import numpy as np
 
 if TYPE_CHECKING:
     import pandas
@@ -154,7 +154,7 @@ def inspect(
     else:
         topics = topics_of(Path(recording)) if topics is None else topics
         read = read_all_joints(Path(recording), topics)
-    found = look(read, described, topics=topics or (), rng=generator(rng))
+    found = look(read, described, topics=topics or (), rng=np.random.default_rng(rng))
     return InspectionResult(found)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.api.arguments import arm_of, generator, Rng, RobotLike
+from armid_ros.api.arguments import arm_of, Rng, RobotLike
 from armid_ros.api.excitation import ExcitationResult
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import design, DesignSettings, Excitation, load_excitation
@@ -71,7 +71,7 @@ def simulate(
 
     """
     model = arm_of(arm, '')
-    source = generator(rng)
+    source = np.random.default_rng(rng)
     sensors = Sensors(
         torque_noise=torque_noise,
         position_noise=position_noise,

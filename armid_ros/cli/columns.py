@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli.choices import TIME_UNITS
@@ -14,19 +13,15 @@ from armid_ros.files.cells import listed
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.recording import ReadSettings, Recording
-    from armid_ros.recording.tables import ColumnSettings, TablePlan
-    from armid_ros.robots import Robot
+    from armid_ros.recording.tables import ColumnSettings
 
-#: Where the context keeps which plans of tables have been shown.
-_SHOWN = 'armid.columns.shown'
 #: Where the context keeps what they say.
-META = 'armid.columns'
+_META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     """Keep a value where `settings` finds it."""
-    ctx.meta.setdefault(META, {})[parameter.name] = value
+    ctx.meta.setdefault(_META, {})[parameter.name] = value
     return value
 
 
@@ -143,48 +138,7 @@ def settings() -> ColumnSettings:
     """Return what the options of the running command say."""
     from armid_ros.recording.tables import ColumnSettings
 
-    context = click.get_current_context(silent=True)
-    return ColumnSettings(**(context.meta.get(META, {}) if context is not None else {}))
-
-
-def read(
-    paths: Sequence[Path],
-    robot: Robot,
-    topic: str | None,
-    reading: ReadSettings,
-) -> list[Recording]:
-    """Read bags and tables; guesses are shown on stderr, those of equal files once."""
-    from armid_ros.recording.anything import read_anything
-
-    said = settings()
-    context = click.get_current_context(silent=True)
-    shown: set[str] = set() if context is None else context.meta.setdefault(_SHOWN, set())
-
-    def show(plan: TablePlan) -> None:
-        lines = plan.lines()
-        body = '\n'.join(lines[1:])
-        if plan.guessed or plan.notes:
-            click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
-        shown.add(body)
-
-    for path in paths if said.rename else ():
-        if ':' in path.name and not path.exists():  # a second pair without an option of its own
-            raise RecordingError(
-                f"there is no recording '{path}'; names to exchange need an option for each pair: "
-                f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
-            )
-    return [
-        read_anything(
-            path,
-            joints=robot.joints,
-            slides=list(robot.prismatic),
-            topic=topic,
-            columns=said,
-            show=show,
-            settings=reading,
-        )
-        for path in paths
-    ]
+    return ColumnSettings(**click.get_current_context().meta.get(_META, {}))
 
 
 def _coupling(text: str) -> tuple[str, str, float]:

@@ -12,14 +12,15 @@ from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.effects import make_effect
-from armid_ros.errors import ModelError, RobotError, visible
+from armid_ros.errors import ModelError, RecordingError, RobotError, visible
 from armid_ros.files import default_memory_limit, result_folder, Staged, staged, write_file
 from armid_ros.files.cells import listed, parted
 from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
+from armid_ros.recording.anything import read_anything
 from armid_ros.recording.ros1 import is_ros1
-from armid_ros.recording.tables import is_table
+from armid_ros.recording.tables import is_table, TablePlan
 from armid_ros.robots import (
     driven_in_words,
     inertia_doubts,
@@ -33,6 +34,9 @@ from click.core import ParameterSource
 import numpy as np
 
 Corners = tuple[Sequence[float], Sequence[float]]
+
+#: Where the context keeps which plans of tables have been shown.
+_SHOWN = 'armid.columns.shown'
 
 
 def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> None:
@@ -185,9 +189,36 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
     return np.broadcast_to(values, robot.n_joints).copy()
 
 
-def read(bags: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
-    """Read what bags, or tables, hold of the robot's joints."""
-    return columns.read(bags, robot, topic, read_settings())
+def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
+    """Read the joints of bags and tables; guesses are shown on stderr, equal ones once."""
+    said, reading = columns.settings(), read_settings()
+    shown: set[str] = click.get_current_context().meta.setdefault(_SHOWN, set())
+
+    def show(plan: TablePlan) -> None:
+        lines = plan.lines()
+        body = '\n'.join(lines[1:])
+        if plan.guessed or plan.notes:
+            click.echo('\n'.join(lines) if body not in shown else f'{lines[0]}, alike', err=True)
+        shown.add(body)
+
+    for path in paths if said.rename else ():
+        if ':' in path.name and not path.exists():  # a second pair without an option of its own
+            raise RecordingError(
+                f"there is no recording '{path}'; names to exchange need an option for each pair: "
+                f"--rename '{said.rename[-1][0]}:{said.rename[-1][1]}' --rename '{path}'"
+            )
+    return [
+        read_anything(
+            path,
+            joints=robot.joints,
+            slides=list(robot.prismatic),
+            topic=topic,
+            columns=said,
+            show=show,
+            settings=reading,
+        )
+        for path in paths
+    ]
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:

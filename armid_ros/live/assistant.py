@@ -3,24 +3,23 @@
 """
 Who answers: a process of its own, so that joint states of 1 kHz never wait for a diagnosis.
 
-The process reads jobs from its standard input and writes results to its standard output. It ends
-when its input does, so it never outlives who started it, however that one ended.
+Jobs go to the process and results come back through a pair of sockets. The process ends when the
+other end is closed, so it never outlives who started it, however that one ended.
 
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 import os
 from pathlib import Path
-import pickle
-import queue
-import struct
 import subprocess
 import sys
-import threading
 import traceback
-from typing import Any, ClassVar, IO
+from typing import ClassVar
 
 from armid_ros.api.diagnosis import DiagnosisResult
 from armid_ros.diagnosis import Diagnosis, next_run
@@ -33,7 +32,8 @@ import numpy as np
 _ONE_THREAD = dict.fromkeys(('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1')
 #: Courtesy towards the processes that must not wait.
 _NICE = 10
-_LENGTH = struct.Struct('<Q')
+#: Of standard error, where what a library prints belongs.
+_STDERR = 2
 
 
 @dataclass(frozen=True)
@@ -148,11 +148,6 @@ class Assistant:
         self.busy = False
         self._start()
 
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._process.pid
-
     def ask(self, job: Job) -> None:
         """
         Begin a job, in another process where the one before has ended.
@@ -170,92 +165,65 @@ class Assistant:
         if self._process.poll() is not None:
             self.close()
             self._start()
-        assert self._process.stdin is not None
         try:
-            _write(self._process.stdin, job)
+            self._pipe.send(job)
         except OSError as error:
             raise IdentificationError(f'the process that diagnoses has ended: {error}') from error
         self.busy = True
 
     def poll(self) -> Result | None:
         """Return what came, once."""
-        try:
-            result = self._results.get_nowait()
-        except queue.Empty:
+        if self._pipe.closed or not self._pipe.poll():
             return None
         self.busy = False
+        try:
+            result: Result = self._pipe.recv()
+        except (EOFError, OSError):  # it ended, maybe while it wrote
+            self._pipe.close()
+            code = self._process.wait()
+            return Done(f'the process that diagnoses has ended with {code}', success=False)
         return result
 
     def close(self) -> None:
         """End the process, whatever it does."""
         self._process.kill()
         self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                try:
-                    pipe.close()
-                except OSError:  # what it was not read of any more
-                    pass
+        self._pipe.close()
 
     def _start(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, '-P', '-c', f'from {__name__} import main; main()'],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=os.environ | _ONE_THREAD,
-            start_new_session=True,  # Ctrl-C is for who started it
-        )
-        self._results: queue.SimpleQueue[Result] = queue.SimpleQueue()
-        own = self._process, self._results
-        threading.Thread(target=_listen, args=own, daemon=True).start()
+        self._pipe, other = Pipe()
+        with other:
+            self._process = subprocess.Popen(
+                [
+                    sys.executable,
+                    '-P',
+                    '-c',
+                    f'from {__name__} import main; main({other.fileno()})',
+                ],
+                stdin=subprocess.DEVNULL,
+                stdout=_STDERR,
+                pass_fds=[other.fileno()],
+                env=os.environ | _ONE_THREAD,
+                start_new_session=True,  # Ctrl-C is for who started it
+            )
 
 
 #: Answers jobs one at a time.
 Helper = Assistant | InProcess
 
 
-def _listen(process: subprocess.Popen[bytes], results: queue.SimpleQueue[Result]) -> None:
-    """Pass on what a process answers, until it ends."""
-    assert process.stdout is not None
-    while (result := _read(process.stdout)) is not None:
-        results.put(result)
-    code = process.wait()
-    results.put(Done(f'the process that diagnoses has ended with {code}', success=False))
-
-
-def _write(pipe: IO[bytes], what: object) -> None:
-    data = pickle.dumps(what, protocol=pickle.HIGHEST_PROTOCOL)
-    pipe.write(_LENGTH.pack(len(data)) + data)
-    pipe.flush()
-
-
-def _read(pipe: IO[bytes]) -> Any:
-    """Return the next object; None at the end."""
-    try:
-        head = pipe.read(_LENGTH.size)
-        if len(head) < _LENGTH.size:
-            return None
-        length = _LENGTH.unpack(head)[0]
-        data = pipe.read(length)
-    except (OSError, ValueError):  # closed while it is read
-        return None
-    if len(data) < length:  # it ended while it wrote
-        return None
-    return pickle.loads(data)  # of a process of one's own
-
-
-def main() -> None:
-    """Answer until the input ends."""
+def main(fd: int) -> None:
+    """Answer what comes on a socket until its other end is closed."""
     os.nice(_NICE)
-    jobs, results = sys.stdin.buffer, os.fdopen(os.dup(1), 'wb')
-    os.dup2(2, 1)  # what a library prints must not get among the results
     helper = InProcess()
-    while (job := _read(jobs)) is not None:
-        try:
-            helper.ask(job)
-            result = helper.poll()
-        except Exception as error:  # a window that nobody foresaw; the next one is another
-            traceback.print_exc()
-            what = f'{type(job).__name__.lower()} failed: {type(error).__name__}: {error}'
-            result = Done(what, success=False)
-        _write(results, result)
+    with suppress(EOFError, OSError), Connection(fd) as pipe:
+        while True:
+            job = pipe.recv()
+            try:
+                helper.ask(job)
+                result = helper.poll()
+            except Exception as error:  # a window that nobody foresaw; the next one is another
+                traceback.print_exc()
+                what = f'{type(job).__name__.lower()} failed: {type(error).__name__}: {error}'
+                result = Done(what, success=False)
+            pipe.send(result)

@@ -34,7 +34,7 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 #: How often due messages are published [s].
-TICK = 0.001
+_TICK = 0.001
 #: Messages published in one go; services are answered between.
 _BURST = 1000
 #: How long a trajectory may take to arrive when the node ends [s].
@@ -58,7 +58,6 @@ class JumpGuard:
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
         self.tolerance, self.timeout = tolerance, timeout
-        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._latest: dict[tuple[str, ...], tuple[JointState, float]] = {}
         self._limits: dict[str, float] = {}
         self._states = node.create_subscription(
@@ -87,7 +86,7 @@ class JumpGuard:
         pose = MeasuredPose.unknown(reference.joints)
         for message, seen in self._latest.values():
             pose = pose.updated(message.name, message.position, 0, seen)
-        lost = pose.staleness(self._now(), self.timeout)
+        lost = pose.staleness(time.monotonic(), self.timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; it is not known where it is'
         if reference.dq is not None:
@@ -109,10 +108,7 @@ class JumpGuard:
         before = self._latest.get(names)
         if before and stamp and stamp == Time.from_msg(before[0].header.stamp).nanoseconds:
             return
-        self._latest[names] = (message, self._now())
-
-    def _now(self) -> float:
-        return float(self._clock.now().nanoseconds * 1e-9)
+        self._latest[names] = (message, time.monotonic())
 
 
 class BagPlayerNode(ArmidNode):
@@ -185,12 +181,12 @@ class BagPlayerNode(ArmidNode):
         ),
     )
 
-    def __init__(self, bag: Bag | None = None, **kwargs: Any) -> None:
-        """Take the bag; by default the one the parameter names."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Open the bag that the parameter names."""
         super().__init__('bag_player', **kwargs)
-        if bag is None and not self.value('bag'):
+        if not self.value('bag'):
             raise RecordingError("parameter 'bag' is empty: give a bag, -p bag:=PATH")
-        self._bag = bag or Bag(self.value('bag'))
+        self._bag = Bag(self.value('bag'))
         self._lock_step = bool(self.value('use_sim_time'))
         trouble = self.objection({'clock_rate': self.value('clock_rate')})
         if trouble:
@@ -213,7 +209,7 @@ class BagPlayerNode(ArmidNode):
         self._keep_clock()
         pace = self.get_clock() if self._lock_step else Clock(clock_type=ClockType.STEADY_TIME)
         self._pace = pace
-        self._timer = self.create_timer(TICK, self.play, clock=pace)
+        self._timer = self.create_timer(_TICK, self.play, clock=pace)
 
     @property
     def finished(self) -> bool:

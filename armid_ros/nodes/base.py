@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, OutputError
 from armid_ros.nodes.complaints import Complaints, FATAL, surviving
 from armid_ros.nodes.parameters.table import as_declared, declare, is_as, NodeParameter, unknown
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -27,16 +28,15 @@ _PATIENCE = 5.0
 #: How often new publishers and answers are looked for [s].
 LOOK_PERIOD = 0.1
 
-EXECUTOR = NodeParameter(
-    name='executor',
-    default='single',
-    description='Executor when the node is a process of its own; events takes less processor time '
-    'at 1 kHz, but is experimental in Jazzy.',
-    choices=('single', 'events'),
-)
 #: Parameters of every node.
 COMMON = (
-    EXECUTOR,
+    NodeParameter(
+        'executor',
+        'single',
+        'Executor when the node is a process of its own; events takes less processor time at '
+        '1 kHz, but is experimental in Jazzy.',
+        choices=('single', 'events'),
+    ),
     NodeParameter(
         'end_with_parent',
         False,
@@ -211,9 +211,25 @@ class ArmidNode(Node):
     def close(self) -> None:
         """Finish what must not be lost."""
 
+    def tell(self, text: str) -> str:
+        """Log a text, and return it; /rosout is gone once the process is told to end."""
+        if self.context.ok():
+            self.get_logger().info(text)
+        return text
+
     def value(self, parameter: str) -> Any:
         """Return the value of a parameter."""
         return self.get_parameter(parameter).value
+
+    def folder(self, parameter: str) -> Path:
+        """Return the folder that a parameter names, made if it is not there; or OutputError."""
+        folder = Path(self.value(parameter)).expanduser()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            said = f'{parameter}: {folder}: cannot be made: {error.strerror}'
+            raise OutputError(said) from error
+        return folder
 
     def offer(self, service: str, action: Callable[[], str]) -> None:
         """

@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import wraps
 import traceback
-from types import MappingProxyType
 from typing import Any
 
 from armid_ros.errors import ArmidError, RecordingEnded
@@ -26,7 +25,7 @@ class Complaints:
 
     Attributes
     ----------
-    counts : mapping of str to int
+    counts : Counter of str
         How often each kind was rejected.
     latest : str
         Text of the last complaint; empty when there was none.
@@ -40,20 +39,15 @@ class Complaints:
     def __init__(self, logger: RcutilsLogger) -> None:
         """Say things on the logger of a node, which is also /rosout."""
         self._logger = logger
-        self._counts: Counter[str] = Counter()
+        self.counts: Counter[str] = Counter()
         self._said: dict[str, set[str]] = {}
         self.latest = ''
         self.fresh = False
         self.defects = 0
 
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """Return how often each kind was rejected."""
-        return MappingProxyType(self._counts)
-
     def say(self, kind: str, text: str) -> None:
         """Count a rejected input, and log it unless the same was said before."""
-        self._counts[kind] += 1
+        self.counts[kind] += 1
         self.latest = text
         self.fresh = True
         said = self._said.setdefault(kind, set())

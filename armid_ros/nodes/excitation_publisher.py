@@ -226,7 +226,7 @@ class ExcitationPublisherNode(ArmidNode):
         self._overloads = 0
         self._trouble, self._rehearsed = '', ''
         self._runs, self._outcome = self._runs + 1, 'complete'  # unless it is stopped
-        return self._tell(
+        return self.tell(
             f'a run of {planned.duration:g} s, {planned.approach.duration:.1f} s of it to get '
             f'there, sent to {receiver}'
         )
@@ -244,7 +244,7 @@ class ExcitationPublisherNode(ArmidNode):
         if self._gate is not None:
             elapsed = self._arm.now() - self._begun
             self._end_run('stopped by ~/stop')
-            return self._tell(f'stopped {elapsed:.2f} s after the start')
+            return self.tell(f'stopped {elapsed:.2f} s after the start')
         ending = self._ending
         if ending is None:
             raise TrajectoryError('nothing is under way')
@@ -253,10 +253,10 @@ class ExcitationPublisherNode(ArmidNode):
         now, limits = self._arm.now(), map(self.value, ('tracking_tolerance', 'stopping'))
         motion = ending.stopped_again(self._arm.monitor, now, *limits)
         if motion is None:
-            return self._tell('the stop was sent before')
+            return self.tell('the stop was sent before')
         self._ending = replace(ending, last=motion, sent=now)
         self._controller.insist(write_trajectory(motion, float(motion.t[0])))
-        return self._tell('the arm was still on its path, and was stopped again')
+        return self.tell('the arm was still on its path, and was stopped again')
 
     @property
     def activity(self) -> str:
@@ -399,7 +399,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _end_complete(self, gate: MotionGate) -> None:
         self._gate, end = None, gate.run.at([gate.run.duration])
         self._ending = Ending(gate, self._begun, replace(end, t=np.zeros(1)), self._arm.now(), '')
-        self._tell(f'run complete: {gate.run.duration:.1f} s, approach included')
+        self.tell(f'run complete: {gate.run.duration:.1f} s, approach included')
 
     def _on_goal_ended(self, reason: str) -> None:
         """Take what a controller says of the run: that it is at its end, or why it is not."""
@@ -422,7 +422,7 @@ class ExcitationPublisherNode(ArmidNode):
         if report.surprises:
             self._say_trouble(f'rehearsed: {report}; look into it before ~/start')
         else:
-            self._rehearsed = self._tell(f'rehearsed: {report}; {advice}')
+            self._rehearsed = self.tell(f'rehearsed: {report}; {advice}')
 
     def _on_experiment(self, message: String) -> None:
         """Take an excitation that somebody planned; ~/start runs it, and nothing else does."""
@@ -430,15 +430,11 @@ class ExcitationPublisherNode(ArmidNode):
             raise TrajectoryError('an excitation is under way; the new one is not taken')
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
-        self._tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')
+        self.tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')
 
     def _say_trouble(self, text: str) -> None:
         self._trouble = text
         self.get_logger().error(text)
-
-    def _tell(self, text: str) -> str:
-        self.get_logger().info(text)
-        return text
 
 
 def main(args: Sequence[str] | None = None) -> None:

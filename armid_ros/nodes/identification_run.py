@@ -14,7 +14,7 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.verdict.document import SCHEMA as DIAGNOSIS
-from armid_ros.errors import ArmidError, OutputError, RecordingError, TrajectoryError
+from armid_ros.errors import ArmidError, RecordingError, TrajectoryError
 from armid_ros.files.own import refuse_foreign
 from armid_ros.identification.output import SCHEMA as IDENTIFICATION
 from armid_ros.nodes.base import ArmidNode
@@ -174,11 +174,7 @@ class IdentificationRunNode(ArmidNode):
         ArmModel.of(
             self.value('robot'), effects=effects, gravity=self.value('gravity'), joints=joints
         )
-        folder = Path(self.value('save_to')).expanduser()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f'save_to: {folder}: cannot be made: {error.strerror}') from error
+        folder = self.folder('save_to')
         for name, schema in _FOLDERS.items():
             if (folder / name).is_dir():
                 refuse_foreign(folder / name, schema)
@@ -192,7 +188,13 @@ class IdentificationRunNode(ArmidNode):
 
     def _steps(self) -> Iterator[Wait]:
         """Go through all that is to be done."""
-        yield from self._until('waits for the other nodes', self._partners)
+        deadline = time.monotonic() + self.value('patience')
+        yield (
+            'waits for the other nodes',
+            lambda: not self._missing() or time.monotonic() > deadline,
+        )
+        if self._missing():
+            raise ArmidError(f'{" and ".join(self._missing())} did not come up')
         if self.value('rehearse'):
             yield from self._excited('rehearse')
         bags = []
@@ -283,21 +285,13 @@ class IdentificationRunNode(ArmidNode):
         told = ': '.join(str(document[key]).replace('_', ' ') for key in keys if key in document)
         self._results.append(f'{command}: {told or "done"} ({folder / "report.html"})')
 
-    def _until(self, what: str, come: Callable[[], str]) -> Iterator[Wait]:
-        """Wait until nothing is missing any more, for as long as patience lasts."""
-        deadline = time.monotonic() + self.value('patience')
-        yield what, lambda: not come() or time.monotonic() > deadline
-        if come():
-            raise ArmidError(come())
-
-    def _partners(self) -> str:
-        """Say which nodes are missing."""
-        missing = [
-            self._full[node]
-            for node, service in (('publisher', 'start'), ('recorder', 'start'))
-            if not self._client(node, service).service_is_ready()
+    def _missing(self) -> list[str]:
+        """Return which of the other nodes are not there."""
+        return [
+            name
+            for node, name in self._full.items()
+            if not self._client(node, 'start').service_is_ready()
         ]
-        return f'{" and ".join(missing)} did not come up' if missing else ''
 
     def _client(self, node: str, service: str) -> Client:
         name = f'{self._full[node]}/{service}'

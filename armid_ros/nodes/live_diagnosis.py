@@ -5,30 +5,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from armid_msgs.msg import Diagnosis
 from armid_ros.api.arguments import source_of
 from armid_ros.arm.model_file import model_text
 from armid_ros.diagnosis import Finding
-from armid_ros.errors import ArmidError, IdentificationError, OutputError
+from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Done, Helper, Plan, Save
-from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
-from armid_ros.nodes.messages.joint_states import disturbance, JointStateReader
-from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
+from armid_ros.nodes.listening import ListeningNode
+from armid_ros.nodes.messages.joint_states import disturbance, JointSample
 from armid_ros.nodes.parameters.live import (
     LIVE_PARAMETERS,
     LIVE_SETTINGS,
     make_diagnosis,
     settings_of,
 )
-from armid_ros.nodes.qos import LATCHED, MatchedSubscription
+from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 #: What each verdict is in /diagnostics: something is wrong where it names or cannot name.
@@ -38,7 +35,7 @@ _LEVELS = {
 }
 
 
-class LiveDiagnosisNode(ArmidNode):
+class LiveDiagnosisNode(ListeningNode):
     """
     Diagnoses an arm while it moves.
 
@@ -51,14 +48,6 @@ class LiveDiagnosisNode(ArmidNode):
     ----------
     live : LiveDiagnosis, or None
         None until a robot is known.
-    received : int
-        Joint states received.
-    last_stamp_ns : int
-        Stamp of the last one [ns].
-    freshness : Freshness
-        Whether joint states still come.
-    stamps : StampDifference
-        How far their stamps are from the clock.
 
     """
 
@@ -82,11 +71,6 @@ class LiveDiagnosisNode(ArmidNode):
         """
         super().__init__('live_diagnosis', **kwargs)
         self.live: LiveDiagnosis | None = None
-        self.received = 0
-        self.last_stamp_ns = 0
-        self.freshness = Freshness('joint states')
-        self.stamps = StampDifference(self.get_clock())
-        self._description: str | None = None
         self._said: object = ()
         self._waiting: list[Save | Plan] = []
         self._helper = helper or Assistant()
@@ -97,19 +81,9 @@ class LiveDiagnosisNode(ArmidNode):
             live = make_diagnosis(self.value)
         if live is not None:
             self._adopt(live)
-        else:
-            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
-        self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self.take_joint_states
-        )
+        self.listen()
         for service in (self.accept, self.reject, self.save, self.next_run, self.reset):
             self.offer(f'~/{service.__name__}', service)
-        self.look_every(LOOK_PERIOD, self.look)
-
-    @property
-    def hardware(self) -> str:
-        """Name of the robot."""
-        return str(self.live.belief.accepted.robot.name) if self.live else ''
 
     @property
     def busy(self) -> bool:
@@ -122,7 +96,7 @@ class LiveDiagnosisNode(ArmidNode):
         named = _in_words(live)
         live.accept()
         self._publish_model()
-        return self._tell(f'accepted: {named}')
+        return self.tell(f'accepted: {named}')
 
     def reject(self) -> str:
         """Take back what is proposed, and do not propose it again."""
@@ -130,7 +104,7 @@ class LiveDiagnosisNode(ArmidNode):
         named = _in_words(live)
         live.reject()
         self._publish_model()
-        return self._tell(f'rejected: {named}')
+        return self.tell(f'rejected: {named}')
 
     def reset(self) -> str:
         """Begin anew with the model as it was given."""
@@ -141,11 +115,7 @@ class LiveDiagnosisNode(ArmidNode):
     def save(self) -> str:
         """Have the last diagnosis written; the log says when it is."""
         self._require_diagnosis()
-        folder = Path(self.value('save_to')).expanduser()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f'save_to: {folder}: cannot be made: {error.strerror}') from error
+        folder = self.folder('save_to')
         refuse_replacing(folder, Save.FILES)
         self._begin(Save(folder))
         return f'writing {", ".join(Save.FILES)} to {folder}'
@@ -158,26 +128,19 @@ class LiveDiagnosisNode(ArmidNode):
 
     def look(self) -> None:
         """Look at who publishes joint states, and what has been answered."""
-        self.joint_states.match()
+        super().look()
         self.take_answer()
 
-    def take_joint_states(self, message: JointState) -> None:
-        """Take a joint state, and ask when enough new motion came."""
-        self.received += 1
-        self.freshness.heard()
-        stamp = message.header.stamp
-        self.last_stamp_ns = stamp.sec * 10**9 + stamp.nanosec
-        self.stamps.take(self.last_stamp_ns)
-        if self.live is None:
-            return
-        learning = self.live.learning
-        for sample in self._reader.read(message):
-            self._watch.take(sample.t, sample.q, sample.tau)
-            self.live.add(*sample)
-        if learning and not self.live.learning:
-            self._tell('the misfit of the model is learned; from now on it is diagnosed')
-        if self.live.due and not self._helper.busy:
-            self._helper.ask(self.live.request())
+    def take_sample(self, sample: JointSample) -> None:
+        """Take a joint state of all joints, and ask when enough new motion came."""
+        live = self._require()
+        learning = live.learning
+        self._watch.take(sample.t, sample.q, sample.tau)
+        live.add(*sample)
+        if learning and not live.learning:
+            self.tell('the misfit of the model is learned; from now on it is diagnosed')
+        if live.due and not self._helper.busy:
+            self._helper.ask(live.request())
 
     def take_answer(self) -> bool:
         """Take what was answered, if anything; return whether something was."""
@@ -196,7 +159,7 @@ class LiveDiagnosisNode(ArmidNode):
         """Say how far it is."""
         live = self.live
         if live is None:
-            return 'waiting for robot_description', {'received': self.received}
+            return self.awaited, {'received': self.received}
         values = {
             'received': self.received,
             'kept samples': len(live.window),
@@ -208,8 +171,8 @@ class LiveDiagnosisNode(ArmidNode):
         }
         for reason in sorted(self._watch.news()):
             self.complaints.say(reason, disturbance(reason, self.joint_states.several))
-        if not self.received:
-            return 'no joint states so far', values
+        if self.awaited:
+            return self.awaited, values
         if not (self.freshness.stopped or self.complaints.fresh) and live.learning:
             return 'learning the misfit of the model: nothing may be wrong yet', values
         trouble = self.freshness.trouble()
@@ -245,11 +208,9 @@ class LiveDiagnosisNode(ArmidNode):
         """End the process that diagnoses."""
         self._helper.close()
 
-    def _on_description(self, message: String) -> None:
-        if message.data == self._description:
-            return
-        self._adopt(make_diagnosis(self.value, message.data))
-        self._description = message.data
+    def take_description(self, urdf: str) -> None:
+        """Diagnose the robot of robot_description."""
+        self._adopt(make_diagnosis(self.value, urdf))
 
     def _take(self, answer: Answer) -> None:
         """Publish a diagnosis, and the model if it is another one."""
@@ -261,7 +222,7 @@ class LiveDiagnosisNode(ArmidNode):
         if live.latest is latest:
             return
         message = _message(answer, self.hardware, live.confirmed)
-        message.header.stamp = self._reader.stamp(answer.end).to_msg()
+        message.header.stamp = self.reader.stamp(answer.end).to_msg()
         self._diagnoses.publish(message)
         said = f'{answer.verdict.replace("_", " ")}: {answer.summary}'
         if answer.named != self._said:
@@ -273,7 +234,7 @@ class LiveDiagnosisNode(ArmidNode):
         if not done.success:
             self.complaints.say('diagnosis', done.text)
             return
-        self._tell(done.text)
+        self.tell(done.text)
         if done.excitation:
             self._runs.publish(String(data=done.excitation))
 
@@ -293,19 +254,15 @@ class LiveDiagnosisNode(ArmidNode):
 
     def _adopt(self, live: LiveDiagnosis) -> None:
         robot = live.belief.accepted.robot
+        self.adopt(robot)
         self.live = live
         self._watch = StreamWatch(robot.n_joints)
-        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
         self._publish_model()
 
     def _require(self) -> LiveDiagnosis:
         if self.live is None:
             raise IdentificationError('there is no robot yet: robot_description has not come')
         return self.live
-
-    def _tell(self, text: str) -> str:
-        self.get_logger().info(text)
-        return text
 
 
 def _message(answer: Answer, robot: str, confirmed: bool) -> Diagnosis:

@@ -10,8 +10,8 @@ does not depend on how fast the computer is, nor on what else it does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 import math
 import os
@@ -21,7 +21,6 @@ from typing import Any, TypeVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
-from armid_ros.estimate import Estimate
 from armid_ros.excitation import Excitation, TransferPlanner
 from armid_ros.excitation.pose_monitor import AGREEING
 from armid_ros.identification.online.identifier import OnlineIdentifier
@@ -35,8 +34,6 @@ from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import make_executor, steady
 from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.simulation import SimulatedArm
-from rclpy.context import Context
-from rclpy.executors import Executor
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.time import Time
@@ -48,12 +45,17 @@ AnyNode = TypeVar('AnyNode', bound=ArmidNode)
 PATIENCE = 20.0
 #: The arm holds still for so long after the end, while filters run out [s].
 _REST = 0.5
-#: Begin of time where nobody says otherwise: a stamp of zero would mean that there is none [ns].
+#: Begin of time: a stamp of zero would mean that there is none [ns].
 EPOCH_NS = 1_000 * 10**9
 #: How long the arm is at rest before it is started [s]: what the publisher has to see.
 _SEEN = 0.26
-#: What is recorded unless told otherwise.
-TOPICS = ('joint_states', 'robot_description', 'joint_trajectory', 'online_identifier/estimate')
+#: What is recorded, and what is recorded of who learns.
+_TOPICS = ('joint_states', 'robot_description', 'joint_trajectory')
+_LEARNED = ('online_identifier/estimate',)
+#: Step of the clock of a replay [ns].
+_TICK_NS = 2_000_000
+#: Simulated time between two reports of progress [s].
+_PERIOD = 1.0
 
 
 @dataclass(frozen=True)
@@ -65,12 +67,6 @@ class Progress:
     ----------
     t, duration : float
         Simulated time since the start, and in all [s].
-    estimate : Estimate
-        The online estimate now.
-    samples : int
-        Samples it rests on.
-    condition_number : float
-        Of the weighted regressor so far.
     real_time_factor : float
         Simulated time per real time so far.
 
@@ -78,9 +74,6 @@ class Progress:
 
     t: float
     duration: float
-    estimate: Estimate
-    samples: int
-    condition_number: float
     real_time_factor: float
 
 
@@ -90,22 +83,18 @@ OnProgress = Callable[[Progress], None]
 def run_lockstep(
     arm: SimulatedArm,
     excitation: Excitation,
-    identifier: OnlineIdentifier,
     bag: Path,
+    identifier: OnlineIdentifier | None = None,
     *,
-    topics: Sequence[str] = TOPICS,
     rate: float = 200.0,
     approach: float = 3.0,
     on_progress: OnProgress | None = None,
-    period: float = 1.0,
-    start_ns: int = EPOCH_NS,
-    domain: int | None = None,
 ) -> Progress:
     """
-    Excite an arm, identify it online, and record it.
+    Excite an arm and record it, and identify it online where somebody learns.
 
-    Four nodes do it: excitation_publisher, simulated_arm, online_identifier and recorder. They
-    are heard on this machine only.
+    Three or four nodes do it: excitation_publisher, simulated_arm, recorder and, with an
+    identifier, online_identifier. They are heard on this machine only.
 
     Parameters
     ----------
@@ -113,24 +102,16 @@ def run_lockstep(
         The arm.
     excitation : Excitation
         What it shall do.
-    identifier : OnlineIdentifier
-        Learns.
     bag : Path
         Directory to record to; it must not exist.
-    topics : sequence of str
-        What to record, joint_states among it.
+    identifier : OnlineIdentifier, optional
+        Learns; without it, a run takes half of the time.
     rate : float
         Of joint_states [Hz].
     approach : float
         Time to get from where the arm stands to the start of the excitation [s].
     on_progress : callable, optional
-        Told how it is going.
-    period : float
-        How often [s of simulated time].
-    start_ns : int
-        Stamp of the beginning [ns].
-    domain : int, optional
-        ROS domain; by default that of ROS_DOMAIN_ID, or else one of its own.
+        Told every second of simulated time how it is going.
 
     Returns
     -------
@@ -143,66 +124,24 @@ def run_lockstep(
         If the bag exists, the arm refuses the excitation, or a node does not get its messages.
 
     """
-    with Stage(domain) as stage:
-        learner = stage.add(OnlineIdentifierNode, identifier)
-        recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
-        run = _Run(stage, arm, start_ns, rate, recorder, learner)
+    with Stage() as stage:
+        learner = None if identifier is None else stage.add(OnlineIdentifierNode, identifier)
+        topics = list(_TOPICS if learner is None else _TOPICS + _LEARNED)
+        recorder = stage.add(RecorderNode, bag=str(bag), topics=topics)
+        run = _Run(stage, arm, rate, recorder, learner)
         run.begin(excitation, approach)
-        watch = _Watch(learner, run.duration, on_progress, period)
+        watch = _Watch(run.duration, on_progress)
         while watch.t < watch.duration:
-            watch.see(run.step() - start_ns)
+            watch.see(run.step())
         return watch.progress()
-
-
-def record_lockstep(
-    arm: SimulatedArm,
-    excitation: Excitation,
-    bag: Path,
-    *,
-    topics: Sequence[str] = TOPICS[:3],
-    rate: float = 200.0,
-    approach: float = 3.0,
-    on_progress: Callable[[float], None] | None = None,
-    domain: int | None = None,
-) -> None:
-    """
-    Excite an arm and record it, with nobody who learns: in half of the time.
-
-    Three nodes do it: excitation_publisher, simulated_arm and recorder.
-
-    Parameters
-    ----------
-    arm, excitation, bag, topics, rate, approach, domain
-        As for `run_lockstep`.
-    on_progress : callable, optional
-        Told the share that is done.
-
-    Raises
-    ------
-    ArmidError
-        If the bag exists, the arm refuses the excitation, or a node does not get its messages.
-
-    """
-    with Stage(domain) as stage:
-        recorder = stage.add(RecorderNode, bag=str(bag), topics=list(topics))
-        run, t = _Run(stage, arm, EPOCH_NS, rate, recorder), 0.0
-        run.begin(excitation, approach)
-        while t < run.duration:
-            t = (run.step() - EPOCH_NS) * 1e-9
-            if on_progress is not None:
-                on_progress(min(t / run.duration, 1.0))
 
 
 def replay_lockstep(
     bag: Path,
     identifier: OnlineIdentifier,
     *,
-    topic: str = 'joint_states',
     duration: float,
-    tick: float = 0.002,
     on_progress: OnProgress | None = None,
-    period: float = 1.0,
-    domain: int | None = None,
 ) -> Progress:
     """
     Play a bag to an online identifier in lock step with /clock.
@@ -212,16 +151,12 @@ def replay_lockstep(
     Parameters
     ----------
     bag : Path
-        What was recorded.
+        What was recorded, with joint_states.
     identifier : OnlineIdentifier
         Learns.
-    topic : str
-        Name of the topic with the joint states in the bag.
     duration : float
         How much of it [s].
-    tick : float
-        Step of the clock [s].
-    on_progress, period, domain
+    on_progress : callable, optional
         As for `run_lockstep`.
 
     Returns
@@ -230,7 +165,8 @@ def replay_lockstep(
         At the end.
 
     """
-    with Stage(domain) as stage:
+    with Stage() as stage:
+        topic = 'joint_states'
         player = stage.add(
             BagPlayerNode, bag=str(bag), topics=[topic], subscriber_timeout=PATIENCE
         )
@@ -240,32 +176,32 @@ def replay_lockstep(
         stage.spin_until(
             lambda: clock.get_subscription_count() >= 2 and _matched(learner), full_topic
         )
-        watch = _Watch(learner, duration, on_progress, period)
-        step_ns, now = round(tick * 1e9), EPOCH_NS
+        watch, now = _Watch(duration, on_progress), EPOCH_NS
         while watch.t < duration and not player.finished:
-            now += step_ns
+            now += _TICK_NS
             clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
-            due = (now - EPOCH_NS - step_ns - 1) * 1e-9
+            due = (now - EPOCH_NS - _TICK_NS - 1) * 1e-9
             stage.spin_until(
                 lambda due=due: not player.waiting and player.position >= due, '/clock'
             )
             count = player.published[full_topic]
             stage.spin_until(lambda count=count: learner.received >= count, full_topic)
-            watch.see(now - EPOCH_NS)
+            watch.see(now)
         return watch.progress()
 
 
 class Stage:
-    """Nodes in one process, and the executor that runs them."""
-
-    def __init__(self, domain: int | None) -> None:
-        if domain is None and os.environ.get('ROS_DOMAIN_ID'):
-            domain = int(os.environ['ROS_DOMAIN_ID'])
-        self._scope = _scope(domain)
-        self._nodes: list[ArmidNode] = []
+    """Nodes in one process, and the executor that runs them; in the domain of ROS_DOMAIN_ID."""
 
     def __enter__(self) -> Stage:
-        self._context, self._executor = self._scope.__enter__()
+        domain = os.environ.get('ROS_DOMAIN_ID')
+        self._nodes: list[ArmidNode] = []
+        with ExitStack() as stack:
+            self._context = stack.enter_context(private_context(int(domain) if domain else None))
+            stack.enter_context(steady())
+            self._executor = make_executor('events', self._context)
+            stack.callback(self._executor.shutdown)
+            self._scope = stack.pop_all()
         return self
 
     def __exit__(self, *error: Any) -> None:
@@ -273,7 +209,7 @@ class Stage:
             node.close()
             self._executor.remove_node(node)
             node.destroy_node()
-        self._scope.__exit__(*error)
+        self._scope.close()
 
     def add(self, make: type[AnyNode], *core: Any, **parameters: Any) -> AnyNode:
         parameters = {'use_sim_time': True, **parameters}
@@ -308,15 +244,14 @@ class _Run:
         self,
         stage: Stage,
         arm: SimulatedArm,
-        start_ns: int,
         rate: float,
         recorder: RecorderNode,
-        learner: OnlineIdentifierNode | None = None,
+        learner: OnlineIdentifierNode | None,
     ) -> None:
         self._stage, self._recorder, self._learner = stage, recorder, learner
-        self._robot, self._start_ns = arm.plant.robot, start_ns
+        self._robot = arm.plant.robot
         self._plant = stage.add(
-            SimulatedArmNode, arm, start_ns, rate=rate, real_time_factor=0.0, use_sim_time=False
+            SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
         )
         self.duration = 0.0
 
@@ -334,7 +269,7 @@ class _Run:
             stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
         publisher.start()
         stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        self.duration = publisher.duration + (begun - self._start_ns) * 1e-9 + _REST
+        self.duration = publisher.duration + (begun - EPOCH_NS) * 1e-9 + _REST
 
     def _connected(self, publisher: ExcitationPublisherNode) -> bool:
         """Whether everybody hears everybody, and the clock."""
@@ -367,53 +302,25 @@ class _Run:
 
 
 class _Watch:
-    """Tells of the progress of a learner."""
+    """Tells how far a run is."""
 
-    def __init__(
-        self,
-        learner: OnlineIdentifierNode,
-        duration: float,
-        tell: OnProgress | None,
-        period: float,
-    ) -> None:
-        self._learner = learner
-        self._tell = tell
-        self._period = period
+    def __init__(self, duration: float, tell: OnProgress | None) -> None:
+        self._tell, self._due = tell, _PERIOD
         self._begun = time.monotonic()
-        self._due = period
-        self.duration = duration
-        self.t = 0.0
+        self.duration, self.t = duration, 0.0
 
-    def see(self, elapsed_ns: int) -> None:
-        self.t = elapsed_ns * 1e-9
+    def see(self, now_ns: int) -> None:
+        self.t = (now_ns - EPOCH_NS) * 1e-9
         if self.t >= self._due:
-            self._due += self._period
+            self._due += _PERIOD
             if self._tell is not None:
                 self._tell(self.progress())
 
     def progress(self) -> Progress:
-        identifier = self._learner.identifier
-        assert identifier is not None
-        return Progress(
-            t=self.t,
-            duration=self.duration,
-            estimate=identifier.estimate(),
-            samples=identifier.samples,
-            condition_number=identifier.condition_number,
-            real_time_factor=self.t / max(time.monotonic() - self._begun, 1e-9),
-        )
+        factor = self.t / max(time.monotonic() - self._begun, 1e-9)
+        return Progress(self.t, self.duration, factor)
 
 
 def _matched(learner: OnlineIdentifierNode) -> bool:
     learner.joint_states.match()
     return learner.joint_states.publishers > 0
-
-
-@contextmanager
-def _scope(domain: int | None) -> Iterator[tuple[Context, Executor]]:
-    with private_context(domain) as context, steady():
-        executor = make_executor('events', context)
-        try:
-            yield context, executor
-        finally:
-            executor.shutdown()

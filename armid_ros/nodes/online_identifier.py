@@ -24,7 +24,7 @@ from armid_ros.identification.online.identifier import (
 )
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
+from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.estimates import (
     change_status,
     estimate_message,
@@ -36,18 +36,15 @@ from armid_ros.nodes.messages.joint_states import (
     disturbance,
     DISTURBANCES,
     JointSample,
-    JointStateReader,
 )
-from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
     settings_of,
 )
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.nodes.qos import LATCHED, MatchedSubscription, STREAM
+from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.running.process import run
-from armid_ros.recording.message_types import header_stamp
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.publisher import Publisher
@@ -60,7 +57,7 @@ _FOLDER = 'online_identification'
 _TIMED = 2000
 
 
-class OnlineIdentifierNode(ArmidNode):
+class OnlineIdentifierNode(ListeningNode):
     """
     Estimates parameters from joint_states.
 
@@ -68,16 +65,8 @@ class OnlineIdentifierNode(ArmidNode):
     ----------
     identifier : OnlineIdentifier, or None
         None until a robot is known.
-    received : int
-        Joint states received.
-    last_stamp_ns : int
-        Stamp of the last one [ns].
     update_times : deque of float
         Processor time of the last updates [s].
-    freshness : Freshness
-        Whether joint states still come.
-    stamps : StampDifference
-        How far their stamps are from the clock.
 
     """
 
@@ -105,13 +94,7 @@ class OnlineIdentifierNode(ArmidNode):
         """Take the identifier; by default made from the parameters, once the robot is known."""
         super().__init__('online_identifier', **kwargs)
         self.identifier: OnlineIdentifier | None = None
-        self.received = 0
-        self.last_stamp_ns = 0
         self.update_times: deque[float] = deque(maxlen=_TIMED)
-        self.freshness = Freshness('joint states')
-        self.stamps = StampDifference(self.get_clock())
-        self._stopped = False
-        self._description: str | None = None
         self._published = -1
         self._disturbed: Counter[str] = Counter()
         if self.value('save_to'):  # said now, and not when all has been learned
@@ -120,25 +103,15 @@ class OnlineIdentifierNode(ArmidNode):
             identifier = make_identifier(self.value)
         if identifier is not None:
             self._begin(identifier)
-        else:
-            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
         self.create_subscription(String, 'model', self._on_model, LATCHED)
         self._estimates = self.create_publisher(ParameterEstimate, '~/estimate', LATCHED)
         self._changes = self.create_publisher(ParameterEstimate, '~/change', LATCHED)
         self._predictions = self.create_publisher(JointState, '~/predicted_joint_states', STREAM)
         self._residuals = self.create_publisher(JointState, '~/residual', STREAM)
-        self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self._on_joint_states, raw=True
-        )
+        self.listen()
         self.offer('~/reset', self.reset)
         self.offer('~/save', self.save)
         self.pace('estimate_rate', self.publish_estimate)
-        self.look_every(LOOK_PERIOD, self.look)
-
-    @property
-    def hardware(self) -> str:
-        """Name of the robot."""
-        return str(self.identifier.arm.robot.name) if self.identifier else ''
 
     def reset(self) -> str:
         """Forget everything that was learned."""
@@ -167,13 +140,6 @@ class OnlineIdentifierNode(ArmidNode):
                 said = f'what was learned is lost: {error}'
             print(said, file=sys.stderr)  # the log is closed when a signal ends the node
 
-    def look(self) -> None:
-        """Look at who publishes joint states, and say at once when they stop or come again."""
-        self.joint_states.match()
-        if self.freshness.stopped != self._stopped:
-            self._stopped = self.freshness.stopped
-            self.publish_diagnostics()
-
     def publish_estimate(self) -> None:
         """Publish the estimate if it has changed."""
         identifier = self.identifier
@@ -190,7 +156,7 @@ class OnlineIdentifierNode(ArmidNode):
         """Say how the identification goes."""
         identifier = self.identifier
         if identifier is None:
-            return 'waiting for robot_description', {'received': self.received}
+            return self.awaited, {'received': self.received}
         values: dict[str, object] = {
             'received': self.received,
             'missing': identifier.missing,
@@ -270,8 +236,8 @@ class OnlineIdentifierNode(ArmidNode):
         self._disturbed = counted
 
     def _trouble(self, identifier: OnlineIdentifier) -> str:
-        if not self.received:
-            return 'no joint states so far'
+        if self.awaited:
+            return self.awaited
         stopped = self.freshness.trouble()
         if stopped:
             fresh = self.complaints.latest if self.complaints.fresh else ''
@@ -284,11 +250,9 @@ class OnlineIdentifierNode(ArmidNode):
         learned = self._progress.look(self._last_sample, identifier.estimate())
         return '; '.join(filter(None, (too_little_motion(learned), differ)))
 
-    def _on_description(self, message: String) -> None:
-        if message.data == self._description:
-            return
-        self._begin(make_identifier(self.value, message.data))
-        self._description = message.data
+    def take_description(self, urdf: str) -> None:
+        """Identify the robot of robot_description."""
+        self._begin(make_identifier(self.value, urdf))
 
     def _on_model(self, message: String) -> None:
         """
@@ -307,17 +271,7 @@ class OnlineIdentifierNode(ArmidNode):
             rng = np.random.default_rng(0)
             self._adopt(OnlineIdentifier(arm, before.settings, rng=rng))
 
-    def _on_joint_states(self, data: bytes) -> None:
-        self.received += 1
-        self.freshness.heard()
-        self.last_stamp_ns = header_stamp(data)
-        self.stamps.take(self.last_stamp_ns)
-        if self.identifier is None:
-            return
-        for sample in self._reader.read_serialized(data):
-            self._take(sample)
-
-    def _take(self, sample: JointSample) -> None:
+    def take_sample(self, sample: JointSample) -> None:
         """Learn from the joint state of all joints."""
         identifier = self._require()
         begun = time.thread_time()
@@ -327,7 +281,7 @@ class OnlineIdentifierNode(ArmidNode):
             self._last_sample = learned.t
             self._squares += learned.residual**2
             self._counted += 1
-            self._last_sample_stamp = self._reader.stamp(learned.t).to_msg()
+            self._last_sample_stamp = self.reader.stamp(learned.t).to_msg()
             self._publish_effort(self._predictions, learned.predicted)
             self._publish_effort(self._residuals, learned.residual)
         for change in identifier.changes[self._told :]:
@@ -341,7 +295,7 @@ class OnlineIdentifierNode(ArmidNode):
         message = estimate_message(
             change.size, self._require().samples, self._require().condition_number
         )
-        message.header.stamp = self._reader.stamp(change.t).to_msg()
+        message.header.stamp = self.reader.stamp(change.t).to_msg()
         self._changes.publish(message)
 
     def _publish_effort(self, publisher: Publisher, effort: FloatArray) -> None:
@@ -356,10 +310,10 @@ class OnlineIdentifierNode(ArmidNode):
 
     def _adopt(self, identifier: OnlineIdentifier) -> None:
         robot = identifier.arm.robot
+        self.adopt(robot)
         self.identifier = identifier
         self._names = list(robot.joints)
-        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
-        self._last_sample_stamp = self._reader.stamp(0.0).to_msg()
+        self._last_sample_stamp = self.reader.stamp(0.0).to_msg()
         self._last_sample = 0.0
         self._told = len(identifier.changes)
         self._progress = LearningProgress(

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from functools import partial
 import os
@@ -23,12 +23,10 @@ from armid_ros.nodes.running.process import run
 from armid_ros.recording import BagWriter
 from armid_ros.recording.message_types import header_stamp
 
-OpenBag = Callable[[Path], BagWriter]
-
 #: How often what waits in memory is written out [s]; bounds what a kill loses.
-FLUSH_PERIOD = 0.1
+_FLUSH_PERIOD = 0.1
 #: How often the disk is looked at [s].
-WATCH_PERIOD = 1.0
+_WATCH_PERIOD = 1.0
 #: A disk that will be full within this time is warned of [s].
 _WARNED = 60.0
 #: Messages kept while simulated time has not begun.
@@ -41,6 +39,8 @@ class RecorderNode(ArmidNode):
 
     Attributes
     ----------
+    message_count : int
+        Messages in the bag, or in the last one when none is open.
     last_stamps : dict of str to int
         Header stamp of the last message of each topic that has one [ns].
 
@@ -88,25 +88,24 @@ class RecorderNode(ArmidNode):
         ),
     )
 
-    def __init__(self, open_bag: OpenBag | None = None, **kwargs: Any) -> None:
-        """Take what opens a bag; by default a BagWriter with the parameters of the node."""
+    def __init__(self, **kwargs: Any) -> None:
+        """Begin to record where the parameters ask for it."""
         super().__init__('recorder', **kwargs)
-        self._open_bag = open_bag or self._default_bag
         self._wanted = self._topics_wanted()
         self._writer: BagWriter | None = None
         self._subscriptions_by_topic: dict[str, MatchedSubscription] = {}
         self._refused: dict[str, Sequence[str]] = {}  # types of topics that are not recorded
         self._held: list[tuple[str, bool, bytes]] = []  # topic, whether it has stamps, message
         self._bags = 0
-        self._count = 0
+        self.message_count = 0
         self._begun = 0.0
         self._simulated = bool(self.value('use_sim_time'))
         self.last_stamps: dict[str, int] = {}
         self.offer('~/start', self.start)
         self.offer('~/stop', self.stop)
         self.look_every(LOOK_PERIOD, self.look)
-        self.look_every(FLUSH_PERIOD, self._flush)
-        self.look_every(WATCH_PERIOD, self.watch)
+        self.look_every(_FLUSH_PERIOD, self._flush)
+        self.look_every(_WATCH_PERIOD, self.watch)
         if self.value('record'):
             self.start()
 
@@ -114,11 +113,6 @@ class RecorderNode(ArmidNode):
     def recording(self) -> bool:
         """Whether a bag is open."""
         return self._writer is not None
-
-    @property
-    def message_count(self) -> int:
-        """Return the number of messages in the bag, or in the last one when none is open."""
-        return self._count
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -137,13 +131,15 @@ class RecorderNode(ArmidNode):
         while number and path.exists():
             path = path.with_name(f'{Path(name).name}_{number}')
             number += 1
-        self._writer = self._open_bag(path)
+        self._writer = BagWriter(
+            path, chunk_age=self.value('chunk_age'), compression=self.value('compression')
+        )
         self._bags += 1
-        self._count = 0
+        self.message_count = 0
         self._begun = time.monotonic()
         self.watch()
         self.look()
-        return self._tell(f'recording into {self._writer.path}')
+        return self.tell(f'recording into {self._writer.path}')
 
     def stop(self) -> str:
         """Complete the bag, and say where it is and how many messages it holds."""
@@ -158,7 +154,7 @@ class RecorderNode(ArmidNode):
             writer.close()
         except ArmidError as error:
             raise self._given_up(writer, str(error)) from error
-        return self._tell(f'{writer.path}: {self._count} messages')
+        return self.tell(f'{writer.path}: {self.message_count} messages')
 
     def look(self) -> None:
         """Subscribe to topics that have appeared, with the QoS of their publishers."""
@@ -195,7 +191,7 @@ class RecorderNode(ArmidNode):
         least = self.value('min_free') * 1e6
         if free < least:
             self._give_up(f'{writer.path}: {size_text(free)} are left on the disk')
-        rate = writer.size / max(time.monotonic() - self._begun, WATCH_PERIOD)
+        rate = writer.size / max(time.monotonic() - self._begun, _WATCH_PERIOD)
         if free - least < _WARNED * rate:
             self.complaints.say(
                 'disk', f'the disk of {writer.path} will be full in less than {_WARNED:.0f} s'
@@ -286,7 +282,7 @@ class RecorderNode(ArmidNode):
             writer.write(topic, data, now, sent or now)
         except RecordingError as error:
             self._give_up(str(error))
-        self._count += 1
+        self.message_count += 1
         self.last_stamps[topic] = sent
 
     def _flush(self) -> None:
@@ -316,16 +312,6 @@ class RecorderNode(ArmidNode):
         elif lacking:
             kept += f', without its index ({lacking}): `armid recover` makes it whole'
         return RecordingEnded(f'{reason}; recording ends: {kept}')
-
-    def _tell(self, text: str) -> str:
-        if self.context.ok():  # /rosout is gone once the process is told to end
-            self.get_logger().info(text)
-        return text
-
-    def _default_bag(self, path: Path) -> BagWriter:
-        return BagWriter(
-            path, chunk_age=self.value('chunk_age'), compression=self.value('compression')
-        )
 
 
 def main(args: Sequence[str] | None = None) -> None:

@@ -14,7 +14,7 @@ from armid_ros.errors import ArmidError, ModelError, TrajectoryError
 from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.arm import (
     ARM_PARAMETERS,
-    bare_arm,
+    described_arm,
     make_arm,
     SENSOR_PARAMETERS,
     sensors_of,
@@ -161,7 +161,7 @@ class SimulatedArmNode(ArmidNode):
         """
         super().__init__('simulated_arm', **kwargs)
         self._arm = arm or make_arm(self.value, self.get_logger().warn)
-        self._bare = bare_arm(self.value) if arm is None else None
+        self._bare = described_arm(self.value)[0] if arm is None else None
         self._dt_ns = round(self._arm.plant.dt * 1e9)
         self._stride = self._steps_at(self.value('rate'))
         self._follows = bool(self.value('use_sim_time'))
@@ -279,18 +279,6 @@ class SimulatedArmNode(ArmidNode):
         if self._owed and self._clock_publisher is None and not self.moving:
             self._origin_ns = (self._origin_ns or 0) + round(self._owed * 1e9)
             self._owed = 0.0
-
-    def follow_reference(self, reference: Reference) -> None:
-        """
-        Begin a trajectory now, as if it had come on joint_trajectory.
-
-        Raises
-        ------
-        TrajectoryError
-            If the arm cannot follow it.
-
-        """
-        self._arm.set_trajectory(reference.for_robot(self._arm.plant.robot))
 
     def reset(self) -> str:
         """Put the arm back to where it stood first; time goes on."""

@@ -108,10 +108,13 @@ def test_robots_and_effects_are_listed_for_people_and_programs():
     assert ROBOT in armid('robots').output
     listed = json.loads(armid('effects', '--json').output)
     assert [row['name'] for row in listed] == list(CATALOGUE)
-    lines = armid('effects').output.splitlines()
-    (line,) = (k for k, text in enumerate(lines) if text.startswith('stribeck_friction:'))
-    shown = ' '.join(lines[line : line + 5])
-    assert 'stribeck_torque [N m]' in shown and 'shape: stribeck_velocity [rad/s]' in shown
+    text = armid('effects').output
+    assert max(map(len, text.splitlines())) <= 80
+    for name, effect in CATALOGUE.items():
+        shown = text[text.index(f'{name}: ') :]
+        for one in (*effect.quantities, *effect.shapes):  # no name is broken
+            assert (f'{one.name} [{one.unit}]' if one.unit else one.name) in shown
+    assert 'shape: stribeck_velocity [rad/s]' in text
 
 
 def test_excite_simulate_identify_in_three_lines(tmp_path):

@@ -70,21 +70,15 @@ def test_nothing_can_be_written_or_planned_before_a_diagnosis(tmp_path):
         assert done.text == 'nothing has been diagnosed so far'
 
 
-def test_a_process_that_died_is_said():
+def test_a_process_that_died_is_said_and_another_takes_its_place(tmp_path):
     with working() as assistant:
+        before = assistant._process.pid
         assistant._process.kill()
         done = wait(assistant)
-        assert not done.success
-        assert 'has ended' in done.text
-
-
-def test_another_process_takes_the_place_of_one_that_died(tmp_path):
-    with working() as assistant:
-        before = assistant.pid
-        assistant._process.kill()
-        wait(assistant)
+        assert not done.success and 'has ended' in done.text
+        assert assistant.poll() is None  # it is said once
         assistant.ask(Save(tmp_path))
-        assert assistant.pid != before
+        assert assistant._process.pid != before
         assert wait(assistant).text == 'nothing has been diagnosed so far'
 
 
@@ -97,7 +91,7 @@ def test_a_job_that_fails_does_not_end_the_process():
 
 def test_the_process_ends_when_nobody_can_ask_it_any_more():
     with working() as assistant:
-        assistant._process.stdin.close()
+        assistant._pipe.close()
         assert assistant._process.wait(timeout=PATIENCE) == 0
 
 

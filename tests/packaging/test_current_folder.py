@@ -20,7 +20,8 @@ STARTS = {
         from armid_ros.live.assistant import Assistant, Plan
         assistant = Assistant()
         assistant.ask(Plan())
-        assert assistant._results.get(timeout=60).text == 'nothing has been diagnosed so far'
+        assert assistant._pipe.poll(60)
+        assert assistant.poll().text == 'nothing has been diagnosed so far'
         assistant.close()
         """,
     'the searches of excite': """

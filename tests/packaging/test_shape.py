@@ -17,7 +17,6 @@ MANY = {
     'api/excitation.py:design_excitation',
     'api/identification.py:identify',
     'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
-    'nodes/lockstep.py:run_lockstep',
 }
 
 #: Lines that a room of the package may have. A room that shrinks takes its number along: a budget

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.recorder import RecorderNode
-from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments
@@ -17,15 +16,10 @@ import numpy as np
 from sensor_msgs.msg import Imu, JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-SECOND = 10**9
+from tests.ros.test_simulated_arm import SECOND, still_arm
+
 ROBOT = load_robot('two_link_elastic')
 SIDES = ('joint_states', 'link/joint_states', 'reference/joint_states', 'link1/imu', 'link2/imu')
-
-
-def still_arm(bench, **parameters):
-    """Make an arm that moves only when the test steps it, from a stamp of 100 s on."""
-    parameters = {'real_time_factor': 0.0, **parameters}
-    return bench.add(lambda **kw: SimulatedArmNode(start_ns=100 * SECOND, **kw), **parameters)
 
 
 def trajectory(t, q, tau=None, *, at_rest=False, joints=ROBOT.joints):
@@ -66,8 +60,8 @@ def test_both_sides_are_published_with_one_stamp(bench):
 
 def test_a_bag_recorded_live_tells_the_springs(bench, tmp_path):
     arm = still_arm(
-        bench, robot='two_link_elastic', loop_gain=0.15, start='0,0', velocity_noise=[0.003],
-        acceleration_noise=0.08,
+        bench, robot='two_link_elastic', rate=1000.0, loop_gain=0.15, start='0,0',
+        velocity_noise=[0.003], acceleration_noise=0.08,
     )  # fmt: skip
     recorder = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=list(SIDES))
     publisher = bench.matched_publisher(JointTrajectory, 'joint_trajectory', LATCHED)

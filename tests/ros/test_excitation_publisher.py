@@ -495,13 +495,6 @@ def test_slowing_down_is_the_derivative_of_where_it_is(excitation):
     np.testing.assert_allclose(motion.ddq, numeric, atol=0.05)
 
 
-def test_a_file_is_loaded(bench, plans):
-    file = plans / 'slow' / 'excitation.yaml'
-    excitation = load_excitation(file)
-    node = bench.add(ExcitationPublisherNode, file=str(file), rate=50.0)
-    assert node.duration == pytest.approx(3.0 + excitation.sampled_duration(50.0))
-
-
 @pytest.mark.parametrize('speed', ['slow', 'fast'])
 def test_what_armid_excite_writes_is_run_as_its_bag_has_it(bench, arm, plans, robot, speed):
     planned = read_waypoints(plans / speed / 'trajectory', joints=robot.joints)

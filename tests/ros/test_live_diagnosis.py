@@ -15,18 +15,19 @@ from armid_ros.live.assistant import Done, Plan, Save
 from armid_ros.motion import Motion
 from armid_ros.nodes.live_diagnosis import LiveDiagnosisNode
 from armid_ros.nodes.qos import LATCHED
-from armid_ros.nodes.simulated_arm import SimulatedArmNode
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
 
 from tests.live.conftest import KNOWN, MORE_FRICTION, moving
 from tests.ros.controller import joint_state
+from tests.ros.test_simulated_arm import still_arm
 
 ROBOT = load_robot('humanoid_arm')
 RATE = 100.0
@@ -63,13 +64,8 @@ def set_effects(arm, *effects):
     return arm.set_parameters([Parameter('effects', value=list(effects) or [''])])[0]
 
 
-def simulated(bench, *effects, **parameters):
-    values = {'rate': RATE, 'real_time_factor': 0.0, 'torque_noise': [0.05], **parameters}
-    return bench.add(
-        lambda **kw: SimulatedArmNode(start_ns=10**11, **kw),
-        effects=list(effects) or [''],
-        **values,
-    )
+def simulated(bench, *effects):
+    return still_arm(bench, rate=RATE, torque_noise=[0.05], effects=list(effects) or [''])
 
 
 def move(bench, arm, duration):
@@ -166,7 +162,8 @@ def test_questions_wait_until_the_one_before_is_answered(bench, idle):
 
 
 def take(node, t, q, tau):
-    node.take_joint_states(joint_state(t, ROBOT.joints, [q] * 6, (), [tau] * 6))
+    message = joint_state(t, ROBOT.joints, [q] * 6, (), [tau] * 6)
+    node.take_joint_states(serialize_message(message))
 
 
 def status(bench, node):

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
@@ -101,24 +103,12 @@ def test_a_fixed_parameter_is_refused_another_value(bench):
 def test_a_rate_is_followed_from_the_moment_it_is_set(bench):
     """A timer that is told another period waits for the end of the one it has."""
     node = bench.add(OnlineIdentifierNode, robot='humanoid_arm', estimate_rate=0.1)
-    node.pace('estimate_rate', calls := Calls())
+    node.pace('estimate_rate', calls := Mock(__name__='calls'))
     bench.settle()
     assert node._paced['estimate_rate'][1].time_until_next_call() > 1e9
     node.set_parameters([Parameter('estimate_rate', value=1000.0)])
     assert node._paced['estimate_rate'][1].time_until_next_call() <= 1e6
-    bench.spin_until(lambda: calls.count > 3, 'calls')
-
-
-class Calls:
-    """Counts how often it is called."""
-
-    __name__ = 'calls'
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def __call__(self) -> None:
-        self.count += 1
+    bench.spin_until(lambda: calls.call_count > 3, 'calls')
 
 
 def identifier(settings: OnlineSettings | None = None) -> OnlineIdentifier:

@@ -9,7 +9,7 @@ from armid_ros.effects import make_effect, parse_effect
 from armid_ros.errors import ArmidError
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.nodes.lockstep import EPOCH_NS, record_lockstep, replay_lockstep, run_lockstep
+from armid_ros.nodes.lockstep import EPOCH_NS, replay_lockstep, run_lockstep
 from armid_ros.recording import read_recording, topics
 from armid_ros.robots import load_robot
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -49,22 +49,26 @@ def identifier(robot):
     return OnlineIdentifier(arm, rng=np.random.default_rng(0))
 
 
-def run(truth, robot, excitation, bag, **options):
+def run(truth, excitation, bag, learner=None, **options):
     rng = np.random.default_rng(2)
     arm = SimulatedArm(truth, rng=rng, sensors=Sensors(torque_noise=0.05))
-    return run_lockstep(arm, excitation, identifier(robot), bag, rate=RATE, **options)
+    return run_lockstep(arm, excitation, bag, learner, rate=RATE, **options)
 
 
 @pytest.fixture(scope='module')
 def first_run(truth, robot, excitation, tmp_path_factory):
-    """Return the bag, the result, and what was told on the way."""
-    bag, told = tmp_path_factory.mktemp('lockstep') / 'bag', []
-    result = run(truth, robot, excitation, bag, approach=APPROACH, on_progress=told.append)
-    return bag, result, told
+    """Return the bag, the result, what was learned, and time and estimate on the way."""
+    bag, told, learner = tmp_path_factory.mktemp('lockstep') / 'bag', [], identifier(robot)
+
+    def tell(now):
+        told.append((now.t, learner.estimate().values))
+
+    result = run(truth, excitation, bag, learner, approach=APPROACH, on_progress=tell)
+    return bag, result, learner, told
 
 
 def test_every_sample_is_recorded_on_time(first_run, robot, excitation):
-    bag, result, _ = first_run
+    bag, result, *_ = first_run
     recording = read_recording(bag, joints=robot.joints)
     assert recording.report.clean
     assert recording.start_ns == EPOCH_NS + round(1e9 / RATE)
@@ -84,52 +88,37 @@ def test_the_arm_is_where_the_excitation_is(first_run, robot, excitation):
     np.testing.assert_allclose(reached, wanted, atol=0.01)
 
 
-def test_the_estimate_converges_to_the_truth(first_run, robot, truth):
-    _, _, told = first_run
-    assert [round(p.t) for p in told] == list(range(1, len(told) + 1))
-    error = [
-        np.abs(p.estimate.values - identifier(robot).base.values(truth.theta)).max() for p in told
-    ]
+def test_the_estimate_converges_to_the_truth(first_run, truth):
+    *_, learner, told = first_run
+    assert [round(t) for t, _ in told] == list(range(1, len(told) + 1))
+    error = [np.abs(values - learner.base.values(truth.theta)).max() for _, values in told]
     assert error[-1] < 0.1 * error[0]
 
 
 def test_a_replay_learns_the_same(first_run, robot):
-    bag, result, _ = first_run
-    again = replay_lockstep(bag, identifier(robot), duration=result.t)
-    assert again.samples == result.samples
-    np.testing.assert_allclose(again.estimate.values, result.estimate.values, rtol=1e-9)
+    bag, result, learner, _ = first_run
+    again = identifier(robot)
+    replay_lockstep(bag, again, duration=result.t)
+    assert again.samples == learner.samples
+    np.testing.assert_allclose(again.estimate().values, learner.estimate().values, rtol=1e-9)
 
 
-@pytest.mark.long
-def test_a_run_that_nobody_learns_from_gives_the_same_samples(
-    first_run, truth, robot, excitation, tmp_path
+@pytest.mark.parametrize('learns', [True, False])
+def test_another_run_gives_the_same_samples_whether_somebody_learns_or_not(
+    first_run, truth, robot, excitation, tmp_path, learns
 ):
-    sensors = Sensors(torque_noise=0.05)
-    arm = SimulatedArm(truth, rng=np.random.default_rng(2), sensors=sensors)
-    told = []
-    asked = {'rate': RATE, 'approach': APPROACH, 'on_progress': told.append}
-    record_lockstep(arm, excitation, tmp_path / 'bag', **asked)
-    first, alone = (
-        read_recording(bag, joints=robot.joints) for bag in (first_run[0], tmp_path / 'bag')
-    )
-    np.testing.assert_array_equal(first.q, alone.q)
-    np.testing.assert_array_equal(first.tau, alone.tau)
-    assert told == sorted(told) and told[-1] == 1.0
-
-
-def test_another_run_gives_the_same_samples(first_run, truth, robot, excitation, tmp_path):
-    run(truth, robot, excitation, tmp_path / 'bag', approach=APPROACH)
+    learner = identifier(robot) if learns else None
+    run(truth, excitation, tmp_path / 'bag', learner, approach=APPROACH)
     first, second = (
         read_recording(bag, joints=robot.joints) for bag in (first_run[0], tmp_path / 'bag')
     )
-    np.testing.assert_array_equal(first.t, second.t)
-    np.testing.assert_array_equal(first.q, second.q)
-    np.testing.assert_array_equal(first.tau, second.tau)
+    for name in ('t', 'q', 'tau'):
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
 def test_an_excitation_that_the_arm_refuses_ends_the_run_with_its_reason(
     truth, robot, excitation, tmp_path
 ):
     with pytest.raises(ArmidError, match='velocity limit'):
-        run(truth, robot, excitation, tmp_path / 'bag', approach=0.1)
+        run(truth, excitation, tmp_path / 'bag', approach=0.1)
     assert len(read_recording(tmp_path / 'bag', joints=robot.joints)) > 0

@@ -100,6 +100,18 @@ def publish(bench, node, publisher, batch):
         bench.spin_until(lambda goal=goal: node.received >= goal, 'the joint states')
 
 
+def taught(bench, batch):
+    """Return a node that has taken joint states."""
+    node = identifying(bench)
+    publish(bench, node, bench.matched_publisher(JointState, 'joint_states'), batch)
+    return node
+
+
+def assert_learned(node, expected, rtol=1e-6, atol=1e-8):
+    found = node.identifier.estimate().values
+    np.testing.assert_allclose(found, expected.estimate().values, rtol=rtol, atol=atol)
+
+
 @pytest.fixture(scope='module')
 def expected(arm, samples):
     """Return what the core learns of the same samples."""
@@ -113,9 +125,7 @@ def expected(arm, samples):
 
 def test_the_estimate_is_that_of_the_core_and_the_truth(bench, arm, samples, expected):
     estimates = bench.listen(ParameterEstimate, 'online_identifier/estimate', LATCHED)
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
-    publish(bench, node, publisher, messages(arm, samples))
+    node = taught(bench, messages(arm, samples))
     node.publish_estimate()
     bench.spin_until(lambda: estimates and estimates[-1].samples == expected.samples)
     last = estimates[-1]
@@ -129,32 +139,24 @@ def test_the_estimate_is_that_of_the_core_and_the_truth(bench, arm, samples, exp
 
 
 def test_joints_are_matched_by_name_and_others_left_out(bench, arm, samples, expected):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     t, q, dq, tau = samples
     extra = np.full((len(t), 1), np.nan)
     shuffled = [
         message(('gripper', 'elbow', 'shoulder'), *sample)
         for sample in zip(t, *(np.hstack([extra, x[:, ::-1]]) for x in (q, dq, tau)), strict=True)
     ]
-    publish(bench, node, publisher, shuffled)
-    np.testing.assert_allclose(
-        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
-    )
+    node = taught(bench, shuffled)
+    assert_learned(node, expected)
 
 
 @pytest.mark.parametrize('columns', [slice(None), [1]], ids=['all', 'one'])
 def test_velocities_that_are_not_numbers_are_absent(bench, arm, samples, expected, columns):
     """The joint state broadcaster fills what has no state interface with NaN."""
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     t, q, dq, tau = samples
     dq = dq.copy()
     dq[:, columns] = np.nan
-    publish(bench, node, publisher, messages(arm, (t, q, dq, tau)))
-    np.testing.assert_allclose(
-        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
-    )
+    node = taught(bench, messages(arm, (t, q, dq, tau)))
+    assert_learned(node, expected)
     assert not node.complaints.latest
 
 
@@ -211,17 +213,13 @@ SPOILED = {
 
 def test_rubbish_is_said_once_and_costs_nothing(bench, arm, samples, expected):
     rosout, diagnostics = bench.rosout(), bench.diagnostics()
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     mixed, kinds = [], list(SPOILED)
     for k, good in enumerate(messages(arm, samples)):
         if k % 50 == 25:
             mixed.append(spoil(good, kinds[k // 50 % len(kinds)]))
         mixed.append(good)
-    publish(bench, node, publisher, mixed)
-    np.testing.assert_allclose(
-        node.identifier.estimate().values, expected.estimate().values, rtol=1e-6, atol=1e-8
-    )
+    node = taught(bench, mixed)
+    assert_learned(node, expected)
     bench.diagnose(node, diagnostics)
     for words in SPOILED.values():
         bench.spin_until(lambda words=words: any(words in m.msg for m in rosout), words)
@@ -280,9 +278,7 @@ def test_it_changes_its_qos_when_a_publisher_offers_less(bench, arm, samples):
 def test_predictions_and_residuals_add_up_to_the_torque(bench, arm, samples):
     predictions = bench.listen(JointState, 'online_identifier/predicted_joint_states')
     residuals = bench.listen(JointState, 'online_identifier/residual')
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
-    publish(bench, node, publisher, messages(arm, samples))
+    taught(bench, messages(arm, samples))
     bench.spin_until(lambda: len(predictions) == len(residuals) > 700)
     assert tuple(residuals[-1].name) == arm.robot.joints
     assert residuals[-1].header == predictions[-1].header
@@ -319,15 +315,11 @@ def test_a_model_leaves_the_effects_of_the_parameters(bench, arm, effects, expec
 @pytest.mark.long
 def test_a_jump_back_in_time_is_said_and_survived(bench, arm, samples, expected):
     diagnostics = bench.diagnostics()
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     batch = messages(arm, samples)
-    publish(bench, node, publisher, batch + batch)
+    node = taught(bench, batch + batch)
     bench.diagnose(node, diagnostics)
     assert any('jump' in d.status[0].message for d in diagnostics)
-    np.testing.assert_allclose(
-        node.identifier.estimate().values, expected.estimate().values, rtol=5e-2, atol=5e-3
-    )
+    assert_learned(node, expected, rtol=5e-2, atol=5e-3)
 
 
 @pytest.mark.parametrize('second', [True, False])
@@ -350,23 +342,19 @@ def test_who_contradict_each_other_are_named(bench, arm, samples, second):
 
 def test_messages_out_of_order_are_said_and_left_out(bench, arm, samples):
     diagnostics = bench.diagnostics()
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     batch = messages(arm, samples)[:200]
     batch[100], batch[101] = batch[101], batch[100]
     batch[150], batch[151] = batch[151], batch[150]
-    publish(bench, node, publisher, batch)
+    node = taught(bench, batch)
     bench.diagnose(node, diagnostics)
     assert any('stamp' in d.status[0].message for d in diagnostics)
     assert node.identifier.rejected['out_of_order'] == 2
 
 
 def test_messages_without_a_stamp_are_taken_at_the_clock(bench, arm, samples):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     unstamped = messages(arm, samples)[0]
     unstamped.header.stamp = Time()
-    publish(bench, node, publisher, [unstamped])
+    node = taught(bench, [unstamped])
     assert node.complaints.counts['stamp'] == 1
 
 
@@ -448,11 +436,9 @@ def test_joint_states_that_stop_are_stale_within_a_second(bench, arm, samples):
 
 
 def test_effort_that_is_not_filled_in_is_an_error_and_teaches_nothing(bench, arm, samples):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     t, q, dq, tau = samples
     batch = messages(arm, (t, q, dq, 0.0 * tau))
-    publish(bench, node, publisher, batch)
+    node = taught(bench, batch)
     state = statuses(bench, node)['state']
     assert state.level == DiagnosticStatus.ERROR
     assert 'effort' in state.message
@@ -460,10 +446,8 @@ def test_effort_that_is_not_filled_in_is_an_error_and_teaches_nothing(bench, arm
 
 
 def test_degrees_are_noticed(bench, arm, samples):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     t, q, dq, tau = samples
-    publish(bench, node, publisher, messages(arm, (t, np.degrees(q), np.degrees(dq), tau)))
+    node = taught(bench, messages(arm, (t, np.degrees(q), np.degrees(dq), tau)))
     state = statuses(bench, node)['state']
     assert state.level == DiagnosticStatus.ERROR
     assert 'degrees' in state.message and ' rad' in state.message
@@ -474,8 +458,6 @@ def test_degrees_are_noticed(bench, arm, samples):
 @pytest.mark.parametrize('late', [0.0, 0.002])
 def test_two_senders_with_half_of_the_joints_each_are_one_arm(bench, arm, samples, late):
     """The second one has stamps of its own, between those of the first."""
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     t, q, dq, tau = samples
     shifted = [[np.interp(t + late, t, x[:, 1])] for x in (q, dq, tau)]
     batch = []
@@ -483,33 +465,27 @@ def test_two_senders_with_half_of_the_joints_each_are_one_arm(bench, arm, sample
         one = (x[k, :1] for x in (q, dq, tau))
         other = (np.array([x[0][k]]) for x in shifted)
         batch += [message(['shoulder'], stamp, *one), message(['elbow'], stamp + late, *other)]
-    publish(bench, node, publisher, batch)
+    node = taught(bench, batch)
     truth = node.identifier.base.values(arm.theta)
     np.testing.assert_allclose(node.identifier.estimate().values, truth, rtol=3e-2, atol=5e-3)
     assert not node.complaints.counts
 
 
 def test_a_spike_is_said_with_the_joint_and_costs_nothing(bench, arm, samples, expected):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     t, q, dq, tau = samples
     spoiled = tau.copy()
     spoiled[600, 1] += 1000.0
-    publish(bench, node, publisher, messages(arm, (t, q, dq, spoiled)))
+    node = taught(bench, messages(arm, (t, q, dq, spoiled)))
     state = statuses(bench, node)['state']
     assert node.complaints.counts['spike'] == 1
     assert "effort of 'elbow'" in node.complaints.latest
     assert [v.value for v in state.values if v.key.startswith('left')] == ['1']
-    np.testing.assert_allclose(
-        node.identifier.estimate().values, expected.estimate().values, rtol=1e-3, atol=1e-4
-    )
+    assert_learned(node, expected, rtol=1e-3, atol=1e-4)
 
 
 def test_joint_states_that_never_came_are_counted_and_said(bench, arm, samples):
-    node = identifying(bench)
-    publisher = bench.matched_publisher(JointState, 'joint_states')
     batch = messages(arm, samples)
-    publish(bench, node, publisher, batch[:300] + batch[301:500] + batch[503:])
+    node = taught(bench, batch[:300] + batch[301:500] + batch[503:])
     state = statuses(bench, node)['state']
     assert {v.key: v.value for v in state.values}['missing'] == '4'
     assert 'missing' in node.complaints.latest
@@ -548,8 +524,7 @@ def statuses(bench, node):
 
 @pytest.mark.long
 def test_parameters_come_with_their_intervals(bench, arm):
-    node = identifying(bench)
-    publish(bench, node, bench.matched_publisher(JointState, 'joint_states'), moving(arm, 20.0))
+    node = taught(bench, moving(arm, 20.0))
     found = statuses(bench, node)['parameters']
     values = {v.key: float(v.value) for v in found.values}
     for joint in ('shoulder', 'elbow'):

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 import gc
 
 from armid_ros.nodes.lockstep import Stage
-from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import steady
 import numpy as np
 import pytest
@@ -36,6 +35,6 @@ def test_linear_algebra_has_one_thread_and_old_objects_are_not_looked_through(be
 
 
 def test_nodes_in_lock_step_are_steady(before):
-    with private_context() as context, Stage(context.get_domain_id()):
+    with Stage():
         assert all(threads()[path] == 1 for path in before)
     assert before.items() <= threads().items()

@@ -15,6 +15,7 @@ import click
 if TYPE_CHECKING:
     from armid_ros.api.identification import IdentificationResult
     from armid_ros.arm import ArmModel
+    from armid_ros.estimate import Estimate
     from armid_ros.identification.assess.agreement import Agreement
     from armid_ros.motion import FloatArray
     from armid_ros.nodes.lockstep import Progress
@@ -75,31 +76,30 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         identifier = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
         target = identifier.base.values(truth.theta)
         plant = SimulatedArm(truth, rng=rng, sensors=steps.SENSORS)
-        history: list[Progress] = []
+        history: list[tuple[float, Estimate]] = []
 
         def watch(now: Progress) -> None:
-            history.append(now)
+            history.append((now.t, identifier.estimate()))
             tick(now.t / now.duration)
 
-        end = run_lockstep(plant, excitation, identifier, bag, rate=rate, on_progress=watch)
+        end = run_lockstep(plant, excitation, bag, identifier, rate=rate, on_progress=watch)
         tick(0.0, 'playing the bag back')
-        replay = replay_lockstep(
-            bag,
-            OnlineIdentifier(nominal, rng=np.random.default_rng(seed)),
-            duration=end.duration,
-            on_progress=lambda now: tick(now.t / now.duration),
+        again = OnlineIdentifier(nominal, rng=np.random.default_rng(seed))
+        replay_lockstep(
+            bag, again, duration=end.duration, on_progress=lambda now: tick(now.t / now.duration)
         )
         tick(0.0, 'identifying offline')
         recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
         found = identify(nominal, recording, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
-    online = Agreement.of(end.estimate, target)
+    learned, replayed = identifier.estimate(), again.estimate()
+    online = Agreement.of(learned, target)
     document: dict[str, Any] = {
         **found.document(),
         'robot': steps.ROBOT,
         'truth': offline.document(),
         'online': online.document(),
-        'replay_difference': float(np.abs(replay.estimate.values - end.estimate.values).max()),
+        'replay_difference': float(np.abs(replayed.values - learned.values).max()),
         'real_time_factor': end.real_time_factor,
         'held_out': _held_out_error(found.arm, truth, rng),
     }
@@ -149,7 +149,10 @@ def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) ->
 
 
 def _page(
-    found: IdentificationResult, truth: ArmModel, history: list[Progress], target: FloatArray
+    found: IdentificationResult,
+    truth: ArmModel,
+    history: list[tuple[float, Estimate]],
+    target: FloatArray,
 ) -> str:
     """Return report.html, with the truth and the convergence of the online estimate."""
     from armid_ros.report.identification_report import Assessment, identification_report
@@ -157,11 +160,11 @@ def _page(
     import numpy as np
 
     convergence = convergence_section(
-        np.array([now.t for now in history]),
-        np.array([now.estimate.values for now in history]),
-        np.array([now.estimate.std for now in history]),
+        np.array([t for t, _ in history]),
+        np.array([estimate.values for _, estimate in history]),
+        np.array([estimate.std for _, estimate in history]),
         target,
-        history[-1].estimate.parameters,
+        history[-1][1].parameters,
     )
     return identification_report(
         found.core,

@@ -18,7 +18,7 @@ from armid_ros.errors import ModelError
 from armid_ros.excitation import Excitation, Limits, random_feasible
 from armid_ros.files import load_yaml, read_text, settled
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.lockstep import record_lockstep
+from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.recording import read_recording, Recording
 from armid_ros.report.notation import digits, pretty
 from armid_ros.robots import collision_model, Robot
@@ -166,16 +166,23 @@ def diagnose_hidden(
         Joint states per second.
 
     """
-    limits, bodies, recordings = Limits.of(known.robot), collision_model(known.robot), []
-    for name in _RUNS:
+    limits, bodies = Limits.of(known.robot), collision_model(known.robot)
+
+    def recorded(name: str) -> Recording:
         drawn = random_feasible(known, limits, _PERIOD, _HARMONICS, rng, collision=bodies)
         plant = SimulatedArm(changed, rng=rng, sensors=SENSORS)
         with progress(f'recording {name}') as tick:
-            record_lockstep(
-                plant, Excitation(drawn, 2, 1.0), out / name, rate=rate, on_progress=tick
+            run_lockstep(
+                plant,
+                Excitation(drawn, 2, 1.0),
+                out / name,
+                rate=rate,
+                on_progress=lambda now: tick(now.t / now.duration),
             )
         recording = read_recording(out / name, joints=known.robot.joints)
-        recordings.append(replace(recording, source=str(settled(out / name))))
+        return replace(recording, source=str(settled(out / name)))
+
+    recordings = [recorded(name) for name in _RUNS]
     with progress('diagnosing') as tick:
         found = diagnose(
             known,

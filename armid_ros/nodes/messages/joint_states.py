@@ -12,16 +12,11 @@ from armid_ros.errors import RecordingError
 from armid_ros.identification.samples.joint_merge import joint_places, JointMerger
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
-from armid_ros.recording.joint_state.message import (
-    JointStateMessages,
-    JointStateValues,
-    MalformedMessage,
-)
+from armid_ros.recording.joint_state.message import JointStateMessages, MalformedMessage
 import numpy as np
 import numpy.typing as npt
 from rclpy.clock import Clock
 from rclpy.time import Time
-from sensor_msgs.msg import JointState
 
 #: Messages that name some of the joints before it is said that the others do not come.
 _PATIENCE = 100
@@ -94,29 +89,16 @@ class JointStateReader:
         self._order: npt.NDArray[np.intp] | slice = slice(None)
         self._epoch: int | None = None
 
-    def read(self, message: JointState) -> list[JointSample]:
+    def read(self, data: bytes) -> list[JointSample]:
         """
-        Return the samples of all joints that a message completes.
+        Return the samples of all joints that a message completes, as it came, serialised.
 
         One as a rule; none when it cannot be used. Messages that name some of the joints are put
         together with those of other senders.
 
         """
-        stamp, fields = message.header.stamp, (message.position, message.velocity, message.effort)
-        values = (np.array(field, dtype=np.float64) for field in fields)
-        return self._read(JointStateValues(stamp.sec, stamp.nanosec, tuple(message.name), *values))
-
-    def read_serialized(self, data: bytes) -> list[JointSample]:
-        """Return the same of a message as it came, which takes a third of the time."""
         try:
-            values = self._messages.read(data)
-        except MalformedMessage as error:
-            self._complaints.say('joint_states', str(error))
-            return []
-        return self._read(values)
-
-    def _read(self, message: JointStateValues) -> list[JointSample]:
-        try:
+            message = self._messages.read(data)
             if message.names is not self._names and message.names != self._names:
                 self._match(message.names)
             self._names = message.names
@@ -128,7 +110,7 @@ class JointStateReader:
                 # a broadcaster fills the velocities of a hardware that has none with NaN
                 dq = dq if math.isfinite(np.add.reduce(dq)) else None
             tau = self._values(message.names, message.effort, 'effort')
-        except RecordingError as error:
+        except (MalformedMessage, RecordingError) as error:
             self._complaints.say('joint_states', str(error))
             return []
         if self._merger is None:

@@ -85,13 +85,6 @@ class StampDifference:
         self._late = (now - stamp_ns) * 1e-9 if stamp_ns and now else 0.0
         self._recent.append(self._late)
 
-    def fault(self, topic: str, allowed: float) -> str:
-        """Say that the last stamp is further from the clock than is allowed [s]; empty: not."""
-        if abs(self._late) <= allowed:
-            return ''
-        size = f'{abs(self._late):.0f}' if abs(self._late) >= 10.0 else f'{abs(self._late):.2f}'
-        return f'stamps of {topic} are {size} s {self._side(self._late)}'
-
     def of_start(self, topic: str, allowed: float, simulated: bool) -> str:
         """
         Return why a trajectory that is stamped with the time of the node must not be sent.
@@ -126,10 +119,10 @@ class StampDifference:
 
     def of_results(self, topic: str) -> str:
         """Say what follows for results, which carry the stamps of what they were made of."""
-        fault = self.fault(topic, SHOWN)
-        if not fault:
+        if abs(self._late) <= SHOWN:
             return ''
         return (
-            f'{fault}, and so are those of what is made of them: set the clocks, or use_sim_time '
-            'on all nodes or on none'
+            f'stamps of {topic} are {abs(self._late):.0f} s {self._side(self._late)}, and so are '
+            'those of what is made of them: set the clocks, or use_sim_time on all nodes or on '
+            'none'
         )

@@ -6,14 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
 from armid_ros.effects import parse_effect
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
@@ -24,8 +23,6 @@ from armid_ros.simulation.elastic.setup import (
     shipped_arm,
 )
 import numpy as np
-
-Values = Callable[[str], Any]
 
 ARM_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
@@ -109,7 +106,7 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
         If robot, model, effects or sensors are not valid or do not fit each other.
 
     """
-    arm, drives = _described(value)
+    arm, drives = described_arm(value)
     arm = with_effects(arm, value('effects'))
     n, dt = arm.robot.n_joints, value('time_step')
     rng = np.random.default_rng(value('seed'))
@@ -152,11 +149,6 @@ def sensors_of(value: Values, n_joints: int) -> Sensors:
     )
 
 
-def bare_arm(value: Values) -> ArmModel:
-    """Return the arm that parameters describe, but for the parameter `effects`."""
-    return _described(value)[0]
-
-
 def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
     """
     Return an arm with effects.
@@ -179,7 +171,8 @@ def with_effects(arm: ArmModel, texts: Iterable[str]) -> ArmModel:
     return arm
 
 
-def _described(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
+def described_arm(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
+    """Return the arm that parameters describe, but for `effects`, and its drives if shipped."""
     gravity, drives = value('gravity'), None
     if value('model'):
         arm = load_model(value('model'))

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
@@ -27,16 +25,20 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
-from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.robots import CollisionModel, load_arms, load_robot, Robot
+from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.robots import CollisionModel, load_arms, load_robot
 import numpy as np
-
-Values = Callable[[str], Any]
 
 #: Samples of a period that a design looks at, and how many a harmonic needs.
 _SAMPLES, _PER_HARMONIC = 100, 8
 
-EXCITATION_PARAMETERS = (
+SIMULATION = NodeParameter(
+    'simulation',
+    False,
+    'The arm is simulated: by default it begins by itself, and fast. So it is with use_sim_time.',
+)
+#: All parameters of the excitation publisher.
+PUBLISHER_PARAMETERS = (
     NodeParameter('robot', 'humanoid_arm', 'A shipped robot, or the path of a URDF or xacro.'),
     NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
     NodeParameter(
@@ -94,22 +96,6 @@ EXCITATION_PARAMETERS = (
         lower=0,
         upper=2**62,
     ),
-)
-
-
-SIMULATION = NodeParameter(
-    'simulation',
-    False,
-    'The arm is simulated: by default it begins by itself, and fast. So it is with use_sim_time.',
-)
-START = NodeParameter(
-    'start',
-    False,
-    'Begin without ~/start, as soon as joint states arrive and a controller subscribes; true by '
-    'default in a simulation only.',
-)
-
-INTERFACE_PARAMETERS = (
     NodeParameter(
         'interface',
         'auto',
@@ -143,10 +129,6 @@ INTERFACE_PARAMETERS = (
         upper=60.0,
         read_only=False,
     ),
-)
-
-RUN_PARAMETERS = (
-    *INTERFACE_PARAMETERS,
     NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
     NodeParameter(
         'approach',
@@ -190,7 +172,12 @@ RUN_PARAMETERS = (
         read_only=False,
     ),
     SIMULATION,
-    START,
+    NodeParameter(
+        'start',
+        False,
+        'Begin without ~/start, as soon as joint states arrive and a controller subscribes; true '
+        'by default in a simulation only.',
+    ),
     NodeParameter(
         'tracking_tolerance',
         0.2,
@@ -230,9 +217,6 @@ RUN_PARAMETERS = (
     ),
 )
 
-#: All parameters of the excitation publisher.
-PUBLISHER_PARAMETERS = (*EXCITATION_PARAMETERS, *RUN_PARAMETERS)
-
 
 @dataclass(frozen=True)
 class Surroundings:
@@ -241,8 +225,6 @@ class Surroundings:
 
     Attributes
     ----------
-    robot : Robot
-        The arm.
     bodies : CollisionModel
         Its bodies, and what stands around it, the floor among it.
     planner : TransferPlanner
@@ -252,7 +234,6 @@ class Surroundings:
 
     """
 
-    robot: Robot
     bodies: CollisionModel
     planner: TransferPlanner
     unchecked: tuple[str, ...]
@@ -265,7 +246,7 @@ def make_surroundings(value: Values) -> Surroundings:
     Parameters
     ----------
     value : callable
-        Returns the value of a parameter of `EXCITATION_PARAMETERS`.
+        Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
 
     Raises
     ------
@@ -289,7 +270,7 @@ def make_surroundings(value: Values) -> Surroundings:
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
-    return Surroundings(arm.robot, bodies, planner, unchecked)
+    return Surroundings(bodies, planner, unchecked)
 
 
 def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
@@ -299,7 +280,7 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     Parameters
     ----------
     value : callable
-        Returns the value of a parameter of `EXCITATION_PARAMETERS`.
+        Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
     rate : float
         Samples per second at which it will be sent [Hz].
     surroundings : Surroundings
@@ -311,14 +292,13 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         If there is no such file, or the excitation does not keep the limits or hits something.
 
     """
-    robot = surroundings.robot
     if value('file'):
         return checked(load_excitation(value('file')), surroundings.planner, value('file'))
     arm = surroundings.planner.arm
     own = {effect.name for effect in arm.effects}
     for name in filter(None, value('effects')):
         if name not in own:
-            arm = arm.with_effect(make_effect(name, robot))
+            arm = arm.with_effect(make_effect(name, arm.robot))
     periods, run_in = value('n_periods'), value('run_in')
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),

@@ -4,18 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import load_robot, parse_gravity, Robot, robot_from_urdf
 import numpy as np
-
-Values = Callable[[str], Any]
 
 #: Parameters of nodes that learn of the robot on robot_description, where none is named.
 ROBOT_PARAMETERS = (

@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from armid_ros.api.arguments import read_recording
 from armid_ros.arm import ArmModel, load_misfit, load_model
@@ -15,9 +13,7 @@ from armid_ros.effects import parse_effect
 from armid_ros.errors import ModelError
 from armid_ros.live import LiveDiagnosis, LiveSettings
 from armid_ros.nodes.parameters.identifier import robot_of, ROBOT_PARAMETERS
-from armid_ros.nodes.parameters.table import NodeParameter
-
-Values = Callable[[str], Any]
+from armid_ros.nodes.parameters.table import NodeParameter, Values
 
 #: Parameters that are fields of LiveSettings; they can be set while the node runs.
 LIVE_SETTINGS = (

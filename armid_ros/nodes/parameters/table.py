@@ -31,6 +31,8 @@ from rclpy.parameter import Parameter
 _ROS = ('use_sim_time', 'start_type_description_service')
 
 Value = bool | int | float | str | list[str] | list[float]
+#: Returns the value of a parameter by its name.
+Values = Callable[[str], Any]
 
 
 @dataclass(frozen=True)

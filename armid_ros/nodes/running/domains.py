@@ -35,26 +35,19 @@ def private_context(domain: int | None = None) -> Iterator[Context]:
     """
     with reserved_domain() if domain is None else nullcontext(domain) as chosen:
         context = Context()
-        with _localhost_only():
+        # rmw reads the range when a context is made; there is no argument for it
+        before = os.environ.get(_RANGE)
+        os.environ[_RANGE] = 'LOCALHOST'
+        try:
             context.init(args=[], domain_id=chosen)
+        finally:
+            del os.environ[_RANGE]
+            if before is not None:
+                os.environ[_RANGE] = before
         try:
             yield context
         finally:
             context.try_shutdown()
-
-
-@contextmanager
-def _localhost_only() -> Iterator[None]:
-    # rmw reads it when a context is made; there is no argument for it
-    before = os.environ.get(_RANGE)
-    os.environ[_RANGE] = 'LOCALHOST'
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[_RANGE]
-        else:
-            os.environ[_RANGE] = before
 
 
 @contextmanager

@@ -10,10 +10,10 @@ from typing import Any
 
 from armid_msgs.msg import Diagnosis
 from armid_ros.motion import FloatArray
-from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.listening import ListeningNode
+from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.nodes.qos import DEPTH, LATCHED, MatchedSubscription, STREAM
+from armid_ros.nodes.qos import DEPTH, LATCHED, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 from armid_ros.view.scene import joint_axes, joint_frames
@@ -21,11 +21,9 @@ from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import ColorRGBA, String
+from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-#: How often publishers of joint states are looked for [s].
-_LOOK_PERIOD = 0.1
 #: Markers that are not drawn anew vanish after this [s].
 _LIFETIME = 2
 #: Residuals and torques are averaged over so much time (mean square) [s].
@@ -36,7 +34,7 @@ _ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
 _LINE = 60
 
 
-class ResidualMarkersNode(ArmidNode):
+class ResidualMarkersNode(ListeningNode):
     """
     Draws the residual of the online identifier on the joints, for RViz and Foxglove.
 
@@ -67,40 +65,34 @@ class ResidualMarkersNode(ArmidNode):
     def __init__(self, **kwargs: Any) -> None:
         """Take the keyword arguments of rclpy's Node."""
         super().__init__('residual_markers', **kwargs)
-        self._robot: Robot | None = None
         self._told = ''
         self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)
         if self.value('robot'):
-            self._adopt(load_robot(self.value('robot'), joints=self._joints()))
-        else:
-            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
-        self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self._on_joint_states
-        )
+            self._draw_on(load_robot(self.value('robot'), joints=self._joints()))
+        self.listen()
         self.create_subscription(
             JointState, 'online_identifier/residual', self._on_residual, DEPTH
         )
         self.create_subscription(
             Diagnosis, 'live_diagnosis/diagnosis', self._on_diagnosis, LATCHED
         )
-        self.look_every(_LOOK_PERIOD, self.joint_states.match)
         self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say what is drawn, and what is missing."""
-        if self._robot is None:
-            return 'waiting for robot_description', {}
+        if self.robot is None:
+            return self.awaited, {}
         if not np.isfinite(self._q).all():
             return 'no joint states so far', {}
-        shares = zip(self._robot.joints, self._shares(), strict=True)
+        shares = zip(self.robot.joints, self._shares(), strict=True)
         return '', {f'residual share {joint}': float(share) for joint, share in shares}
 
     def draw(self) -> None:
         """Publish the markers of the arm as it is now."""
-        if self._robot is None or not np.isfinite(self._q).all():
+        if self.robot is None or not np.isfinite(self._q).all():
             return
         stamp = self.get_clock().now().to_msg()
-        markers = [*self._of_joints(self._robot), *self._of_diagnosis(self._robot)]
+        markers = [*self._of_joints(self.robot), *self._of_diagnosis(self.robot)]
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.header.stamp = self._frame, stamp
             marker.id = number
@@ -153,14 +145,14 @@ class ResidualMarkersNode(ArmidNode):
     def _joints(self) -> tuple[str, ...] | None:
         return tuple(filter(None, self.value('joints'))) or None
 
-    def _on_description(self, message: String) -> None:
-        self._adopt(robot_from_urdf(message.data, joints=self._joints()))
+    def take_description(self, urdf: str) -> None:
+        """Draw on the robot of robot_description."""
+        self._draw_on(robot_from_urdf(urdf, joints=self._joints()))
 
-    def _adopt(self, robot: Robot) -> None:
+    def _draw_on(self, robot: Robot) -> None:
         n = robot.n_joints
-        self._robot = robot
+        self.adopt(robot)
         self._frame = self.value('frame') or robot.base
-        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
         self._q, self._now = np.full(n, np.nan), np.zeros(n)
         self._residual, self._torque = np.zeros(n), np.zeros(n)
         self._seen = {'residual': 0.0, 'torque': 0.0}
@@ -168,15 +160,13 @@ class ResidualMarkersNode(ArmidNode):
         steps = np.diff(np.vstack([np.zeros(3), places[0]]), axis=0)
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
 
-    def _on_joint_states(self, message: JointState) -> None:
-        if self._robot is None:
-            return
-        for sample in self._reader.read(message):
-            self._q = sample.q
-            self._torque = self._averaged('torque', sample.t, self._torque, sample.tau)
+    def take_sample(self, sample: JointSample) -> None:
+        """Take a joint state, where the arm is drawn and what its torque is."""
+        self._q = sample.q
+        self._torque = self._averaged('torque', sample.t, self._torque, sample.tau)
 
     def _on_residual(self, message: JointState) -> None:
-        if self._robot is None or tuple(message.name) != self._robot.joints:
+        if self.robot is None or tuple(message.name) != self.robot.joints:
             return
         stamp = message.header.stamp
         self._now = np.array(message.effort)

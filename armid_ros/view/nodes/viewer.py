@@ -8,24 +8,19 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from armid_ros.errors import ArmidError
-from armid_ros.nodes.base import ArmidNode
-from armid_ros.nodes.messages.joint_states import JointStateReader
+from armid_ros.nodes.listening import ListeningNode
+from armid_ros.nodes.messages.joint_states import JointSample
 from armid_ros.nodes.parameters.table import NodeParameter
-from armid_ros.nodes.qos import DEPTH, LATCHED, MatchedSubscription
+from armid_ros.nodes.qos import DEPTH
 from armid_ros.nodes.running.process import run
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
 from armid_ros.view.live import LiveLog
 from armid_ros.view.rerun_log import open_stream
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
-
-#: How often publishers of joint states are looked for [s].
-_LOOK_PERIOD = 0.1
 
 
-class ViewerNode(ArmidNode):
+class ViewerNode(ListeningNode):
     """
     Shows an arm while it moves.
 
@@ -33,8 +28,6 @@ class ViewerNode(ArmidNode):
     ----------
     log : LiveLog, or None
         None until a robot is known.
-    received : int
-        Joint states received.
 
     """
 
@@ -49,27 +42,18 @@ class ViewerNode(ArmidNode):
         """Take the stream to log to; by default a window or a file, as the parameters say."""
         super().__init__('viewer', **kwargs)
         self.log: LiveLog | None = None
-        self.received = 0
         self._stream = stream
         if self.value('robot'):
-            self._adopt(load_robot(self.value('robot'), joints=self._joints()))
-        else:
-            self.create_subscription(String, 'robot_description', self._on_description, LATCHED)
-        self.joint_states = MatchedSubscription(
-            self, JointState, 'joint_states', self._on_joint_states
-        )
+            self._show(load_robot(self.value('robot'), joints=self._joints()))
+        self.listen()
         for topic, kind in (('predicted_joint_states', 'predicted'), ('residual', 'residual')):
             self.create_subscription(
                 JointState, f'online_identifier/{topic}', self._on_effort(kind), DEPTH
             )
-        self.look_every(_LOOK_PERIOD, self.joint_states.match)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say what is shown."""
-        waiting = '' if self.log else 'waiting for robot_description'
-        return waiting or ('' if self.received else 'no joint states so far'), {
-            'received': self.received
-        }
+        return self.awaited, {'received': self.received}
 
     def close(self) -> None:
         """Write what is not written yet."""
@@ -79,23 +63,19 @@ class ViewerNode(ArmidNode):
     def _joints(self) -> tuple[str, ...] | None:
         return tuple(filter(None, self.value('joints'))) or None
 
-    def _on_description(self, message: String) -> None:
-        if self.log is not None:
-            return
-        try:
-            self._adopt(robot_from_urdf(message.data, joints=self._joints()))
-        except ArmidError as error:
-            self.complaints.say('robot_description', str(error))
+    def take_description(self, urdf: str) -> None:
+        """Show the robot of the first description."""
+        if self.log is None:
+            self._show(robot_from_urdf(urdf, joints=self._joints()))
 
-    def _on_joint_states(self, message: JointState) -> None:
-        self.received += 1
+    def take_sample(self, sample: JointSample) -> None:
+        """Show a joint state."""
         if self.log is not None:
-            for sample in self._reader.read(message):
-                self.log.measured(*sample)
+            self.log.measured(*sample)
 
     def _on_effort(self, kind: str) -> Callable[[JointState], None]:
         def take(message: JointState) -> None:
-            if self.log is None or tuple(message.name) != self._robot.joints:
+            if self.log is None or self.robot is None or message.name != list(self.robot.joints):
                 return
             show = self.log.predicted if kind == 'predicted' else self.log.residual
             show(self._time(message), np.array(message.effort))
@@ -105,14 +85,13 @@ class ViewerNode(ArmidNode):
     def _time(self, message: JointState) -> float:
         """Return the time of a message as the joint states count it [s]."""
         stamp = message.header.stamp
-        zero = self._reader.stamp(0.0).nanoseconds
+        zero = self.reader.stamp(0.0).nanoseconds
         return 1e-9 * (stamp.sec * 10**9 + stamp.nanosec - zero)
 
-    def _adopt(self, robot: Robot) -> None:
+    def _show(self, robot: Robot) -> None:
         out = Path(self.value('out')) if self.value('out') else None
         stream = self._stream or open_stream(robot.name, out)
-        self._robot = robot
-        self._reader = JointStateReader(robot.joints, self.complaints, self.get_clock())
+        self.adopt(robot)
         self.log = LiveLog(robot, stream, tuple(filter(None, self.value('mark'))))
         for note in self.log.notes:
             self.get_logger().warning(note)
