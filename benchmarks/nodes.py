@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The nodes at speed: what is lost at 1 kHz, update times, lock step; kills: benchmarks.endurance.
+The nodes at speed: what is lost at 1 kHz, update times, memory; kills: benchmarks.endurance.
 
 ``python -m benchmarks.nodes [--seconds 60]``; the identifier runs in this process, the arm and the
 recorder in theirs. Losses are to be measured on an otherwise idle machine.
@@ -23,16 +23,12 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.excitation import Excitation, Limits, random_feasible, save_excitation
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.nodes.online_identifier import OnlineIdentifierNode
 from armid_ros.nodes.running.domains import private_context
 from armid_ros.nodes.running.process import make_executor, steady
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
-from armid_ros.simulation import Reference, SimulatedArm
 import numpy as np
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
 
 from benchmarks.real_recordings import example_robot
 
@@ -156,83 +152,13 @@ def at_one_kilohertz(seconds, folder):
     )
 
 
-def bare_round_trip(steps=4000):
-    """Return the processor time of a message to a node and its answer, with nothing done [s]."""
-    with private_context() as context:
-        executor = make_executor('events', context)
-        plant, other = (
-            Node(name, context=context, use_global_arguments=False)
-            for name in ('plant', 'controller')
-        )
-        states = plant.create_publisher(JointState, 'joint_states', 10)
-        commands = other.create_publisher(JointState, 'commands', 10)
-        heard = []
-        other.create_subscription(JointState, 'joint_states', commands.publish, 10)
-        plant.create_subscription(JointState, 'commands', heard.append, 10)
-        message = JointState(name=[f'joint{k}' for k in range(6)])
-        message.position = message.velocity = message.effort = [0.1] * 6
-        for node in (plant, other):
-            executor.add_node(node)
-        while not (states.get_subscription_count() and commands.get_subscription_count()):
-            executor.spin_once(timeout_sec=0.1)
-        begun = time.process_time()
-        for _ in range(steps):
-            heard.clear()
-            states.publish(message)
-            while not heard:
-                executor.spin_once(timeout_sec=0.1)
-        used = time.process_time() - begun
-        executor.shutdown()
-    return used / steps
-
-
-def in_lock_step(rate, folder):
-    """
-    Print how much faster than real time the nodes are together.
-
-    By the clock, which other processes slow down, and by processor time, which is what an idle
-    machine needs; beside it what the simulator and a bare round trip of messages need.
-
-    """
-    robot = load_robot('humanoid_arm', gravity='moon')
-    arm, run = with_friction(robot), short_run(robot, 10.0, 1)
-    rng = np.random.default_rng(0)
-    plant = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
-    alone = SimulatedArm(arm, rng=rng, start=run.at([0.0]).q[0])
-    alone.set_trajectory(Reference.of(run.motion(100.0)))
-    begun = time.process_time()
-    for _ in range(1000):
-        alone.advance(10)
-    simulator = 10.0 / (time.process_time() - begun)
-    identifier, used = OnlineIdentifier(arm, rng=rng), []
-
-    def tell(_):
-        used.append(time.process_time())
-
-    end = run_lockstep(
-        plant, run, identifier, folder / f'bag_{rate:.0f}', rate=rate, on_progress=tell
-    )
-    by_processor = 1.0 / np.diff(used)
-    bare = 1.0 / (rate * bare_round_trip())
-    wanted = 8 if rate <= 200.0 else 5
-    print(
-        f'lock step, joint_states at {rate:5.0f} Hz   {end.real_time_factor:.1f} x real time; '
-        f'by processor time {np.median(by_processor):.1f}, in the best second '
-        f'{by_processor.max():.1f} (wanted: {wanted}; the simulator alone {simulator:.1f}, '
-        f'a bare round trip {bare:.0f})'
-    )
-
-
 def main():
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seconds', type=float, default=60.0, help='at 1 kHz')
     seconds = parser.parse_args().seconds
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        at_one_kilohertz(seconds, folder)
-        for rate in (200.0, 500.0, 1000.0):
-            in_lock_step(rate, folder)
+        at_one_kilohertz(seconds, Path(name))
 
 
 if __name__ == '__main__':
