@@ -17,13 +17,7 @@ from urllib.parse import quote
 from armid_ros.changes.histories import HistoryChange
 from armid_ros.changes.scatter import ParameterHistory
 from armid_ros.fleet.bags import BagFile, DAY_NS, file_name, folder_of
-from armid_ros.fleet.sections import (
-    Curve,
-    drawing,
-    fleet_table,
-    link,
-    ParameterCurves,
-)
+from armid_ros.fleet.sections import drawing, fleet_table, link
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import (
     change_rows,
@@ -34,6 +28,7 @@ from armid_ros.fleet.watch import (
     wear_rows,
 )
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.report.blocks import ContentSection, Paragraph, SmallMultiples
 from armid_ros.report.notation import counted, digits, with_interval
 from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.frame import VerdictSection
@@ -125,7 +120,12 @@ def _arm_page(found: Watch, arm: WatchedArm, reports: set[str], diagnoses: Diagn
     order = {change.series.parameter: k for k, change in enumerate(arm.named)}
     shown = [one for one in arm.series if len(one.values)]
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
-    sections.append(ParameterCurves([_curve(arm, one) for one in shown]))
+    said = (
+        'Every point is a bag with its 95 % interval; it leads to the bag below. The range is '
+        'that of the ordinate.'
+    )
+    curves = SmallMultiples([_curve(arm, one) for one in shown])
+    sections.append(ContentSection('Parameters over time', [curves, Paragraph(said, 'hint')]))
     rows = []
     for row in wear_rows(found, arm):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
@@ -207,7 +207,7 @@ def _cut(series: ParameterHistory, named: Sequence[HistoryChange]) -> int:
     return next((one.index for one in named if one.series.parameter == series.parameter), 0)
 
 
-def _curve(arm: WatchedArm, series: ParameterHistory) -> Curve:
+def _curve(arm: WatchedArm, series: ParameterHistory) -> tuple[str, str, Markup, str]:
     links = []
     for day in series.days:
         nearest = min(arm.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
@@ -216,7 +216,7 @@ def _curve(arm: WatchedArm, series: ParameterHistory) -> Curve:
     svg, ends = drawing(series.days, series.values, series.std, cut, links)
     shown = f'{digits(ends[0], 3)} to {digits(ends[1], 3)} {series.unit}'.rstrip()
     changed = any(one.series.parameter == series.parameter for one in arm.named)
-    return Curve(parameter_label(*series.parameter), shown, svg, changed)
+    return parameter_label(*series.parameter), shown, svg, 'changed' * changed
 
 
 def _bags(arm: WatchedArm, reports: set[str]) -> Section:

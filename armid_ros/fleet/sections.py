@@ -5,13 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
 from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
-from armid_ros.report.page import Section
 from markupsafe import escape, Markup
 import numpy as np
 
@@ -46,39 +43,6 @@ def fleet_table(
     words = [k for k in range(len(heads)) if k not in numbers]
     table = DataTable(heads, rows, words, 'fleet')
     return ContentSection(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
-
-
-@dataclass(frozen=True)
-class Curve:
-    """
-    A parameter over time.
-
-    Attributes
-    ----------
-    title, range : str
-        What it is, and from where to where the ordinate goes.
-    svg : Markup
-        The drawing.
-    changed : bool
-        Whether it has changed.
-
-    """
-
-    title: str
-    range: str
-    svg: Markup
-    changed: bool = False
-
-
-@dataclass(frozen=True)
-class ParameterCurves(Section):
-    """All parameters of an arm over time, those that have changed first."""
-
-    title: ClassVar[str] = 'Parameters over time'
-    package: ClassVar[str] = 'armid_ros.fleet'
-    template: ClassVar[str] = 'series.html'
-
-    curves: Sequence[Curve]
 
 
 def link(target: str, text: str) -> Markup:

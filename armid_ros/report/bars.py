@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from armid_ros.report.blocks import Legend
 from armid_ros.report.charts import Role
 from armid_ros.report.notation import digits
-from armid_ros.report.page import render
-from markupsafe import Markup
+from armid_ros.report.page import Templated
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Bar:
 
 
 @dataclass(frozen=True)
-class BarChart:
+class BarChart(Templated):
     """
     Rows of bars on a common scale from zero.
 
@@ -61,6 +61,8 @@ class BarChart:
 
     """
 
+    template: ClassVar[str] = 'bars.html'
+
     rows: Sequence[tuple[str, Sequence[Bar]]]
     unit: str
     roles: Sequence[tuple[Role, str]] = ()
@@ -77,7 +79,3 @@ class BarChart:
     def legend(self) -> Legend:
         """Return what the colours stand for."""
         return Legend(self.roles)
-
-    def html(self) -> Markup:
-        """Return the bars as HTML."""
-        return render('bars.html', {'chart': self})
