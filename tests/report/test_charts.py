@@ -7,8 +7,16 @@ from io import BytesIO
 import json
 import re
 
-from armid_ros.report import Bar, BarChart, Chart, Series, thinned
-from armid_ros.report.charts import image_data, joined, joined_time, rounded
+from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.charts import (
+    Chart,
+    image_data,
+    joined,
+    joined_time,
+    rounded,
+    Series,
+    thinned,
+)
 from matplotlib.image import imread
 import numpy as np
 
