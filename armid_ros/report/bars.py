@@ -10,7 +10,6 @@ from typing import ClassVar
 
 from armid_ros.report.blocks import Legend
 from armid_ros.report.charts import Role
-from armid_ros.report.notation import digits
 from armid_ros.report.page import Templated
 
 
@@ -22,22 +21,17 @@ class Bar:
     Attributes
     ----------
     value : float
-        Length, in the unit of the chart; not negative.
+        Length, in the unit of all bars; not negative.
     role : str
         What it is, which gives the colour.
-    label : str
-        Text beside it; by default the value.
+    text : str
+        What is written beside it.
 
     """
 
     value: float
     role: Role
-    label: str = ''
-
-    @property
-    def text(self) -> str:
-        """Return what is written beside the bar."""
-        return self.label or digits(self.value)
+    text: str
 
 
 @dataclass(frozen=True)
@@ -49,8 +43,6 @@ class BarChart(Templated):
     ----------
     rows : sequence of (str, sequence of Bar)
         Label of each row, and its bars one below the other.
-    unit : str
-        Unit of all bars.
     roles : sequence of (str, str)
         Legend: role, and what it stands for.
     scale_by_row : bool
@@ -64,7 +56,6 @@ class BarChart(Templated):
     template: ClassVar[str] = 'bars.html'
 
     rows: Sequence[tuple[str, Sequence[Bar]]]
-    unit: str
     roles: Sequence[tuple[Role, str]] = ()
     scale_by_row: bool = False
     full: float = 0.0

@@ -58,7 +58,6 @@ def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
         rows.append((robot.joints[joint], bars))
     return BarChart(
         rows,
-        '%',
         [
             (role, f'{label} error: rms of residual over rms of torque')
             for role, label, _ in scores
@@ -228,7 +227,7 @@ def forward_section(
             )
             for joint, name in enumerate(robot.joints)
         ]
-        own.append(BarChart(rows, 'mrad', [(role, label) for role, label, _ in models], True))
+        own.append(BarChart(rows, [(role, label) for role, label, _ in models], True))
         own += _worst_joint(robot, pair, models)
         said = pair.after.worst
         if pair.before is not None:
