@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A headless Chromium that reports are looked at with."""
 
-from base64 import b64decode
 import fcntl
 import itertools
 import json
@@ -107,11 +106,6 @@ class Browser:
         )
         assert 'exceptionDetails' not in answer, answer['exceptionDetails']
         return answer['result'].get('value')
-
-    def screenshot(self, path):
-        """Write the whole page as a picture."""
-        shot = self.call('Page.captureScreenshot', captureBeyondViewport=True)
-        Path(path).write_bytes(b64decode(shot['data']))
 
     def close(self):
         """End the browser."""

@@ -18,9 +18,9 @@ nothing changes.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import sys
 import time
 
@@ -38,7 +38,6 @@ import numpy as np
 from scipy import signal
 
 from benchmarks.change_information import Noise, Visibility, visibility
-from benchmarks.change_tally import Tally
 
 
 def ball(mass: float) -> str:
@@ -79,6 +78,41 @@ SENSORS = Sensors(torque_noise=NOISE, resolution=2.0 * np.pi / 2**17)
 _RAMP = 3.0
 
 Sample = tuple[float, FloatArray, FloatArray]
+
+
+@dataclass
+class Tally:
+    """Changes that were seen: whether the name is right, and how many intervals hold the truth."""
+
+    named: int = 0
+    among: int = 0
+    wrong: int = 0
+    held: int = 0
+    intervals: int = 0
+
+    def add(self, truth: Mapping[ParameterName, float], found: Change) -> str:
+        """Compare what was said with what was done; return a remark."""
+        told = {p for p, value in truth.items() if value} & set(found.size.parameters)
+        if not told:
+            among = any(set(rival.parameters) & set(truth) for rival in found.rivals)
+            self.among += among
+            self.wrong += not among
+            return '(named second)' if among else '(WRONG)'
+        self.named += 1
+        right = np.array([truth.get(p, 0.0) for p in found.size.parameters])
+        lower, upper = found.size.interval().T
+        holds = (lower <= right) & (right <= upper)
+        self.held += int(np.sum(holds))
+        self.intervals += len(holds)
+        return '' if holds.all() else f'({np.sum(~holds)} not true)'
+
+    def __str__(self) -> str:
+        """Say both."""
+        return (
+            f'of changes that were seen {self.named} named, {self.among} named second, '
+            f'{self.wrong} wrongly; {self.held} of {self.intervals} 95 % intervals of sizes hold '
+            f'the truth, {100.0 * self.held / max(self.intervals, 1):.1f} %'
+        )
 
 
 def arm_with(*effects: str) -> ArmModel:

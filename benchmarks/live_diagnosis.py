@@ -3,18 +3,18 @@
 """
 Effects that appear in a running arm: how soon, and how rightly, the live diagnosis names them.
 
-The simulated humanoid arm and the node `live_diagnosis` in one process over real topics, in lock
-step; joint states at 200 Hz with torque noise of 0.05 N m and encoders of 18 bits. The arm moves
-along random harmonics. From the first 16 s the node measures the
-misfit of the model. Then one effect of the catalogue is set on the parameter `effects`
-of the running arm; the node knows nothing of it. A draw is right when the effect is the first name
-of a diagnosis that the node proposes within 30 s, on the right joint; a name before the effect
-appears, or another first name that is proposed, is wrong. While a diagnosis is under way the arm
-moves on for as long as its processor time, as it does beside a process of its own. Sizes are such
-that the effect makes up a tenth of the torque of its joint, or the largest that arms have. Then
-the arm moves for half an hour and nothing changes.
+The simulated humanoid arm and the node `live_diagnosis` in one process, in lock step. Joint states
+at 200 Hz with torque noise of 0.05 N m and encoders of 18 bits are handed over without topics,
+each of which would wait for its turn on a busy machine. The arm moves along random harmonics. From
+the first 16 s the node measures the misfit of the model. Then one effect of the catalogue is set
+on the parameter `effects` of the running arm; the node knows nothing of it. A draw is right when
+the effect is the first name of a diagnosis that the node proposes within 30 s, on the right joint;
+a name before the effect appears, or another first name that is proposed, is wrong. While a
+diagnosis is under way the arm moves on for as long as its processor time, as it does beside a
+process of its own. Sizes are such that the effect makes up a tenth of the torque of its joint, or
+the largest that arms have. Then the arm moves for half an hour and nothing changes.
 
-    python -m benchmarks.live_diagnosis [--draws 40] [--seed 0] [--minutes 30] [--direct]
+    python -m benchmarks.live_diagnosis [--draws 40] [--seed 0] [--minutes 30]
 
 """
 
@@ -173,8 +173,7 @@ def sized(arm: ArmModel, along: Motion, kind: tuple[str, str], joint: str) -> fl
 class Bench:
     """The two nodes, in lock step."""
 
-    def __init__(self, stage: Stage, along: Motion, direct: bool) -> None:
-        self._direct = direct
+    def __init__(self, stage: Stage, along: Motion) -> None:
         self.plant = stage.add(
             SimulatedArmNode,
             None,
@@ -204,8 +203,7 @@ class Bench:
         for count in range(round(seconds * RATE)):
             stamp = self.plant.step()
             self.helper.now += 1.0 / RATE
-            if self._direct:
-                self.node.take_joint_states(serialize_message(self.plant.joint_state))
+            self.node.take_joint_states(serialize_message(self.plant.joint_state))
             self._stage.spin_until(
                 lambda stamp=stamp: self.node.last_stamp_ns == stamp, 'joint_states'
             )
@@ -231,20 +229,20 @@ class Bench:
 
 
 @contextmanager
-def bench(along: Motion, direct: bool) -> Iterator[Bench]:
+def bench(along: Motion) -> Iterator[Bench]:
     """Make the nodes."""
     with Stage() as stage:
-        yield Bench(stage, along, direct)
+        yield Bench(stage, along)
 
 
-def draw(number: int, seed: int, direct: bool) -> Draw:
+def draw(number: int, seed: int) -> Draw:
     """Let one effect appear in a running arm."""
     rng = np.random.default_rng(number + 1000 * seed)
     along = motion(BEFORE + WANTED + 6.0, rng)
     arm = known_arm()
     effect = drawn(arm, along, KINDS[number % len(KINDS)], rng)
     name, _, place = effect.partition(':')[0].partition('@')
-    with bench(along, direct) as nodes:
+    with bench(along) as nodes:
         early = any(nodes.proposed for _ in nodes.run(BEFORE))
         nodes.set_effect(effect)
         delay, said = None, []
@@ -259,12 +257,12 @@ def draw(number: int, seed: int, direct: bool) -> Draw:
         return Draw(effect, delay, nodes.proposed, right, early, asked, seconds, said)
 
 
-def quiet(minutes: float, seed: int, direct: bool) -> tuple[int, int, list[list[list[str]]]]:
+def quiet(minutes: float, seed: int) -> tuple[int, int, list[list[list[str]]]]:
     """Return diagnoses, names that were said, and what was proposed while nothing changed."""
     rng = np.random.default_rng([1000, seed])
     asked, said, proposed = 0, 0, []
     for _ in range(max(1, round(minutes / 5.0))):
-        with bench(motion(304.0, rng), direct) as nodes:
+        with bench(motion(304.0, rng)) as nodes:
             for _ in nodes.run(min(300.0, 60.0 * minutes)):
                 latest = nodes.live.latest
                 said += bool(latest is not None and latest.named)
@@ -281,17 +279,11 @@ def main() -> None:
     parser.add_argument('--first', type=int, default=0, help='number of the first draw')
     parser.add_argument('--seed', type=int, default=0, help='other draws of the same kinds')
     parser.add_argument('--minutes', type=float, default=30.0)
-    parser.add_argument(
-        '--direct',
-        action='store_true',
-        help='hand joint states over without topics: on a busy '
-        'machine each topic waits for its turn',
-    )
     parser.add_argument('--out', type=Path, default=Path('live_diagnosis.json'))
     chosen = parser.parse_args()
     begun, draws = time.process_time(), []
     for number in range(chosen.first, chosen.first + chosen.draws):
-        one = draw(number, chosen.seed, chosen.direct)
+        one = draw(number, chosen.seed)
         draws.append(one)
         delay = '     -' if one.delay is None else f'{one.delay:5.1f} s'
         print(
@@ -306,7 +298,7 @@ def main() -> None:
         print(f'named rightly within {WANTED:g} s: {right} of {len(draws)}')
     still = None
     if chosen.minutes:
-        still = quiet(chosen.minutes, chosen.seed, chosen.direct)
+        still = quiet(chosen.minutes, chosen.seed)
         print(
             f'{chosen.minutes:g} min without a change: {still[0]} diagnoses, {still[1]} with a '
             f'name, proposed: {still[2]}'

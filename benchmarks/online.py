@@ -1,13 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Online identification: time of an update, and its estimate next to the offline one.
+Online identification: processor time of an update.
 
 The Panda of example-robot-data, 7 joints, all base parameters with viscous and Coulomb friction
-and torque offset. The first table is of samples at 1 kHz, in process and without ROS: an update
-that uses a row of the regressor, and all of them, with the default rate of rows and with a row
-for every sample. The second one gives the recursive estimator the rows of the offline
-identification. The third says what the filters do to an estimate from samples without noise.
+and torque offset. Samples at 1 kHz, in process and without ROS: an update that uses a row of the
+regressor, and all of them, with the default rate of rows and with a row for every sample.
 
     python -m benchmarks.online [--seconds 30]
 
@@ -21,15 +19,9 @@ import time
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
-from armid_ros.identification.rows.causal import MOTION_FILTER_RATIO
-from armid_ros.identification.rows.regression import regressions
-from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import Recording
 from armid_ros.robots import load_robot, Robot
 import numpy as np
 
@@ -101,51 +93,8 @@ def print_update_times(arm: ArmModel, motion: Motion, tau: FloatArray) -> None:
         print(f'{name:20s}  {update_times(arm, motion, tau, settings)}', flush=True)
 
 
-def print_recursive_against_batch(arm: ArmModel, motion: Motion, tau: FloatArray) -> None:
-    """Fit the rows of the offline identification by both."""
-    recording = Recording(joints=motion.joints, t=motion.t, q=motion.q, tau=tau, source='bag')
-    base = arm.base_parameters(np.random.default_rng(0))
-    used = conditioning([recording], SignalSettings())
-    (problem,) = regressions(arm, base.independent, [recording], used)
-    print('\nrecursive against batch, same rows, no forgetting')
-    print('method  rows   par.  largest relative difference of values')
-    for method in ('ols', 'wls'):
-        batch = solve([problem], method)
-        noise = np.ones(7) if method == 'ols' else batch.joint_std
-        recursive = RecursiveLeastSquares(base.parameters, noise)
-        for rows, torque, use in zip(
-            problem.columns, problem.tau, problem.informative, strict=True
-        ):
-            recursive.update(rows, torque, use)
-        difference = np.max(np.abs(recursive.values / batch.values - 1.0))
-        print(
-            f'{method:6s}  {recursive.samples:5d}  {base.rank:3d}  {difference:.1e} '
-            f'(wanted: 6 digits, {"reached" if difference < 1e-6 else "NOT reached"})'
-        )
-
-
-def print_bias_of_filtering(arm: ArmModel, motion: Motion) -> None:
-    """Identify from exact samples; what is wrong afterwards is the filters' doing."""
-    print('\nerror of predicted torque after identification from exact samples, % of torque')
-    print('arm          low-pass behind and before the regressor   all of it before')
-    for name, which in (('rigid', ArmModel(arm.robot)), ('friction', arm)):
-        tau = which.torque(motion)
-        errors = []
-        for cutoff in (CUTOFF, CUTOFF / MOTION_FILTER_RATIO):  # the second one: G becomes F
-            settings = OnlineSettings(cutoff=cutoff, row_rate=40.0 * CUTOFF)
-            online = OnlineIdentifier(which, settings, rng=np.random.default_rng(0))
-            for t, q, torque in zip(motion.t, motion.q, tau, strict=True):
-                online.update(float(t), q, None, torque)
-            columns = which.columns(motion.select(slice(0, None, 50)))
-            columns = columns[:, :, online.base.independent]
-            truth = columns @ online.base.values(which.theta)
-            error = columns @ online.estimate().values - truth
-            errors.append(100.0 * np.linalg.norm(error) / np.linalg.norm(truth))
-        print(f'{name:12s} {errors[0]:20.4f} {errors[1]:38.4f}')
-
-
 def main() -> None:
-    """Print the three tables."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--seconds', type=float, default=30.0, help='of motion at 1 kHz')
     seconds = parser.parse_args().seconds
@@ -157,8 +106,6 @@ def main() -> None:
     measured = Motion(exact.joints, exact.t, noisy_q, exact.dq, exact.ddq)
     print(f'{arm.robot.name}, {seconds:g} s at 1 kHz; Python {platform.python_version()}, one run')
     print_update_times(arm, measured, tau)
-    print_recursive_against_batch(arm, measured, tau)
-    print_bias_of_filtering(arm, exact)
 
 
 if __name__ == '__main__':

@@ -1,14 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What it takes and costs to fit among bodies, beside the unconstrained fit.
+The torque error of physically consistent links, next to that of the unconstrained fit.
 
-Ten minutes of a 7-joint arm at 1 kHz for the time; recordings of real machines, their first two
-thirds against the last, for the torque error.
+Simulated arms and recordings of real machines; the first two thirds of each are fitted, the last
+one is predicted.
 
 """
 
-import argparse
 from dataclasses import replace
 import os
 from pathlib import Path
@@ -22,7 +21,6 @@ from armid_ros.identification import (
     identify,
     PhysicalSettings,
     Score,
-    SignalSettings,
 )
 from armid_ros.recording import read_recording, Recording
 from armid_ros.robots import load_robot
@@ -30,7 +28,6 @@ import numpy as np
 
 from benchmarks import real_recordings
 from benchmarks.coverage import multisine
-from benchmarks.offline_speed import CUTOFF_HZ, DECIMATION, motion, panda
 from tests.hidden.lived.arms import load_arm
 
 #: Arms that are simulated: published descriptions, and drawn ones.
@@ -38,11 +35,11 @@ SIMULATED = ('humanoid', 'ur5', 'panda', 'z1', 'drawn-6-0', 'drawn-4-0')
 FRICTION = ('viscous_friction', 'coulomb_friction', 'torque_offset')
 
 
-def fits(arm, recording, **signals):
+def fits(arm, recording):
     """Identify without and with constraints; returns both results and their processor time."""
     results, seconds = [], []
     for physical in (None, PhysicalSettings()):
-        settings = IdentificationSettings(signals=SignalSettings(**signals), physical=physical)
+        settings = IdentificationSettings(physical=physical)
         start = time.process_time()
         results.append(identify(arm, [recording], settings, rng=np.random.default_rng(0)))
         seconds.append(time.process_time() - start)
@@ -58,21 +55,6 @@ def part(recording, samples):
         q=recording.q[samples],
         dq=dq,
         tau=recording.tau[samples],
-    )
-
-
-def speed(minutes):
-    """Print the time that constraints add."""
-    arm = panda()
-    exact = motion(arm, minutes, np.random.default_rng(0))
-    recording = Recording(joints=exact.joints, t=exact.t, q=exact.q, tau=exact.tau, source='panda')
-    structure = ArmModel(arm.robot, arm.effects)
-    signals = {'cutoff_hz': CUTOFF_HZ, 'decimation': DECIMATION}
-    results, seconds = fits(structure, recording, **signals)
-    least = min(link.eigenvalues[0] for link in results[1].physical.links)
-    print(
-        f'{minutes:g} min of 7 joints at 1 kHz: {seconds[0]:.1f} s, with constraints '
-        f'{seconds[1] - seconds[0]:+.1f} s, wanted +10 s or less; least eigenvalue {least:.2g}'
     )
 
 
@@ -145,13 +127,8 @@ def compared(name, arm, recording, true=None):
 
 def main():
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--minutes', type=float, default=10.0)
-    minutes = parser.parse_args().minutes
     for name in SIMULATED:
         simulated(name)
-    if minutes > 0.0:
-        speed(minutes)
     if not os.environ.get('ARMID_DATA'):
         print('ARMID_DATA names no recordings of real machines')
         return

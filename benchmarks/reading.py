@@ -10,9 +10,7 @@ of an MCAP file as arrays. The files are written by mcap's own writer with its d
     python benchmarks/reading.py [--messages 1000000]
 
 The time of this package is the median of five runs, that of the slower ones of one. Every reader
-has to unpack the chunks, and this one compares their checksums as well, which it does in two
-threads; what zstd and crc32 take alone for that bounds the ratio by processor time, whatever else
-is done.
+has to unpack the chunks, and this one compares their checksums as well, in two threads.
 
 """
 
@@ -25,20 +23,16 @@ import platform
 import tempfile
 import time
 from typing import Any
-import zlib
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording import joint_state_cdr, read_recording
-from armid_ros.recording.mcap.records import map_file
 from armid_ros.recording.message_types import JOINT_STATE, message_type
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_typestore, Stores
-import zstandard
 
 JOINTS = tuple(f'joint_{number}' for number in range(1, 8))
 TOPIC = '/joint_states'
@@ -100,17 +94,6 @@ def read_rosbags(path: Path) -> Arrays:
         )
 
 
-def read_rosbags_raw(path: Path) -> Arrays:
-    """Read with rosbags' raw reader and its decoder, without the high-level reader between."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    with Reader(path) as reader:
-        connections = [c for c in reader.connections if c.topic == TOPIC]
-        return stacked(
-            store.deserialize_cdr(raw, connection.msgtype)
-            for connection, _, raw in reader.messages(connections)
-        )
-
-
 def read_mcap_ros2(path: Path) -> Arrays:
     """Read with mcap's reader and mcap-ros2-support's decoder."""
     with path.open('rb') as stream:
@@ -134,8 +117,7 @@ def stacked(messages: Iterable[Any]) -> Arrays:
 
 READERS: dict[str, Callable[[Path], Arrays]] = {
     'armid_ros': read_ours,
-    'rosbags (AnyReader)': read_rosbags,
-    'rosbags (Reader)': read_rosbags_raw,
+    'rosbags': read_rosbags,
     'mcap-ros2-support': read_mcap_ros2,
 }
 
@@ -151,27 +133,6 @@ def measure(
         seconds.append(time.perf_counter() - begin)
         used.append(time.process_time() - used_before)
     return float(np.median(seconds)), float(np.median(used)), arrays
-
-
-def libraries_alone(path: Path) -> tuple[float, float]:
-    """Return what the processor takes to unpack all chunks, and to sum them up [s]."""
-    content = path.read_bytes()
-    chunks = map_file(content, path).chunks
-    unpack = zstandard.ZstdDecompressor().decompress
-    used = []
-    for _ in range(3):
-        unpacking = summing = 0.0
-        for chunk in chunks:
-            stored = memoryview(content)[chunk.begin : chunk.end]
-            begin = time.process_time()
-            plain = unpack(stored, max_output_size=chunk.size) if chunk.compression else stored
-            between = time.process_time()
-            zlib.crc32(plain)
-            unpacking += between - begin
-            summing += time.process_time() - between
-        used.append((unpacking, summing))
-    zstd, crc = np.median(used, axis=0).tolist()
-    return zstd, crc
 
 
 def compare(path: Path, count: int, wanted: float, title: str) -> bool:
@@ -193,15 +154,7 @@ def compare(path: Path, count: int, wanted: float, title: str) -> bool:
         rate = count / value / 1e3
         print(f'  {name:22} {value:8.2f} {used[name]:12.2f} {rate:9.0f} {share:13.3f}')
     ratio = fastest / seconds['armid_ros']
-    others = min(value for name, value in used.items() if name != 'armid_ros')
-    zstd, crc = libraries_alone(path)
-    alone = zstd + crc
     print(f'  {ratio:.1f} times the faster of the two others (wanted {wanted:g})')
-    print(
-        f'  by processor time {others / used["armid_ros"]:.1f}; zstd alone takes {zstd:.3f} s of '
-        f'it, as of the others, and crc32 {crc:.3f} s: nothing on one core could be beyond '
-        f'{others / alone:.1f}'
-    )
     return ratio >= wanted
 
 

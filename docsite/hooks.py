@@ -47,10 +47,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for uri, text in pages.items():
         files.append(File.generated(config, uri, content=text))
     for path in sorted(NOTEBOOKS.glob('*.py')):
-        page = executed(path)
+        page, pictures = executed(path)
         uri = f'notebooks/{path.stem}.md'
-        files.append(File.generated(config, uri, content=page.markdown))
-        for name, content in page.files.items():
+        files.append(File.generated(config, uri, content=page))
+        for name, content in pictures.items():
             files.append(File.generated(config, f'notebooks/{name}', content=content))
     return files
 

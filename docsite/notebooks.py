@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,27 +18,9 @@ from nbconvert.preprocessors import ExecutePreprocessor
 CELL_TIMEOUT = 600
 
 
-@dataclass(frozen=True)
-class NotebookPage:
+def executed(path: Path) -> tuple[str, dict[str, bytes]]:
     """
-    A notebook as a page.
-
-    Attributes
-    ----------
-    markdown : str
-        Text, code and what the code showed.
-    files : dict of str to bytes
-        Pictures, by the name that the page has for them.
-
-    """
-
-    markdown: str
-    files: dict[str, bytes]
-
-
-def executed(path: Path) -> NotebookPage:
-    """
-    Return a notebook with what its cells show.
+    Return the page of a notebook with what its cells show, and pictures by their names on it.
 
     It runs in its own folder, as an editor would run it.
 
@@ -61,7 +42,7 @@ def executed(path: Path) -> NotebookPage:
     exporter = MarkdownExporter()
     names = {'unique_key': path.stem, 'output_files_dir': 'pictures'}
     markdown, resources = exporter.from_notebook_node(notebook, resources=names)
-    return NotebookPage(markdown, dict(resources['outputs']))
+    return markdown, dict(resources['outputs'])
 
 
 @contextmanager

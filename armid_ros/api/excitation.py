@@ -198,7 +198,6 @@ class ExcitationResult(Shown):
             self.fitness,
             robot=origin.of(self.arm.robot).robot,
             scene=self.scene,
-            after=self.after,
             provenance=origin.provenance,
         )
 

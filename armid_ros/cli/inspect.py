@@ -61,7 +61,7 @@ def inspect(
     from armid_ros.cli.origin import provenance
     from armid_ros.files import json_text, write_file
     from armid_ros.files.cells import listed
-    from armid_ros.inspection.output import SCHEMA
+    from armid_ros.inspection.inspect import SCHEMA
 
     staged = None if out is None else options.stage(out, SCHEMA, robot_source or '')
     robot = None

@@ -11,7 +11,7 @@ import shlex
 import sys
 from typing import Any
 
-from armid_ros.report import hash_files, Provenance, versions
+from armid_ros.report.provenance import hash_files, Provenance, versions
 
 
 def provenance(

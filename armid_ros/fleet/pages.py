@@ -17,13 +17,6 @@ from urllib.parse import quote
 from armid_ros.changes.histories import HistoryChange
 from armid_ros.changes.scatter import ParameterHistory
 from armid_ros.fleet.bags import BagFile, DAY_NS, file_name, folder_of
-from armid_ros.fleet.sections import (
-    Curve,
-    drawing,
-    fleet_table,
-    link,
-    ParameterCurves,
-)
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import (
     change_rows,
@@ -34,10 +27,12 @@ from armid_ros.fleet.watch import (
     wear_rows,
 )
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from armid_ros.motion import FloatArray
+from armid_ros.report.blocks import ContentSection, DataTable, Paragraph, SmallMultiples
 from armid_ros.report.notation import counted, digits, with_interval
 from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.frame import VerdictSection
-from markupsafe import Markup
+from markupsafe import escape, Markup
 import numpy as np
 
 #: Characters of the names of arms that the first sentence lists.
@@ -48,6 +43,8 @@ _COLUMNS = 9
 _SHOWN = 50
 #: Robust deviations of the fleet by which an arm is unlike its siblings.
 _UNLIKE = 3.5
+#: Size of a small curve, and of a larger one with intervals [px].
+_SMALL, _LARGE = (84, 20), (250, 74)
 
 Diagnoses = Mapping[str, Mapping[str, Any]]
 
@@ -87,7 +84,7 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
         'high; a dashed line is where it changed. Error: median of 100 |residual torque| / '
         '|torque| over the bags of an arm, each fitted by itself.'
     )
-    sections: list[Section] = [_verdict(found), fleet_table('Arms', heads, rows, (3, 4, 5), hint)]
+    sections: list[Section] = [_verdict(found), _table('Arms', heads, rows, (3, 4, 5), hint)]
     refused = [row for arm in found.arms for row in arm.refused]
     if refused:
         more = len(refused) > _SHOWN
@@ -123,12 +120,17 @@ def _arm_page(found: Watch, arm: WatchedArm, reports: set[str], diagnoses: Diagn
     ]
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
-        cells = link(report, diagnosis['verdict'].replace('_', ' ')), diagnosis['summary']
-        sections.append(fleet_table('Diagnosis', ('Verdict', 'Summary'), [cells]))
+        cells = _link(report, diagnosis['verdict'].replace('_', ' ')), diagnosis['summary']
+        sections.append(_table('Diagnosis', ('Verdict', 'Summary'), [cells]))
     order = {change.series.parameter: k for k, change in enumerate(arm.named)}
     shown = [one for one in arm.series if len(one.values)]
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
-    sections.append(ParameterCurves([_curve(arm, one) for one in shown]))
+    said = (
+        'Every point is a bag with its 95 % interval; it leads to the bag below. The range is '
+        'that of the ordinate.'
+    )
+    curves = SmallMultiples([_curve(arm, one) for one in shown])
+    sections.append(ContentSection('Parameters over time', [curves, Paragraph(said, 'hint')]))
     rows = []
     for row in wear_rows(found, arm):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
@@ -141,7 +143,7 @@ def _arm_page(found: Watch, arm: WatchedArm, reports: set[str], diagnoses: Diagn
         )
     hint = 'Slope of a straight line through all bags with its 95 % interval, each by itself.'
     sections += [
-        fleet_table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),
+        _table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),
         _bags(arm, reports),
     ]
     if arm.refused:
@@ -180,17 +182,17 @@ def _arm_row(
     page = f'pages/{quote(file_name(arm.arm))}.html'
     what = Markup('')
     for row in change_rows(arm)[:1]:
-        bag = link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
+        bag = _link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
         what = Markup('{} {}').format(row['text'], bag)
     if diagnosis is not None and diagnosis['verdict'] != 'failed':
-        report = link(diagnosis['report'], 'Diagnosis')
+        report = _link(diagnosis['report'], 'Diagnosis')
         what += Markup('<br>{}: {}').format(report, diagnosis['summary'])
     for first in arm.named[:1]:
         what += _spark(first.series, arm.named)
     errors = sorted(e for row in arm.bags if (e := row['relative_error_percent']) is not None)
     mark = Markup('<span class="mark {}">{}</span>').format(arm.health.split(' ')[0], arm.health)
     return [
-        link(page, arm.arm),
+        _link(page, arm.arm),
         mark,
         what,
         str(len(arm.bags)),
@@ -205,23 +207,23 @@ def _spark(series: ParameterHistory | None, named: Sequence[HistoryChange]) -> M
         return Markup('')
     title = f'{parameter_label(*series.parameter)}: {digits(series.values[-1], 3)} {series.unit}'
     order = np.arange(len(series.values), dtype=float)
-    return drawing(order, series.values, series.std, _cut(series, named), title=title)[0]
+    return _drawing(order, series.values, series.std, _cut(series, named), title=title)[0]
 
 
 def _cut(series: ParameterHistory, named: Sequence[HistoryChange]) -> int:
     return next((one.index for one in named if one.series.parameter == series.parameter), 0)
 
 
-def _curve(arm: WatchedArm, series: ParameterHistory) -> Curve:
+def _curve(arm: WatchedArm, series: ParameterHistory) -> tuple[str, str, Markup, str]:
     links = []
     for day in series.days:
         nearest = min(arm.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
         links.append(f'#{BagFile(arm.arm, nearest["bag"]).name}')
     cut = _cut(series, arm.named)
-    svg, ends = drawing(series.days, series.values, series.std, cut, links)
+    svg, ends = _drawing(series.days, series.values, series.std, cut, links)
     shown = f'{digits(ends[0], 3)} to {digits(ends[1], 3)} {series.unit}'.rstrip()
     changed = any(one.series.parameter == series.parameter for one in arm.named)
-    return Curve(parameter_label(*series.parameter), shown, svg, changed)
+    return parameter_label(*series.parameter), shown, svg, 'changed' * changed
 
 
 def _bags(arm: WatchedArm, reports: set[str]) -> Section:
@@ -238,7 +240,7 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Section:
         rows.append(
             (
                 Markup('<span id="{}">{}</span>').format(name, start),
-                link(
+                _link(
                     f'../{quote(report)}' if report in reports else '',
                     row['bag'].rstrip('/').rsplit('/', 1)[-1],
                 ),
@@ -254,9 +256,73 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Section:
         f'`armid fleet report --out RESULTS --arm {arm.arm} --bag NAME`; without --bag, those '
         'around its change and the latest.'
     )
-    return fleet_table('Bags', heads, rows, (2, 3, 4), hint)
+    return _table('Bags', heads, rows, (2, 3, 4), hint)
 
 
 def _refused(rows: Sequence[Mapping[str, Any]], hint: str = '') -> Section:
     cells = [(str(row['arm']), row['bag'], row['reason']) for row in rows]
-    return fleet_table('Refused bags', ('Arm', 'Bag', 'Why'), cells, hint=hint)
+    return _table('Refused bags', ('Arm', 'Bag', 'Why'), cells, hint=hint)
+
+
+def _table(
+    title: str,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    numbers: Sequence[int] = (),
+    hint: str = '',
+) -> ContentSection:
+    """Return a table whose cells may have links and curves; some columns are numbers."""
+    words = [k for k in range(len(heads)) if k not in numbers]
+    table = DataTable(heads, rows, words, 'fleet')
+    return ContentSection(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
+
+
+def _link(target: str, text: str) -> Markup:
+    """Return a text that leads to a page, or the text alone where there is none."""
+    return Markup('<a href="{}">{}</a>').format(target, text) if target else escape(text)
+
+
+def _drawing(
+    x: FloatArray,
+    values: FloatArray,
+    std: FloatArray,
+    cut: int = 0,
+    links: Sequence[str] = (),
+    title: str = '',
+) -> tuple[Markup, tuple[float, float]]:
+    """
+    Draw a series: small as a line, or larger as points with intervals and links.
+
+    Values have the shape (K,); the cut is the first one after a step, 0 for none. Returns the ends
+    of the ordinate as well.
+
+    """
+    (width, height), wide = (_LARGE, HALF_WIDTH) if links else (_SMALL, 0.0)
+    low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))
+    least = max(6.0 * float(np.median(std)), 1e-3 * float(np.max(np.abs(values))), 1e-12)
+    spare = max(0.0, 0.5 * (least - (high - low)))
+    low, high = low - spare, high + spare
+    across = 4.0 + (width - 8.0) * (x - x[0]) / (float(np.ptp(x)) or 1.0)
+    scale = (height - 8.0) / (high - low)
+    up = height - 4.0 - scale * (values - low)
+    parts = [f'<title>{escape(title)}</title>'] if title else []
+    if 0 < cut < len(x):
+        at = 0.5 * (across[cut - 1] + across[cut])
+        parts.append(f'<line class="cut" x1="{at:.1f}" x2="{at:.1f}" y1="0" y2="{height}"/>')
+    for a, b, half, target in zip(across, up, wide * std * scale, links, strict=bool(links)):
+        parts.append(
+            f'<line class="interval" x1="{a:.1f}" x2="{a:.1f}" '
+            f'y1="{b - half:.1f}" y2="{b + half:.1f}"/>'
+        )
+        parts.append(
+            _link(target, Markup(f'<circle class="dot" cx="{a:.1f}" cy="{b:.1f}" r="2.6"/>'))
+        )
+    if not links:
+        line = ' '.join(f'{a:.1f},{b:.1f}' for a, b in zip(across, up, strict=True))
+        parts.append(f'<polyline class="line" points="{line}"/>')
+        parts.append(f'<circle class="dot" cx="{across[-1]:.1f}" cy="{up[-1]:.1f}" r="1.8"/>')
+    svg = Markup(
+        f'<svg class="spark" width="{width}" height="{height}" '
+        f'viewBox="0 0 {width} {height}" role="img">{"".join(parts)}</svg>'
+    )
+    return svg, (low, high)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from armid_ros.inspection.joints import STILL
 from armid_ros.motion import FloatArray
-from armid_ros.recording import Recording
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import welch
@@ -75,9 +74,16 @@ def noise_band(noise: FloatArray, rate: float) -> FloatArray:
     return bands
 
 
-def effort_bands(recording: Recording) -> FloatArray:
+def standing_bands(q: FloatArray, tau: FloatArray, period: float) -> FloatArray:
     """
-    Return the band that the torques of a recording were filtered to, from where the arm stands.
+    Return the bands that torques were filtered to, from the longest time the arm stands.
+
+    Parameters
+    ----------
+    q, tau : ndarray, shape (N, n)
+        Positions [rad or m] and torques [N m].
+    period : float
+        Time from sample to sample [s].
 
     Returns
     -------
@@ -85,13 +91,6 @@ def effort_bands(recording: Recording) -> FloatArray:
         [Hz]; NaN where torques are not filtered, or the arm does not stand long enough.
 
     """
-    if recording.tau is None:
-        return np.full(recording.n_joints, np.nan)
-    return standing_bands(recording.q, recording.tau, recording.period)
-
-
-def standing_bands(q: FloatArray, tau: FloatArray, period: float) -> FloatArray:
-    """Return the bands [Hz] of torques, shape (n,), from the longest time the arm stands."""
     if len(q) < LEAST or period <= 0.0:
         return np.full(tau.shape[1], np.nan)
     first, last = _longest(_standing(q, period))

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import get_args, Literal
+from dataclasses import asdict, dataclass
+from typing import Any, get_args, Literal
 
 from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
-from armid_ros.inspection.band import effort_bands
+from armid_ros.inspection.band import standing_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
 from armid_ros.inspection.trial import TrialFit, try_identification
@@ -20,6 +20,7 @@ from armid_ros.recording import Recording, Topic
 from armid_ros.robots import Robot
 import numpy as np
 
+SCHEMA = 'armid/inspection/1'
 Weight = Literal['bad', 'doubt', 'note']
 
 #: Beyond two turns to either side positions of an arm are hardly in rad.
@@ -90,19 +91,14 @@ class Inspection:
         if self.trial.refused:
             return 'Refused by `armid identify`.'
         if self.trial.grade != 'good':
-            return f'Graded {self.trial.grade} by `armid identify`{self._why}'
+            reason = self.trial.reasons[0]
+            said = _said(reason, [remark.text for remark in self.remarks])
+            why = '.' if said else f': {reason}'
+            return f'Graded {self.trial.grade} by `armid identify`{why}'
         return (
             f'Ready for `armid identify`: {self.trial.rank} of {self.trial.theory} parameters are '
             f'distinguishable (quick fit: {self.trial.relative_error_percent:.1f} % error).'
         )
-
-    @property
-    def _why(self) -> str:
-        """Return the first reason of a grade; a full stop where a remark says it."""
-        assert self.trial is not None
-        reason = self.trial.reasons[0]
-        said = _said(reason, [remark.text for remark in self.remarks])
-        return '.' if said else f': {reason}'
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -158,6 +154,32 @@ def inspect(
     if robot is not None:
         found += [Remark('note', note) for note in robot.notes]
     return Inspection(recording, topics, robot, sampling, joints, trial, worst_first(found))
+
+
+def inspection_document(found: Inspection) -> dict[str, Any]:
+    """Return an inspection for programs to read."""
+    trial = None
+    if found.trial is not None:
+        trial = asdict(found.trial)
+        scale = found.trial.scale
+        trial['scale'] = (
+            None if scale is None else [s if np.isfinite(s) else None for s in scale.tolist()]
+        )
+    return {
+        'schema': SCHEMA,
+        'source': found.recording.source,
+        'topic': found.recording.topic,
+        'topics': [
+            {'name': t.name, 'type_name': t.type_name, 'count': t.count, 'joints': list(t.joints)}
+            for t in found.topics
+        ],
+        'samples': len(found.recording),
+        'sampling': asdict(found.sampling),
+        'joints': [asdict(joint) for joint in found.joints],
+        'remarks': [asdict(remark) for remark in found.remarks],
+        'trial': trial,
+        'verdict': found.verdict,
+    }
 
 
 def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
@@ -299,7 +321,9 @@ def _of_efforts(
 
 
 def _of_filters(recording: Recording) -> Iterator[Remark]:
-    bands = effort_bands(recording)
+    if recording.tau is None:
+        return
+    bands = standing_bands(recording.q, recording.tau, recording.period)
     known = np.flatnonzero(np.isfinite(bands))
     if len(known):
         named = ', '.join(f'{recording.joints[k]} {bands[k]:.2g} Hz' for k in known)

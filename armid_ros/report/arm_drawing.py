@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from armid_ros.excitation.geometry.capsules import outline
 from armid_ros.motion import FloatArray
-from armid_ros.report.page import render
-from armid_ros.report.strip import CORNER, Strip, svg_points
+from armid_ros.report.page import Templated
+from armid_ros.report.strip import CORNER, flat, Strip, svg_points
 from armid_ros.robots import collision_model, CollisionModel, Robot
 from armid_ros.robots.sticks import sticks
 import coal
-from markupsafe import Markup
 import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
@@ -44,7 +44,7 @@ _ENDLESS = 1e3
 
 
 @dataclass(frozen=True)
-class ArmDrawing:
+class ArmDrawing(Templated):
     """
     A drawing of one pose or of several side by side.
 
@@ -69,6 +69,8 @@ class ArmDrawing:
 
     """
 
+    template: ClassVar[str] = 'arm_drawing.html'
+
     width: float
     height: float
     bodies: tuple[tuple[str, str], ...]
@@ -78,10 +80,6 @@ class ArmDrawing:
     labels: tuple[tuple[float, float, float, float, str], ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
     label: str = 'Poses of the arm'
-
-    def html(self) -> Markup:
-        """Return the drawing as SVG."""
-        return render('arm_drawing.html', {'drawing': self})
 
 
 def draw_poses(
@@ -106,14 +104,14 @@ def draw_poses(
     frames = [_frames(model, q) for q in poses]
     last = max(solids, key=lambda solid: solid.joint)
     middle = last.points.mean(axis=0)
-    track = np.array([CORNER.flat(_frames(model, q)[last.joint].act(middle)) for q in way])
+    track = np.array([flat(CORNER, _frames(model, q)[last.joint].act(middle)) for q in way])
     strip = _strip(solids, frames, _POSE, track)
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         share = round(100.0 * solid.joint / collision.robot.n_joints)
         colour = f'color-mix(in srgb, var(--residual) {share}%, var(--measured))'
         bodies.append((points, colour if solid.of_arm else OBSTACLE))
-    tips = [CORNER.flat(frame[last.joint].act(middle)) for frame in frames]
+    tips = [flat(CORNER, frame[last.joint].act(middle)) for frame in frames]
     return ArmDrawing(
         *strip.size,
         tuple(bodies),
@@ -152,15 +150,15 @@ def draw_arm(
     if q is not None and len(q):
         poses = list(q[np.linspace(0, len(q) - 1, min(_POSES, len(q))).astype(np.intp)])
     tried = [[_frames(model, pose)] for pose in poses]
-    flat = [np.array([CORNER.flat(one.translation) for one in frames]) for (frames,) in tried]
-    frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in flat]))]
+    seen = [np.array([flat(CORNER, one.translation) for one in frames]) for (frames,) in tried]
+    frames = tried[int(np.argmax([np.prod(np.ptp(one, axis=0) + _POINT) for one in seen]))]
     strip = _strip(solids, frames, _SINGLE)
     bodies = []
     for solid, points in _outlines(solids, frames, strip):
         chosen = solid.joint > 0 and robot.joints[solid.joint - 1] in marked
         bodies.append((points, 'var(--predicted)' if chosen else 'var(--faint)'))
     dots = [
-        (*_placed(strip, CORNER.flat(frames[0][k].translation), 0), name)
+        (*_placed(strip, flat(CORNER, frames[0][k].translation), 0), name)
         for k, name in enumerate(robot.joints, start=1)
     ]
     labels, y = [], 0.0
@@ -168,7 +166,7 @@ def draw_arm(
         y = max(top, y + _LINE)
         labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
     letters = max((len(name) for *_, name in labels), default=0)
-    down = CORNER.flat(robot.gravity / max(float(np.linalg.norm(robot.gravity)), _POINT))
+    down = flat(CORNER, robot.gravity / max(float(np.linalg.norm(robot.gravity)), _POINT))
     return ArmDrawing(
         round(strip.pitch + _LETTER * letters, 1),
         round(max(strip.height, y + _LINE), 1),
@@ -197,10 +195,10 @@ class _Solid:
         points = self.points @ frame.rotation.T + frame.translation
         turn = np.linspace(0.0, 2.0 * np.pi, _ROUND, endpoint=False)
         ring = max(self.radius, 1e-4) * np.column_stack([np.cos(turn), np.sin(turn)])
-        flat = CORNER.flat(points)
-        flat = flat[ConvexHull(flat).vertices] if len(flat) > _ROUND else flat
-        cloud = (flat[:, np.newaxis] + ring).reshape(-1, 2)
-        return cloud[ConvexHull(cloud).vertices], float(CORNER.near(points).mean())
+        seen = flat(CORNER, points)
+        seen = seen[ConvexHull(seen).vertices] if len(seen) > _ROUND else seen
+        cloud = (seen[:, np.newaxis] + ring).reshape(-1, 2)
+        return cloud[ConvexHull(cloud).vertices], float((points @ CORNER[2]).mean())
 
 
 def _strip(

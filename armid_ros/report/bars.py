@@ -6,12 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from armid_ros.report.blocks import Legend
 from armid_ros.report.charts import Role
-from armid_ros.report.notation import digits
-from armid_ros.report.page import render
-from markupsafe import Markup
+from armid_ros.report.page import Templated
 
 
 @dataclass(frozen=True)
@@ -22,26 +21,21 @@ class Bar:
     Attributes
     ----------
     value : float
-        Length, in the unit of the chart; not negative.
+        Length, in the unit of all bars; not negative.
     role : str
         What it is, which gives the colour.
-    label : str
-        Text beside it; by default the value.
+    text : str
+        What is written beside it.
 
     """
 
     value: float
     role: Role
-    label: str = ''
-
-    @property
-    def text(self) -> str:
-        """Return what is written beside the bar."""
-        return self.label or digits(self.value)
+    text: str
 
 
 @dataclass(frozen=True)
-class BarChart:
+class BarChart(Templated):
     """
     Rows of bars on a common scale from zero.
 
@@ -49,8 +43,6 @@ class BarChart:
     ----------
     rows : sequence of (str, sequence of Bar)
         Label of each row, and its bars one below the other.
-    unit : str
-        Unit of all bars.
     roles : sequence of (str, str)
         Legend: role, and what it stands for.
     scale_by_row : bool
@@ -61,8 +53,9 @@ class BarChart:
 
     """
 
+    template: ClassVar[str] = 'bars.html'
+
     rows: Sequence[tuple[str, Sequence[Bar]]]
-    unit: str
     roles: Sequence[tuple[Role, str]] = ()
     scale_by_row: bool = False
     full: float = 0.0
@@ -77,7 +70,3 @@ class BarChart:
     def legend(self) -> Legend:
         """Return what the colours stand for."""
         return Legend(self.roles)
-
-    def html(self) -> Markup:
-        """Return the bars as HTML."""
-        return render('bars.html', {'chart': self})

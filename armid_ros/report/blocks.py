@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from armid_ros.report.page import render, Section
+from armid_ros.report.page import Section, Templated
 from markupsafe import Markup
 
 
@@ -37,16 +37,6 @@ class ContentSection(Section):
 
     title: str  # type: ignore[misc]  # of an instance, not of a class
     blocks: Sequence[PageBlock]
-
-
-class Templated:
-    """A block with a template, which sees the block under that name."""
-
-    template: ClassVar[str]
-
-    def html(self) -> Markup:
-        """Return the block as HTML, everything in it escaped."""
-        return render(self.template, {'block': self})
 
 
 @dataclass(frozen=True)
@@ -260,3 +250,20 @@ class Legend(Templated):
     template: ClassVar[str] = 'legend.html'
 
     roles: Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class SmallMultiples(Templated):
+    """
+    Small pictures of one kind, as many in a row as there is room for.
+
+    Attributes
+    ----------
+    figures : sequence of (str, str, Markup, str)
+        Caption, small print beside it, picture, and 'heat', 'changed' or ''.
+
+    """
+
+    template: ClassVar[str] = 'small_multiples.html'
+
+    figures: Sequence[tuple[str, str, Markup, str]]

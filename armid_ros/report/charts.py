@@ -13,19 +13,18 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from io import BytesIO
 import json
-import struct
-from typing import Any, Literal
-import zlib
+from typing import Any, ClassVar, Literal
 
 from armid_ros.motion import FloatArray, read_only
-from armid_ros.report.page import render
+from armid_ros.report.page import Templated
 from markupsafe import Markup
 import numpy as np
 import numpy.typing as npt
 
 Role = Literal['measured', 'predicted', 'residual', 'before', 'after', 'floor', 'trend', 'faint']
-Kind = Literal['line', 'trend', 'points', 'sticks', 'steps', 'band']
+Kind = Literal['line', 'trend', 'points', 'sticks', 'band']
 
 #: Samples of a series beyond which the extremes of equal stretches stand for all.
 MOST_SAMPLES = 3000
@@ -48,7 +47,7 @@ class Series:
         What it is, which gives the colour.
     kind : str
         How it is drawn: 'line', broken at NaN; 'trend', with dots and not broken; 'points';
-        'sticks' from zero; 'steps'; or a 'band' from y to ``upper``.
+        'sticks' from zero; or a 'band' from y to ``upper``.
     upper : ndarray, shape (N,), or None
         Upper edge of a band.
 
@@ -101,7 +100,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Chart:
+class Chart(Templated):
     """
     Curves over a common axis that a reader can zoom into.
 
@@ -130,6 +129,8 @@ class Chart:
 
     """
 
+    template: ClassVar[str] = 'chart.html'
+
     x: FloatArray
     series: Sequence[Series]
     xlabel: str
@@ -142,15 +143,15 @@ class Chart:
     symmetric: bool = False
     legend: bool = True
 
-    def html(self) -> Markup:
-        """Return the chart as HTML."""
-        label = f'{self.ylabel} over {self.xlabel}' if self.xlabel else self.ylabel
-        return render(
-            'chart.html', {'chart': self, 'label': label, 'json': script_json(self._data())}
-        )
+    @property
+    def label(self) -> str:
+        """Return the chart in words."""
+        return f'{self.ylabel} over {self.xlabel}' if self.xlabel else self.ylabel
 
-    def _data(self) -> dict[str, Any]:
-        return {
+    @property
+    def json(self) -> Markup:
+        """Return what assets/report.js draws."""
+        data = {
             'x': rounded(self.x),
             'xlabel': self.xlabel,
             'ylabel': self.ylabel,
@@ -172,6 +173,7 @@ class Chart:
                 for series in self.series
             ],
         }
+        return script_json(data)
 
 
 def thinned(*series: npt.ArrayLike, most: int = MOST_SAMPLES) -> npt.NDArray[np.intp]:
@@ -252,20 +254,9 @@ def image_data(colour: FloatArray, strength: FloatArray) -> str:
         Opacity, clipped to 0 to 1.
 
     """
+    from matplotlib.image import imsave  # takes long to import, and few pages have an image
+
     pixels = np.concatenate([colour, np.clip(np.abs(strength), 0.0, 1.0)[..., None]], axis=-1)
-    height, width = strength.shape
-    rows = np.rint(255.0 * pixels).astype(np.uint8).reshape(height, -1)
-    no_filter = np.zeros((height, 1), dtype=np.uint8)
-    chunks = {
-        b'IHDR': struct.pack('>IIBBBBB', width, height, 8, 6, 0, 0, 0),
-        b'IDAT': zlib.compress(np.hstack([no_filter, rows]).tobytes()),
-        b'IEND': b'',
-    }
-    png = b'\x89PNG\r\n\x1a\n' + b''.join(
-        struct.pack('>I', len(content))
-        + kind
-        + content
-        + struct.pack('>I', zlib.crc32(kind + content))
-        for kind, content in chunks.items()
-    )
-    return f'data:image/png;base64,{b64encode(png).decode()}'
+    png = BytesIO()
+    imsave(png, np.rint(255.0 * pixels).astype(np.uint8), format='png')
+    return f'data:image/png;base64,{b64encode(png.getvalue()).decode()}'

@@ -35,7 +35,7 @@ _WHY = {
 _TOLD = 8
 
 
-def compare_report(comparison: Comparison, provenance: Provenance | None = None) -> str:
+def compare_report(comparison: Comparison, provenance: Provenance | None) -> str:
     """
     Return the page of a comparison.
 
@@ -43,7 +43,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None = None)
     ----------
     comparison : Comparison
         Two identifications.
-    provenance : Provenance, optional
+    provenance : Provenance or None
         Files, versions.
 
     Returns

@@ -47,7 +47,6 @@ def excitation_report(
     *,
     robot: str,
     scene: CollisionScene,
-    after: Sequence[str] = (),
     provenance: Provenance | None = None,
 ) -> str:
     """
@@ -67,8 +66,6 @@ def excitation_report(
         Shipped name or path of the description.
     scene : CollisionScene
         Bodies of the arm, its floor, and what stands around it.
-    after : sequence of str
-        Recordings that the design adds to.
     provenance : Provenance, optional
         Files, versions, settings, seed.
 
@@ -112,7 +109,7 @@ def excitation_report(
         motion_section(limits, motion, shares),
         clearance_section(motion.t, curves, design.settings.clearance, said),
         harmonics_section(excitation.trajectory),
-        _asked(design, arm, robot, obstacles, after, run),
+        _asked(design, arm, robot, obstacles, run),
         Origin(provenance or Provenance()),
     ]
     subtitle = (
@@ -210,7 +207,6 @@ def _asked(
     arm: ArmModel,
     robot: str,
     obstacles: Sequence[Obstacle],
-    after: Sequence[str],
     whole: Run,
 ) -> ContentSection:
     settings, run = design.settings, design.excitation

@@ -61,7 +61,7 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     return f'{name.words} of {name.joint}' if name.joint else name.words
 
 
-def rigid_label(name: ParameterName, links: Sequence[str] = ()) -> str:
+def rigid_label(name: ParameterName, links: Sequence[str]) -> str:
     """Return the same of the first parameter of a group alone."""
     found = _SYMBOL.match(name.name)
     if found is None:

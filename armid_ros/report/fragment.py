@@ -17,9 +17,11 @@ import re
 from armid_ros.report.page import asset, render, Section
 
 CLASS = 'armid-result'
+#: Sections that are unfolded at first.
+_OPEN = 2
 
 
-def fragment(sections: Sequence[Section], n_open: int = 2) -> str:
+def fragment(sections: Sequence[Section]) -> str:
     """
     Return sections as HTML to be put into another page.
 
@@ -27,11 +29,9 @@ def fragment(sections: Sequence[Section], n_open: int = 2) -> str:
     ----------
     sections : sequence of Section
         In order; those without a title are shown as they are.
-    n_open : int
-        As many of them are unfolded.
 
     """
-    values = {'class': CLASS, 'style': _style(), 'sections': sections, 'n_open': n_open}
+    values = {'class': CLASS, 'style': _style(), 'sections': sections, 'n_open': _OPEN}
     return str(render('fragment.html', values))
 
 

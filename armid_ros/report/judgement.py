@@ -11,6 +11,7 @@ from typing import NamedTuple
 from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted, digits
 from armid_ros.report.statistics import Trend, Whiteness
@@ -27,6 +28,8 @@ _LISTED = 3
 TELLING_SHARE = 0.15
 #: Share of the lags outside their 99 % band from which a residual is far from white.
 COLOURED_SHARE = 0.25
+#: Fewer samples of a residual go with nothing.
+_FEWEST = 20
 
 
 class Caution(NamedTuple):
@@ -259,17 +262,23 @@ def _verification_findings(verification: Verification | None) -> list[Caution]:
     return findings
 
 
+def residual_by_variable(
+    fits: Sequence[Fit], joint: int
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return a joint's residual, and its speed, position and load in the same samples, (N,)."""
+    used = np.concatenate([fit.informative[:, joint] for fit in fits])
+    parts = {
+        'speed': [fit.motion.dq for fit in fits],
+        'position': [fit.motion.q for fit in fits],
+        'load': [fit.predicted for fit in fits],
+    }
+    residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
+    return residual, {key: np.concatenate(own)[used, joint] for key, own in parts.items()}
+
+
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
     """Return how much of a joint's residual goes with its speed, its position and its load."""
-    used = np.concatenate([fit.informative[:, joint] for fit in fits])
-    residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
-    if len(residual) < 20:
+    residual, axes = residual_by_variable(fits, joint)
+    if len(residual) < _FEWEST:
         return {}
-    axes = {
-        'speed': [fit.motion.dq[:, joint] for fit in fits],
-        'position': [fit.motion.q[:, joint] for fit in fits],
-        'load': [fit.predicted[:, joint] for fit in fits],
-    }
-    return {
-        name: Trend.of(np.concatenate(parts)[used], residual).share for name, parts in axes.items()
-    }
+    return {name: Trend.of(x, residual).share for name, x in axes.items()}

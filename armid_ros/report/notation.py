@@ -94,9 +94,9 @@ def probability(p: float) -> str:
     return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
 
 
-def counted(number: int, what: str, plural: str = '') -> str:
+def counted(number: int, what: str) -> str:
     """Return a number with its noun: '1 joint', '2 joints'."""
-    return f'{number} {what if number == 1 else plural or what + "s"}'
+    return f'{number} {what if number == 1 else what + "s"}'
 
 
 def robot_label(source: str) -> str:

@@ -3,14 +3,12 @@
 """
 The page that every report is: one file, nothing to load, sections one below the other.
 
-A section is a small frozen dataclass with a title and a template of its own; the template sees
-the section under that name.
+A section is a small frozen dataclass with a title and a template of its own.
 
 """
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -24,14 +22,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 
-class Section(ABC):
+class Templated:
     """
-    One part of a page.
+    Something with a template, which sees it as `block`.
 
     Attributes
     ----------
-    title : str
-        Heading; empty for none.
     template : str
         Name of the file in templates/.
     package : str
@@ -39,18 +35,31 @@ class Section(ABC):
 
     """
 
-    title: ClassVar[str]
     template: ClassVar[str]
     package: ClassVar[str] = 'armid_ros.report'
+
+    def html(self) -> Markup:
+        """Return it as HTML, everything in it escaped."""
+        return render(self.template, {'block': self, 'section': self}, self.package)
+
+
+class Section(Templated):
+    """
+    One part of a page, which its template sees as `section`.
+
+    Attributes
+    ----------
+    title : str
+        Heading; empty for none.
+
+    """
+
+    title: ClassVar[str]
 
     @property
     def anchor(self) -> str:
         """Name of the section within the page, for links."""
         return re.sub('[^a-z0-9]+', '-', self.title.lower()).strip('-')
-
-    def html(self) -> Markup:
-        """Return the section as HTML, everything in it escaped."""
-        return render(self.template, {'section': self}, self.package)
 
 
 @dataclass(frozen=True)

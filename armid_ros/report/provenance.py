@@ -13,7 +13,6 @@ import platform
 
 from armid_ros.files import settled
 
-_BLOCK = 1 << 20
 #: Packages whose version can change a result.
 _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 
@@ -74,7 +73,10 @@ def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
     found = []
     for path in map(Path, paths):
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]
-        found += [_hash(file) for file in inside if file.is_file()]
+        for file in filter(Path.is_file, inside):
+            with file.open('rb') as stream:
+                digest = hashlib.file_digest(stream, 'sha256').hexdigest()
+            found.append(FileHash(str(settled(file)), file.stat().st_size, digest))
     return tuple(found)
 
 
@@ -87,12 +89,3 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return known
-
-
-def _hash(path: Path) -> FileHash:
-    digest, size = hashlib.sha256(), 0
-    with path.open('rb') as stream:
-        while block := stream.read(_BLOCK):
-            digest.update(block)
-            size += len(block)
-    return FileHash(str(settled(path)), size, digest.hexdigest())

@@ -14,12 +14,11 @@ import numpy as np
 _CAPTION = 30.0
 
 
-@dataclass(frozen=True)
-class Camera:
+def view(azimuth: float, elevation: float) -> FloatArray:
     """
-    Where space is looked at from, without perspective.
+    Return the directions right, up and towards the eye, as seen without perspective, shape (3, 3).
 
-    Attributes
+    Parameters
     ----------
     azimuth : float
         Direction of the eye about z, from x [rad].
@@ -27,26 +26,19 @@ class Camera:
         Height of the eye over the horizon [rad].
 
     """
-
-    azimuth: float
-    elevation: float
-
-    def flat(self, points: FloatArray) -> FloatArray:
-        """Return what is right and up of points, shape (..., 3) to (..., 2) [m]."""
-        (sa, ca), (se, ce) = _sine_cosine(self.azimuth), _sine_cosine(self.elevation)
-        axes = np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce]])
-        return np.asarray(points @ axes.T)
-
-    def near(self, points: FloatArray) -> FloatArray:
-        """Return how near points are to the eye, shape (..., 3) to (...) [m]."""
-        (sa, ca), (se, ce) = _sine_cosine(self.azimuth), _sine_cosine(self.elevation)
-        return np.asarray(points @ np.array([ca * ce, sa * ce, se]))
+    (sa, ca), (se, ce) = ((np.sin(x), np.cos(x)) for x in (azimuth, elevation))
+    return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
 
 
 #: From the left, x to the right and z up.
-SIDE = Camera(-np.pi / 2.0, 0.0)
+SIDE = view(-np.pi / 2.0, 0.0)
 #: From the front right and above.
-CORNER = Camera(np.radians(-55.0), np.radians(18.0))
+CORNER = view(np.radians(-55.0), np.radians(18.0))
+
+
+def flat(seen: FloatArray, points: FloatArray) -> FloatArray:
+    """Return what is right and up of points in a view, shape (..., 3) to (..., 2) [m]."""
+    return np.asarray(points @ seen[:2].T)
 
 
 @dataclass(frozen=True)
@@ -99,7 +91,3 @@ class Strip:
 def svg_points(points: FloatArray) -> str:
     """Return points, shape (K, 2) [px], as coordinates of SVG."""
     return ' '.join(f'{x:.1f},{y:.1f}' for x, y in points)
-
-
-def _sine_cosine(angle: float) -> tuple[float, float]:
-    return float(np.sin(angle)), float(np.cos(angle))

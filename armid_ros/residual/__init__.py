@@ -8,7 +8,6 @@ residual the map and the law predict, and a table for other programs.
 
 """
 
-from armid_ros.residual.law import Law, Term
 from armid_ros.residual.learn import JointResidual, learn_residual, Residual, WORTH_A_MAP
 from armid_ros.residual.libraries import require_libraries
 from armid_ros.residual.table import lookup_table, TABLE_FILE
@@ -17,9 +16,7 @@ __all__ = [
     'TABLE_FILE',
     'WORTH_A_MAP',
     'JointResidual',
-    'Law',
     'Residual',
-    'Term',
     'learn_residual',
     'lookup_table',
     'require_libraries',

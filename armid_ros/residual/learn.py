@@ -11,7 +11,6 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.effects import Effect
 from armid_ros.effects.learned import as_effect, TorqueMap
 from armid_ros.motion import FloatArray
 from armid_ros.residual.gaussian_process import learn_map
@@ -87,11 +86,6 @@ class Residual:
     base: ArmModel
     arm: ArmModel
     joints: tuple[JointResidual, ...]
-
-    @property
-    def effect(self) -> Effect:
-        """Return the maps as an effect."""
-        return self.arm.effects[-1]
 
     def sentences(self) -> tuple[str, ...]:
         """Say what was learned, a joint a line."""

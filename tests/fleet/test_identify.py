@@ -49,17 +49,20 @@ def by_arm(table, arm):
     return frame[frame['arm'].astype(str) == arm]
 
 
+def alone(paths, outcome):
+    """Return one identification of some bags with the filters of the fleet."""
+    (filters,) = outcome.filters.values()
+    arm = ArmModel.of(URDF, effects=EFFECTS)
+    recordings = [read_recording(path, joints=arm.robot.joints) for path in paths]
+    settings = IdentificationSettings('wls', SignalSettings(filters.cutoff_hz, filters.decimation))
+    return identify(arm, recordings, settings, rng=np.random.default_rng(0))
+
+
 @pytest.mark.parametrize('number', [0, 1, 2])
 def test_an_arm_is_what_one_identification_of_its_bags_is(bags, done, number):
     outcome, store = done
-    (filters,) = outcome.filters.values()
-    arm = ArmModel.of(URDF, effects=EFFECTS)
     name = f'arm_{number:04d}'
-    recordings = [
-        read_recording(path, joints=arm.robot.joints) for path in sorted((bags / name).iterdir())
-    ]
-    settings = IdentificationSettings('wls', SignalSettings(filters.cutoff_hz, filters.decimation))
-    one = identify(arm, recordings, settings, rng=np.random.default_rng(0))
+    one = alone(sorted((bags / name).iterdir()), outcome)
     rows = by_arm(store.data_set('arms'), name)
     assert list(rows['name']) == [parameter.name for parameter in one.estimate.parameters]
     np.testing.assert_allclose(rows['value'], one.estimate.values, rtol=1e-9, atol=1e-13)
@@ -71,16 +74,8 @@ def test_an_arm_is_what_one_identification_of_its_bags_is(bags, done, number):
 
 def test_a_bag_is_what_its_own_identification_is(bags, done):
     outcome, store = done
-    (filters,) = outcome.filters.values()
-    arm = ArmModel.of(URDF, effects=EFFECTS)
     path = bags / 'arm_0001' / '2026-01-02'
-    settings = IdentificationSettings('wls', SignalSettings(filters.cutoff_hz, filters.decimation))
-    one = identify(
-        arm,
-        [read_recording(path, joints=arm.robot.joints)],
-        settings,
-        rng=np.random.default_rng(0),
-    )
+    one = alone([path], outcome)
     frame = store.data_set('parameters').to_pandas()
     rows = frame[frame['bag'] == str(path)]
     np.testing.assert_allclose(rows['value'], one.estimate.values, rtol=1e-9, atol=1e-13)

@@ -47,7 +47,7 @@ def bucket(bags):
 
 
 @pytest.mark.long
-def test_an_object_store_gives_the_digits_of_a_folder(bags, bucket, tmp_path):
+def test_an_object_store_gives_the_digits_of_a_folder_and_is_watched(bags, bucket, tmp_path):
     with connected(None, 1) as client:
         found = find_bags([f'{bucket}/bags/*/*'])
         assert [(bag.arm, bag.day) for bag in found[:1]] == [('arm_0000', '2026-01-01')]
@@ -55,15 +55,8 @@ def test_an_object_store_gives_the_digits_of_a_folder(bags, bucket, tmp_path):
         local = find_bags([f'{bags}/arm_000[01]/*'])
         identified(client, local, URDF, str(tmp_path), FIXED)
     assert (outcome.done, outcome.refused) == (6, ())
-    there, here = digits(Store(f'{bucket}/results')), digits(Store(str(tmp_path)))
-    assert there == here
-
-
-@pytest.mark.long
-def test_results_in_an_object_store_are_watched_there(bucket):
     store = Store(f'{bucket}/results')
-    with connected(None, 1) as client:
-        identified(client, find_bags([f'{bucket}/bags/*/*']), URDF, store.url, FIXED)
+    assert digits(store) == digits(Store(str(tmp_path)))
     write_watch(store, watch_fleet(store))
     assert store.read('alarms.jsonl') == b''
     assert len(store.read_table('watch/arms.parquet')) == 2

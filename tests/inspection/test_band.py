@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.inspection.band import effort_bands, LEAST, noise_band
-from armid_ros.recording import Recording
+from armid_ros.inspection.band import LEAST, noise_band, standing_bands
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
@@ -19,10 +18,6 @@ def filtered(noise, kind, band):
         keep = c - np.sqrt(c**2 - 1.0)
         return lfilter([1.0 - keep], [1.0, -keep], noise, axis=0)
     return lfilter(*butter(2, band, fs=RATE), noise, axis=0)
-
-
-def recording(t, q, tau):
-    return Recording(joints=('a',), t=t, q=q, dq=None, tau=tau)
 
 
 @pytest.mark.parametrize('kind', ['smoothing', 'butterworth'])
@@ -52,10 +47,10 @@ def test_only_where_the_arm_stands_is_looked_at():
     q = np.where(moving, np.sin(2.0 * np.pi * 0.5 * (t - 4.0)), 0.0)[:, np.newaxis]
     friction = np.sign(np.gradient(q, axis=0))  # falls off as a filter does, and is none
     tau = 10.0 * q + friction
-    white = recording(t, q, tau + rng.normal(size=tau.shape))
-    assert np.isnan(effort_bands(white)).all()
-    noise = filtered(rng.normal(size=tau.shape), 'smoothing', 20.0)
-    found = effort_bands(recording(t, q, tau + noise))
+    white = tau + rng.normal(size=tau.shape)
+    assert np.isnan(standing_bands(q, white, 1.0 / RATE)).all()
+    smooth = tau + filtered(rng.normal(size=tau.shape), 'smoothing', 20.0)
+    found = standing_bands(q, smooth, 1.0 / RATE)
     np.testing.assert_allclose(found, 20.0, rtol=0.35)
-    short = recording(t[2500:5500], q[2500:5500], (tau + noise)[2500:5500])
-    assert np.isnan(effort_bands(short)).all()
+    short = slice(2500, 5500)
+    assert np.isnan(standing_bands(q[short], smooth[short], 1.0 / RATE)).all()

@@ -181,26 +181,10 @@ def test_a_joint_that_moves_without_being_driven_is_doubted(clean):
     assert any(text.startswith(moves) for text in remarks(part, left))
 
 
-def test_noisy_positions_are_answered_with_a_lower_cutoff(clean, robot):
-    """Coarse encoders make noise of every frequency in what is differentiated."""
-    coarse = replace(clean, q=np.round(clean.q / 0.02) * 0.02)
-    rough, fine = (inspect(one, robot, rng=np.random.default_rng(0)) for one in (coarse, clean))
-    assert rough.trial.cutoff_hz < 0.5 * fine.trial.cutoff_hz
-
-
 def test_a_fit_that_explains_little_is_doubted(clean, robot):
     pushed = 3.0 * clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]
     other = replace(clean, tau=clean.tau + pushed)
     assert any('leave' in r or 'refuses' in r for r in remarks(other, robot))
-
-
-def test_joints_that_are_exchanged_are_named_as_identify_does(clean, robot):
-    swapped = replace(clean, tau=clean.tau[:, [1, 0, 2, 3, 4, 5]])
-    found = inspect(swapped, robot, rng=np.random.default_rng(0))
-    (fault,) = found.trial.faults
-    assert 'exchanged' in fault
-    assert ('bad', fault) in [(one.weight, one.text) for one in found.remarks]
-    assert 'Ready' not in found.verdict
 
 
 @pytest.mark.slow

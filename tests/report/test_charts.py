@@ -7,8 +7,16 @@ from io import BytesIO
 import json
 import re
 
-from armid_ros.report import Bar, BarChart, Chart, Series, thinned
-from armid_ros.report.charts import image_data, joined, joined_time, rounded
+from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.charts import (
+    Chart,
+    image_data,
+    joined,
+    joined_time,
+    rounded,
+    Series,
+    thinned,
+)
 from matplotlib.image import imread
 import numpy as np
 
@@ -63,16 +71,15 @@ def test_a_name_cannot_end_the_script_of_a_chart():
 
 
 def test_bars_are_as_long_as_their_values():
-    chart = BarChart(
-        [('a', [Bar(1.0, 'before'), Bar(0.25, 'after')]), ('b', [Bar(2.0, 'before')])], 'N m'
-    )
+    short, long = [Bar(1.0, 'before', 'one'), Bar(0.25, 'after', '1/4')], [Bar(2.0, 'before', 'b')]
+    chart = BarChart([('a', short), ('b', long)])
     widths = re.findall(r'width: ([0-9.]+)%', chart.html())
     assert [float(width) for width in widths] == [50.0, 12.5, 100.0]
-    assert '0.25 N m' in chart.html()
+    assert '>1/4<' in chart.html()
 
 
 def test_bars_of_nothing_have_no_length():
-    chart = BarChart([('<b>', [Bar(0.0, 'floor')])], 'N m')
+    chart = BarChart([('<b>', [Bar(0.0, 'floor', 'none')])])
     assert 'width: 0.0%' in chart.html()
     assert '<b>' not in chart.html() and '&lt;b&gt;' in chart.html()
 

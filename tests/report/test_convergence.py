@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The convergence of an online estimate is drawn with its intervals and the true values."""
 
-from armid_ros.report import identification_report
 from armid_ros.report.families import full_label
-from armid_ros.report.identification_report import Assessment
+from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.sections.convergence import convergence_section
 import numpy as np
 

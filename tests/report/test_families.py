@@ -4,6 +4,7 @@
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.report.families import full_label, grouping, parameter_families
+from armid_ros.report.notation import robot_label
 from armid_ros.report.sections.parameters import parameter_section
 import numpy as np
 import pytest
@@ -58,3 +59,16 @@ def test_a_group_is_a_sum_over_named_links():
     estimate = Estimate((name,), np.ones(1), 0.01 * np.eye(1))
     page = parameter_section(estimate, np.ones(1), links=links).html()
     assert f'<small>{words}' in page
+
+
+@pytest.mark.parametrize(
+    ('source', 'label'),
+    [
+        ('humanoid_arm', 'humanoid_arm'),
+        ('/a/long path/arm.urdf', 'arm.urdf'),
+        ('../arm.xacro tool:=true side:=/left', 'arm.xacro tool:=true side:=/left'),
+        ('-', '-'),
+    ],
+)
+def test_a_robot_is_called_as_its_file(source, label):
+    assert robot_label(source) == label

@@ -37,9 +37,5 @@ def test_every_column_of_the_joints_has_its_unit_in_one_piece(html):
     assert all('N m' not in head for head in heads)
 
 
-def test_what_was_remarked_stands_first(html):
-    assert html.index('1 gap') < html.index('id="joints"')
-
-
 def test_a_browser_draws_every_curve_within_the_window(charts_drawn, html):
     assert charts_drawn(html, 400, dark=False) == 2 * 2 + 1

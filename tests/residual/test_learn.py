@@ -97,14 +97,17 @@ def unknown():
     return diagnose(bench.arm, known, validate=[held_out], rng=np.random.default_rng(0))
 
 
-def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown):
-    asked = replace(unknown, verdict='unknown')
-    learned = learn_residual(asked, np.random.default_rng(0))
+@pytest.fixture(scope='module')
+def learned(unknown):
+    """Return what is learned of it."""
+    return learn_residual(replace(unknown, verdict='unknown'), np.random.default_rng(0))
+
+
+def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown, learned):
     best = learned.joints[0]
-    assert best.joint == asked.arm.robot.joints[1]
+    assert best.joint == unknown.arm.robot.joints[1]
     assert best.gain > 0.5
-    assert learned.arm.effects[-1] is learned.effect
-    part = asked.data[0]
+    part = unknown.data[0]
     before, after = (part.residual(arm)[:, 1] for arm in (learned.base, learned.arm))
     assert np.std(after) < 0.7 * np.std(before)
     table = lookup_table(learned).splitlines()
@@ -114,10 +117,9 @@ def test_what_has_no_name_is_learned_and_becomes_part_of_the_model(unknown):
     assert learned.joints[0].learned.torque(at) == pytest.approx(first[3], abs=1e-5)
 
 
-def test_the_page_says_what_is_in_the_model_that_is_written(unknown):
+def test_the_page_says_what_is_in_the_model_that_is_written(unknown, learned):
     plain = diagnosis_report(unknown, {}, robot='two_links')
     asked = replace(unknown, verdict='unknown')
-    learned = learn_residual(asked, np.random.default_rng(0))
     page = diagnosis_report(asked, {}, robot='two_links', extras=Extras(residual=learned))
     joint = asked.arm.robot.joints[1]
     assert 'The model is unchanged.' not in page
@@ -128,8 +130,7 @@ def test_the_page_says_what_is_in_the_model_that_is_written(unknown):
     assert joint in page[begin:end]
 
 
-def test_a_map_that_harms_held_out_recordings_says_so(unknown):
-    learned = learn_residual(replace(unknown, verdict='unknown'), np.random.default_rng(0))
+def test_a_map_that_harms_held_out_recordings_says_so(unknown, learned):
     harmful = replace(learned, joints=(replace(learned.joints[0], held_out=-140.0),))
     assert 'get worse' in harmful.sentences()[0]
     page = diagnosis_report(unknown, {}, robot='two_links', extras=Extras(residual=harmful))

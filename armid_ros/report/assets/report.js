@@ -44,8 +44,6 @@
       Object.assign(series, {spanGaps: true, points: {show: true, space: 0, size: 4, fill: paint}});
     } else if (entry.kind === 'sticks') {
       Object.assign(series, {paths: sticks, width: 2});
-    } else if (entry.kind === 'steps') {
-      series.paths = uPlot.paths.stepped({align: 1});
     } else if (measured && entry.role === 'after') {
       Object.assign(series, {dash: [6, 5], width: 1.6});
     }

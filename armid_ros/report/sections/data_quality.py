@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from armid_ros.identification import Fit
-from armid_ros.identification.rows.period import exact_period
+from armid_ros.identification.rows.period import exact_period, find_period
+from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
     BulletList,
@@ -19,7 +20,6 @@ from armid_ros.report.blocks import (
     TableCell,
 )
 from armid_ros.report.notation import digits, plain
-from armid_ros.report.repeatability import Repeatability
 from armid_ros.report.sources import with_names
 from armid_ros.robots import Robot
 import numpy as np
@@ -28,6 +28,10 @@ import numpy as np
 _GAP = 5.0
 #: Share of the residual that repeats, from which a better model would help [%].
 _TELLING = 50.0
+#: Motion in which a period is looked for [s].
+_SEARCHED = 150.0
+#: Fewer pairs of samples tell no deviation.
+_FEWEST = 20
 
 
 def data_quality_section(
@@ -88,21 +92,24 @@ def _repeatability(
 ) -> list[PageBlock]:
     folds: list[PageBlock] = []
     for recording, _, fits in read:
-        found = Repeatability.of(fits) if fits else None
+        found = repeatability(fits) if fits else None
         if found is None:
             continue
+        period, varying, residual = found
+        power = np.where(residual > 0.0, residual, 1.0) ** 2
+        shares = 100.0 * np.clip(1.0 - varying**2 / power, 0.0, 1.0)
         rows = []
         for k, joint in enumerate(robot.joints):
-            share, unit = 100.0 * float(found.repeating_share[k]), robot.torque_units[k]
+            unit = robot.torque_units[k]
             rows.append(
                 (
                     joint,
-                    f'{digits(found.varying[k])} {unit}',
-                    f'{digits(found.residual[k])} {unit}',
-                    TableCell(f'{share:.0f} %', 'telling' if share > _TELLING else ''),
+                    f'{digits(varying[k])} {unit}',
+                    f'{digits(residual[k])} {unit}',
+                    TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > _TELLING else ''),
                 )
             )
-        period = exact_period(recording, found.period)
+        period = exact_period(recording, period)
         source = recording.source or 'in memory'
         folds.append(
             Fold(
@@ -122,3 +129,38 @@ def _repeatability(
         'one excitation to separate noise from model error.'
     )
     return folds or [unknown]
+
+
+def repeatability(fits: Sequence[Fit]) -> tuple[float, FloatArray, FloatArray] | None:
+    """
+    Return the period of a motion, what does not repeat after it, and the residual.
+
+    Two periods are compared in the longest stretch of a recording; None where nothing repeats. The
+    difference is of the residual, in which each period has its own positions: what depends on the
+    motion alone cancels, be it modelled or not.
+
+    Returns
+    -------
+    period : float
+        [s].
+    varying : ndarray, shape (n,)
+        Standard deviation of what does not repeat [N m].
+    residual : ndarray, shape (n,)
+        Root mean square of the residual of the same samples [N m].
+
+    """
+    fit = max(fits, key=lambda one: len(one.motion))
+    count = int(np.searchsorted(fit.motion.t, fit.motion.t[0] + _SEARCHED))
+    motion = fit.motion.select(slice(count))
+    found = find_period(motion) if count > _FEWEST else None
+    if found is None or found[1].stop - found[1].start < _FEWEST:
+        return None
+    lag, where = found
+    first = slice(where.start, where.stop)
+    second = slice(where.start + lag, where.stop + lag)
+    used = fit.informative[first] & fit.informative[second]
+    pairs = np.maximum(used.sum(axis=0), 1)
+    one, other = fit.residual[first], fit.residual[second]
+    apart = np.sum((other - one) ** 2, axis=0, where=used) / pairs
+    both = np.sum(one**2 + other**2, axis=0, where=used) / pairs
+    return float(motion.t[lag] - motion.t[0]), np.sqrt(0.5 * apart), np.sqrt(0.5 * both)

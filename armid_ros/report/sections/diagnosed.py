@@ -71,7 +71,7 @@ def shares_section(diagnosis: Diagnosis) -> ContentSection:
                 'causes, each joint in units of its floor. Noise is part of the gap, so no cause '
                 'explains all of it.'
             ),
-            BarChart(rows, '', full=1.0),
+            BarChart(rows, full=1.0),
         ],
     )
 

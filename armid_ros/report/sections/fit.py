@@ -58,7 +58,6 @@ def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
         rows.append((robot.joints[joint], bars))
     return BarChart(
         rows,
-        '%',
         [
             (role, f'{label} error: rms of residual over rms of torque')
             for role, label, _ in scores
@@ -124,7 +123,7 @@ def fit_section(
             unit = robot.torque_units[joint]
             share = digits(score.joint_relative_error_percent[joint])
             said = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
-            charts = fit_charts(group[worst], joint, unit, f'{role}-{joint}')
+            charts = _fit_charts(group[worst], joint, unit, f'{role}-{joint}')
             panels.append((robot.joints[joint], said, charts))
         which = ' predicted worst' * several
         blocks.append(
@@ -142,22 +141,8 @@ def _worst_first(score: Score) -> list[int]:
     return [int(joint) for joint in np.argsort(-score.joint_relative_error_percent)]
 
 
-def fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:
-    """
-    Draw the torque of one joint, measured and predicted, and the residual.
-
-    Parameters
-    ----------
-    fits : sequence of Fit
-        Stretches of one recording.
-    joint : int
-        Which joint.
-    unit : str
-        Unit of its torque.
-    link : str
-        Name under which both zoom together.
-
-    """
+def _fit_charts(fits: Sequence[Fit], joint: int, unit: str, link: str) -> tuple[Chart, Chart]:
+    """Draw the torque of one joint, measured and predicted, and the residual."""
     t = joined_time([fit.motion.t for fit in fits])
     measured = joined([fit.motion.tau[:, joint] for fit in fits if fit.motion.tau is not None])
     predicted = joined([fit.predicted[:, joint] for fit in fits])
@@ -242,7 +227,7 @@ def forward_section(
             )
             for joint, name in enumerate(robot.joints)
         ]
-        own.append(BarChart(rows, 'mrad', [(role, label) for role, label, _ in models], True))
+        own.append(BarChart(rows, [(role, label) for role, label, _ in models], True))
         own += _worst_joint(robot, pair, models)
         said = pair.after.worst
         if pair.before is not None:

@@ -64,7 +64,7 @@ def gap_section(
                 f'Root mean square error of each joint on {where}. Each bar is in units of the '
                 f"joint's floor. The floor is {floor}.{kept}"
             ),
-            BarChart(rows, '', [(role, label) for role, label, _ in roles]),
+            BarChart(rows, [(role, label) for role, label, _ in roles]),
         ],
     )
 

@@ -4,37 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
-
-from armid_ros.report.blocks import ContentSection, DataTable, Paragraph, TableCell, Templated
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    Paragraph,
+    SmallMultiples,
+    TableCell,
+)
 from armid_ros.report.charts import image_data
 from armid_ros.report.notation import digits, percent
+from armid_ros.report.page import render
 from armid_ros.residual import JointResidual, Residual, TABLE_FILE
+from markupsafe import Markup
 import numpy as np
 
 #: Cells of a picture along position and velocity.
 _CELLS = 80, 60
 _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5)
-
-
-@dataclass(frozen=True)
-class HeatMaps(Templated):
-    """
-    Pictures over position and velocity.
-
-    Attributes
-    ----------
-    pictures : sequence of (str, str, str, tuple of str)
-        Caption, image as data, the same in words, and the left, right, low and high end of the
-        axes with units.
-
-    """
-
-    template: ClassVar[str] = 'heat_maps.html'
-
-    pictures: Sequence[tuple[str, str, str, Sequence[str]]]
 
 
 def residual_map_section(residual: Residual) -> ContentSection:
@@ -84,14 +70,12 @@ def residual_map_section(residual: Residual) -> ContentSection:
                 'an effect of your own if it is plausible, and diagnose again.',
                 'hint',
             ),
-            HeatMaps(pictures),
+            SmallMultiples(pictures),
         ],
     )
 
 
-def _pictures(
-    one: JointResidual, unit: str, length: str
-) -> list[tuple[str, str, str, Sequence[str]]]:
+def _pictures(one: JointResidual, unit: str, length: str) -> list[tuple[str, str, Markup, str]]:
     """Return pictures of torque and deviation at the middle load, the largest velocity on top."""
     q, dq = (one.axis(number, count) for number, count in enumerate(_CELLS))
     load = np.full((len(dq), len(q)), one.ranges[2].mean())
@@ -102,22 +86,24 @@ def _pictures(
     most = f'most at {digits(q[column])} {length} and {digits(dq[::-1][row])} {length}/s'
     colours = np.where((torque >= 0.0)[..., None], _POSITIVE, _NEGATIVE)
     unsure = f'{digits(one.learned.amplitude)} {unit}'
-    ends = (
-        *(f'{digits(value)} {length}' for value in (q[0], q[-1])),
-        *(f'{digits(value)} {length}/s' for value in (dq[0], dq[-1])),
-    )
-    return [
+    ends = {
+        **{name: f'{digits(x)} {length}' for name, x in (('left', q[0]), ('right', q[-1]))},
+        **{name: f'{digits(x)} {length}/s' for name, x in (('low', dq[0]), ('high', dq[-1]))},
+    }
+    maps = (
         (
             f'{one.joint}: torque, blue up to {digits(peak)} {unit}, orange down to '
             f'-{digits(peak)} {unit}',
             image_data(colours, torque / peak),
             f'Learned torque of {one.joint} over position and velocity, {most}',
-            ends,
         ),
         (
             f'{one.joint}: standard deviation (dark: large; {unsure} far from data)',
             image_data(np.broadcast_to(_UNSURE, (*std.shape, 3)), std / one.learned.amplitude),
             'Standard deviation of that torque',
-            ends,
         ),
+    )
+    return [
+        (caption, '', render('heat_map.html', {'image': image, 'words': words, **ends}), 'heat')
+        for caption, image, words in maps
     ]

@@ -18,7 +18,7 @@ from armid_ros.report.blocks import (
     TableCell,
 )
 from armid_ros.report.charts import Chart, Level, Series
-from armid_ros.report.judgement import explained_shares, TELLING_SHARE
+from armid_ros.report.judgement import explained_shares, residual_by_variable, TELLING_SHARE
 from armid_ros.report.statistics import Trend, Whiteness
 from armid_ros.robots import Robot
 import numpy as np
@@ -51,17 +51,16 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
             for share in shares[joint]
         ]
         rows.append([name, *(cells or ('too few samples in motion', '', ''))])
-        used = np.concatenate([fit.informative[:, joint] for fit in fits])
-        residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
+        residual, axes = residual_by_variable(fits, joint)
         torque, length = robot.torque_units[joint], robot.position_units[joint]
-        axes = (
-            ([fit.motion.dq[:, joint] for fit in fits], f'speed [{length}/s]'),
-            ([fit.motion.q[:, joint] for fit in fits], f'position [{length}]'),
-            ([fit.predicted[:, joint] for fit in fits], f'load: predicted torque [{torque}]'),
+        labels = (
+            f'speed [{length}/s]',
+            f'position [{length}]',
+            f'load: predicted torque [{torque}]',
         )
         charts = [
-            cloud(np.concatenate(parts)[used], residual, label, f'residual [{torque}]')
-            for parts, label in axes
+            _cloud(x, residual, label, f'residual [{torque}]')
+            for x, label in zip(axes.values(), labels, strict=True)
         ]
         opened = most[joint] == max(most) or most[joint] > TELLING_SHARE
         panels = Panels([('', '', [chart]) for chart in charts], three=True)
@@ -81,18 +80,8 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
     )
 
 
-def cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
-    """
-    Draw a residual against a variable, with its mean in bins.
-
-    Parameters
-    ----------
-    x, residual : ndarray, shape (N,)
-        Variable and residual of the same samples.
-    xlabel, ylabel : str
-        Axes with units.
-
-    """
+def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
+    """Draw a residual against a variable of the same samples, with its mean in bins."""
     trend = Trend.of(x, residual)
     chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(_CLOUD, len(x))).astype(np.intp))
     abscissa = np.concatenate([x[chosen], trend.centre])

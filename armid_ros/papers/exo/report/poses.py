@@ -12,7 +12,7 @@ from armid_ros.model import point_motion
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.report.page import Section
-from armid_ros.report.strip import SIDE, Strip, svg_points
+from armid_ros.report.strip import flat, SIDE, Strip, svg_points
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -75,7 +75,7 @@ def draw_poses(
     ]
     ties = [
         tuple(
-            np.round(strip.place(SIDE.flat(np.stack([start, start + _MAGNIFIED * way])), pose), 1)
+            np.round(strip.place(flat(SIDE, np.stack([start, start + _MAGNIFIED * way])), pose), 1)
             .ravel()
             .tolist()
         )
@@ -96,5 +96,5 @@ def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:
         following = None if last else np.array(robot.model.jointPlacements[body + 2].translation)
         if following is None or np.linalg.norm(following) < 1e-9:
             end, _ = point_motion(robot, joint, (6.0 if last else 1.8) * lever, q)
-            spurs.append(SIDE.flat(np.stack([origins[body + 1], end], axis=1)))
-    return [SIDE.flat(np.stack(origins, axis=1)), *spurs]
+            spurs.append(flat(SIDE, np.stack([origins[body + 1], end], axis=1)))
+    return [flat(SIDE, np.stack(origins, axis=1)), *spurs]
