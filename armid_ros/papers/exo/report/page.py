@@ -91,7 +91,7 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verd
     if walked is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)
         sentences.append(
-            f'Over a whole walking cycle, joints driven by the computed torque are off by at most: '
+            'Over a whole walking cycle, joints driven by the computed torque are off by at most: '
             f'{each}.'
         )
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
