@@ -279,8 +279,7 @@ def check(
     if not read:
         return CheckResult(described, remarks, None)
     found = identify(described, read, rng=rng)
-    fault = next(iter(found.graded.faults), '')
-    if not fault and found.grade == 'unusable':
-        fault = found.graded.reasons[0]
+    graded = found.graded
+    fault = next(iter(graded.faults), graded.reasons[0] if graded.word == 'unusable' else '')
     links = check_links(found.core, found.description, found.grade, fault)
     return CheckResult(described, remarks, links)

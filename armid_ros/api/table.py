@@ -107,15 +107,7 @@ DEFAULT_ORIGIN = ResultOrigin()
 
 
 def data_frame(rows: Any) -> pandas.DataFrame:
-    """
-    Return rows as a pandas table.
-
-    Raises
-    ------
-    ArmidError
-        If pandas is not installed.
-
-    """
+    """Return rows as a pandas table; an ArmidError says so where pandas is not installed."""
     try:
         from pandas import DataFrame
     except ModuleNotFoundError:
@@ -148,15 +140,7 @@ class Shown(ABC):
         """Write all files of the result into a folder that exists; return its document."""
 
     def save(self, folder: str | Path) -> Path:
-        """
-        Write the files that the command of the same name writes, all or none.
-
-        Raises
-        ------
-        OutputError
-            If the folder holds results of another kind, or files that armid did not write.
-
-        """
+        """Write the files of the command of the same name; OutputError if others are there."""
         with staged(Path(folder)) as result:
             schema = str(self.fill(result.folder)['schema'])
             with result_folder(Path(folder), schema):

@@ -121,7 +121,8 @@ def _print_remarks(remarks: Sequence[Remark]) -> None:
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
-@parameters.robot_argument
+@click.argument('robot_source', metavar='R', callback=parameters.with_packages)
+@parameters.packages
 @click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     '--out',

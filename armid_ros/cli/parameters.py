@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 import shlex
 from typing import Any, TypeVar
@@ -120,7 +120,7 @@ seed = click.option(
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
 
-_packages = click.option(
+packages = click.option(
     '--package',
     multiple=True,
     metavar='P=FOLDER',
@@ -131,15 +131,6 @@ _packages = click.option(
 )
 
 
-def _described(context: click.Context, _: click.Parameter, source: str | None) -> str | None:
-    return _with_packages(source, context.meta.get(PACKAGES, []))
-
-
-def robot_argument(command: _Command) -> _Command:
-    """Add a description as the first argument, and --package for it."""
-    return click.argument('robot_source', metavar='R', callback=_described)(_packages(command))
-
-
 def robot_described(**values: Any) -> Callable[[_Command], _Command]:
     """Add --robot, with what differs from any other option, and --package for its description."""
     source = click.option(
@@ -147,16 +138,16 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         'robot_source',
         metavar='R',
         shell_complete=_completed(_robots),
-        callback=_described,
+        callback=with_packages,
         **values,
     )
-    return lambda command: source(_packages(command))
+    return lambda command: source(packages(command))
 
 
-def _with_packages(source: str | None, packages: Sequence[str]) -> str | None:
+def with_packages(context: click.Context, _: click.Parameter, source: str | None) -> str | None:
     """Write packages behind the path of a description, where any program takes them."""
     written = []
-    for text in packages:
+    for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')
         if not name or not folder or source in (None, '-'):
             raise click.BadParameter(

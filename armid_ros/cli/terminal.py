@@ -65,19 +65,7 @@ def progress(what: str) -> Iterator[Tick]:
 
 
 class ProgressLines:
-    """
-    Progress as a line of text every ten seconds, for logs and pipes.
-
-    Parameters
-    ----------
-    what : str
-        What is being done.
-    write : callable
-        Is given each line.
-    clock : callable
-        Returns the time [s].
-
-    """
+    """Progress as a line of text every ten seconds, for logs and pipes; `write` gets each."""
 
     #: Time between two lines [s].
     EVERY = 10.0

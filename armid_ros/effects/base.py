@@ -122,13 +122,9 @@ class Effect(ABC):
         chosen = cls._default_joints(robot) if joints is None else joints
         unknown = [name for name in chosen if name not in robot.joints]
         if unknown:
-            by_link = dict(zip(robot.links, robot.joints, strict=True))
-            near = meant(unknown[0], robot.joints)
-            if unknown[0] in by_link:
-                near = f'; the joint of link {unknown[0]} is {by_link[unknown[0]]}'
             raise ModelError(
                 f"{cls.name}: {robot.name} has no joint '{unknown[0]}'; "
-                f'its joints are {", ".join(robot.joints)}{near}'
+                f'its joints are {", ".join(robot.joints)}{meant(unknown[0], robot.joints)}'
             )
         effect = cls(tuple(chosen))
         return effect.with_shape(effect._default_shape(robot)) if cls.shapes else effect

@@ -77,11 +77,7 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verd
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], 1.96 * overall.std[0]
-    true = set(walked.truth.values()) if walked else set()
-    truth = f'; {true.pop():.0f} N/m was simulated' if len(true) == 1 else ''
-    sentences = [
-        f'The straps between exoskeleton and wearer have {k:.0f} ± {reach:.0f} N/m{truth}.'
-    ]
+    sentences = [f'The straps between exoskeleton and wearer have {k:.0f} ± {reach:.0f} N/m.']
     weak = [
         name.replace('_', ' ')
         for part in found[1:]
@@ -90,10 +86,7 @@ def _verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> Verd
     ]
     if walked is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)
-        sentences.append(
-            'Over a whole walking cycle, joints driven by the computed torque are off by at most: '
-            f'{each}.'
-        )
+        sentences.append(f'Over a walking cycle, driven joints are off by at most: {each}.')
     beware = [f'{", ".join(weak)}: too slightly drawn out to know within 10 %.'] if weak else []
     if k - reach <= 0.0:
         return VerdictSection('no interaction', 'fair', ['No interaction is seen.'], beware)
