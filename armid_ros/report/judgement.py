@@ -189,8 +189,8 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
         f'{key} ({", ".join(names) if len(names) <= _LISTED else f"{len(names)} joints"})'
         for key, names in depends.items()
     ]
-    said = f'The residual depends on {", ".join(parts)}: the model lacks an effect.'
-    return (said,) if parts else ()
+    text = f'The residual depends on {", ".join(parts)}: the model lacks an effect.'
+    return (text,) if parts else ()
 
 
 def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:

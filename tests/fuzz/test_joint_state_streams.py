@@ -25,6 +25,7 @@ from hypothesis import example, given, HealthCheck, settings, strategies
 import numpy as np
 import pytest
 from rclpy.clock import Clock
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from tests.ros.test_online_identifier import EFFECT, PENDULUM, two_sines
@@ -129,7 +130,7 @@ def learned(damage: dict[int, tuple], velocity: bool = False) -> OnlineIdentifie
     online = deepcopy(FRESH[velocity])
     reader = JointStateReader(ARM_MODEL.robot.joints, Silent(), Clock())
     for state in stream(damage):
-        for sample in reader.read(state):
+        for sample in reader.read(serialize_message(state)):
             online.update(*sample)
             assert np.all(np.isfinite(online._learner.values))
     return online

@@ -70,5 +70,5 @@ def test_refusal_names_the_link_and_the_remedy():
     robot = load_robot('humanoid_arm')
     pi = robot.rigid_parameters.copy()
     pi[20] = -0.1
-    with pytest.raises(ModelError, match=rf"link '{robot.links[2]}'.*mass -0.1.*consistency"):
+    with pytest.raises(ModelError, match=rf"link '{robot.links[2]}'.*mass -0.1.*physical"):
         require_consistent(robot.links, pi)

@@ -44,7 +44,7 @@ STARTS = {
         from pathlib import Path
         from armid_ros.robots.xacro_expansion import expand_xacro
         Path('arm.xacro').write_text('<robot name="arm"/>')
-        assert 'arm' in expand_xacro(Path('arm.xacro'), {})
+        assert 'arm' in expand_xacro(Path('arm.xacro'), {}, {})
         """,
 }
 

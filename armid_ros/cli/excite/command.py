@@ -287,11 +287,14 @@ def excite(
         else:
             _print(folder, document, result, whose)
         if result.core.stopped == INTERRUPTED:
-            break
+            _interrupted(missing)
+
+
+def _interrupted(missing: list[str | float]) -> None:
+    """End with what is written; name the speeds that are missing."""
     if missing:
         click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
-    if result.core.stopped == INTERRUPTED:
-        raise KeyboardInterrupt
+    raise KeyboardInterrupt
 
 
 def _shown(

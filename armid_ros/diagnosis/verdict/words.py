@@ -142,10 +142,8 @@ def decide(
         return Verdict('partial', f'{said}{tied} There is more: {rest}.')
     if tied:
         return Verdict('ambiguous', f'{said}{tied}')
-    rest = 'With it the error is back at its level before the change.'
-    if hides is None:
-        rest = f'The remaining error is {floor_in_words}.'
-    return Verdict('named', f'{refit}{said} {rest}')
+    level = floor_in_words if hides is None else 'back at its level before the change'
+    return Verdict('named', f'{refit}{said} The remaining error is {level}.')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:
