@@ -50,7 +50,7 @@ def expanded(request: dict[str, Any]) -> dict[str, str]:
         _find_packages(xacro, request, missing)
         document = xacro.process_file(request['path'], mappings=dict(request['arguments']))
         text = str(document.toxml())
-        unknown = _unknown(xacro, request)
+        unknown = _unknown(xacro, request) if request['arguments'] else ''
         if unknown:
             return {'error': unknown}
         answer['text'] = text.replace(f'file://{NOWHERE}', 'package://')
