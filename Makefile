@@ -178,6 +178,7 @@ $(STAMPS)/control_msgs: $(INTERFACES) msg_schemas/present_directories.cmake $(ST
 $(STAMPS)/armid_ros: $(TREE) setup.py setup.cfg package.xml $(wildcard requirements/*.in) $(STAMPS)/armid_msgs
 	@rm -rf build/lib build/bdist.*
 	$(PIP) --no-deps --no-build-isolation --force-reinstall .
+	$(BIN)/python setup.py -q build_ext --inplace  # for what runs in this tree, the tests
 	@touch $@
 
 define SETUP_BASH

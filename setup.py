@@ -5,7 +5,7 @@
 from glob import glob
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
 
 HERE = Path(__file__).resolve().parent  # `colcon build --symlink-install` runs a link to this file
 NAME = 'armid_ros'
@@ -23,7 +23,9 @@ def requirements(group):
 def package_data():
     """List what lies in the package's tree and is not Python."""
     files = sorted(path for path in Path(NAME).rglob('*') if path.is_file())
-    return [str(path.relative_to(NAME)) for path in files if path.suffix not in ('.py', '.pyc')]
+    return [
+        str(path.relative_to(NAME)) for path in files if path.suffix not in ('.py', '.pyc', '.so')
+    ]
 
 
 def commands():
@@ -60,6 +62,10 @@ setup(
     license='Apache-2.0',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: package_data()},
+    # without a compiler the simulator takes all steps in Python
+    ext_modules=[
+        Extension(f'{NAME}.simulation._kernel', [f'{NAME}/simulation/kernel.c'], optional=True)
+    ],
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),

@@ -24,8 +24,9 @@ from scipy.linalg.lapack import dgesv
 #: What each element does: 1 slips forwards, -1 backwards, 0 sticks.
 Modes = tuple[int, ...]
 
-#: Share of its diagonal that is added to G. Elements that depend on one another (two joints and
-#: the sum of the two) make G singular and leave their torques undetermined, never the velocities.
+#: Share of its diagonal that is added to G where that may be singular. Elements that depend on one
+#: another (two joints and the sum of the two) make it so and leave their torques undetermined,
+#: never the velocities.
 REGULARISATION = 1e-10
 
 #: Rounding that does not count as breaking a law: share of a bound, and velocity [rad/s or m/s].
@@ -48,11 +49,14 @@ class BoxLaw:
     lower, upper : ndarray, shape (m,)
         Torque while the element moves backwards, and forwards; lower < upper, infinite for what
         never gives way.
+    shift : float
+        Share of its diagonal that is added to G; 0 where it is regular.
 
     """
 
     lower: FloatArray
     upper: FloatArray
+    shift: float = REGULARISATION
     _limits: list[tuple[float, float]] = field(init=False, repr=False)
     _patterns: dict[Modes, _Pattern] = field(init=False, repr=False, default_factory=dict)
 
@@ -148,5 +152,5 @@ def _pattern(law: BoxLaw, modes: Modes) -> _Pattern:
     array = np.array(modes)
     stuck = array == 0
     bound = np.where(stuck, 0.0, np.where(array > 0, law.upper, law.lower))
-    rows = stuck[:, np.newaxis] * (1.0 + REGULARISATION * np.eye(len(modes)))
+    rows = stuck[:, np.newaxis] * (1.0 + law.shift * np.eye(len(modes)))
     return _Pattern(bound, stuck * 1.0 if stuck.any() else None, rows, np.diag(1.0 - stuck))

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, read_only
+from armid_ros.simulation.compiled import CompiledLoop, CompiledRun
 from armid_ros.simulation.controller import Controller, Target, Targets
 from armid_ros.simulation.integrator import step
 from armid_ros.simulation.plant import Plant, State
@@ -44,7 +45,12 @@ def command(plant: Plant, controller: Controller, state: State, target: Target) 
 
 
 def run(
-    plant: Plant, controller: Controller, state: State, torque: FloatArray, targets: Targets
+    plant: Plant,
+    controller: Controller,
+    state: State,
+    torque: FloatArray,
+    targets: Targets,
+    compiled: CompiledLoop | None = None,
 ) -> Trace:
     """
     Let an arm follow a reference.
@@ -61,6 +67,8 @@ def run(
         Torque of the first step, from `command`.
     targets : Targets
         What to do at the end of each step.
+    compiled : CompiledLoop, optional
+        The same plant and controller, for the steps that it can take.
 
     """
     drive, last = plant.action.drive, len(targets)
@@ -68,12 +76,23 @@ def run(
     links = np.empty((3, *tau.shape))
     motors = links if plant.springs is None else np.empty_like(links)
     q, dq, ddq = links
-    for k, target in enumerate(targets):
+    fast = None if compiled is None else CompiledRun(compiled, targets, links, tau)
+    k = 0
+    while k < last:
         q[k], dq[k], ddq[k], tau[k] = state.q, state.dq, state.ddq, torque
         if motors is not links:
             motors[:, k] = plant.motors(state)
+        reached = k if fast is None else fast.advance(state, k)
+        if reached > k:
+            steps = state.steps + reached - k
+            at, speed, pull = map(read_only, links[:, reached])
+            modes, memory = state.modes, state.memory
+            state = State(steps, steps * plant.dt, at, speed, pull, modes, memory)
+            k, torque = reached, tau[reached]
+            continue
         state = step(plant, state, torque if drive is None else drive(torque))
-        torque = command(plant, controller, state, target)
+        torque = command(plant, controller, state, next(iter(targets[k : k + 1])))
+        k += 1
     q[last], dq[last], ddq[last], tau[last] = state.q, state.dq, state.ddq, torque
     if motors is not links:
         motors[:, last] = plant.motors(state)

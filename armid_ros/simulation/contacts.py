@@ -4,33 +4,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 from armid_ros.effects import DryFriction, NO_FRICTION
 from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
-from armid_ros.simulation.box_complementarity import BoxLaw, Modes, SPEED_TOLERANCE
+from armid_ros.simulation.box_complementarity import BoxLaw, REGULARISATION
 import numpy as np
-import numpy.typing as npt
-
-
-class KnownModes(NamedTuple):
-    """
-    What is constant of a step as long as every element does what it does.
-
-    Attributes
-    ----------
-    taken : ndarray, shape (n,)
-        Joint torques that slipping elements take [N m].
-    held : tuple of ndarray, of shapes (n,), (n, n) and (n, n), or None
-        What takes joints that stick out of the system: 1 for joints that move, 1 where two of
-        them meet, and a diagonal matrix with 1 for those that stick. None if none does.
-
-    """
-
-    taken: FloatArray
-    held: tuple[FloatArray, FloatArray, FloatArray] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +26,6 @@ class Contacts:
         What torques they take.
     axes : tuple of int, length m
         The joint that an element acts on alone; -1 if it acts on several.
-    own : bool
-        Whether they are friction of one joint after the other, whatever its load, so that a joint
-        whose element sticks stood still before.
     friction : DryFriction
         What they are without a load, where the load matters.
 
@@ -57,9 +34,7 @@ class Contacts:
     directions: FloatArray
     law: BoxLaw
     axes: tuple[int, ...]
-    own: bool
     friction: DryFriction | None = None
-    _patterns: dict[Modes, KnownModes] = field(init=False, repr=False, default_factory=dict)
 
     @classmethod
     def of(cls, friction: DryFriction) -> Contacts:
@@ -67,41 +42,10 @@ class Contacts:
         directions = friction.directions
         joints = [np.flatnonzero(direction).tolist() for direction in directions]
         axes = tuple(some[0] if len(some) == 1 else -1 for some in joints)
-        law = BoxLaw(friction.lower, friction.upper)
+        independent = -1 not in axes and len(set(axes)) == len(axes)
+        law = BoxLaw(friction.lower, friction.upper, 0.0 if independent else REGULARISATION)
         loaded = None if friction.load_share is None else friction
-        own = loaded is None and np.array_equal(directions, np.eye(directions.shape[1]))
-        return cls(directions, law, axes, own, loaded)
-
-    def pattern(self, modes: Modes) -> KnownModes | None:
-        """
-        Return what a step is made of in which all elements do what they do; None if not known.
-
-        What sticks can be taken out of the system where it is a joint. Patterns of modes come
-        back step after step, so they are kept.
-
-        """
-        found = self._patterns.get(modes)
-        if found is None and (self.own or 0 not in modes):
-            found = self._patterns[modes] = self._new_pattern(np.array(modes, dtype=int))
-        return found
-
-    def _new_pattern(self, modes: npt.NDArray[np.intp]) -> KnownModes:
-        bound = np.where(modes > 0, self.law.upper, np.where(modes < 0, self.law.lower, 0.0))
-        taken = np.asarray(bound @ self.directions)
-        if modes.all():
-            return KnownModes(taken, None)
-        free = np.where(modes == 0, 0.0, 1.0)
-        return KnownModes(taken, (free, np.outer(free, free), np.diag(1.0 - free)))
-
-    def obeyed(self, dq: FloatArray, modes: Modes, taken: FloatArray | None) -> bool:
-        """Tell whether elements obey their laws at joint velocities, (n,), torques where held."""
-        if taken is not None:
-            return not self.law.violations(dq, taken, modes)
-        speeds = dq if self.own else self.directions.dot(dq)
-        for speed, mode in zip(speeds.tolist(), modes, strict=True):
-            if speed * mode < -SPEED_TOLERANCE:
-                return False
-        return True
+        return cls(directions, law, axes, loaded)
 
     def under(self, load: FloatArray) -> Contacts:
         """Return the contacts as they are under a torque of the rigid body, shape (n,) [N m]."""

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -57,7 +56,66 @@ class Targets:
         return len(self.q)
 
 
-class Controller(ABC):
+@dataclass(frozen=True, eq=False)
+class LinearFeedback:
+    """
+    Inverse dynamics of a rigid body, and a spring and a damper on every joint.
+
+    tau = ID(q, s dq, w^2 e + 2 w de + s ddq_d) + kp e + kd de + feedforward, e = q_d - q.
+
+    Attributes
+    ----------
+    robot : Robot
+        The rigid body that the inverse dynamics ID is of.
+    added_inertia : ndarray, shape (n, n)
+        What is added to its inertia matrix [kg m^2].
+    bandwidth : float
+        w, of the feedback on the acceleration [rad/s].
+    follows : bool
+        Whether velocity and reference acceleration count in ID: s is 1, or 0.
+    weighs : bool
+        Whether gravity does.
+    stiffness, damping : float or ndarray, shape (n,)
+        kp [N m/rad or N/m] and kd [N m s/rad or N s/m].
+
+    """
+
+    robot: Robot
+    added_inertia: FloatArray
+    bandwidth: float = 0.0
+    follows: bool = False
+    weighs: bool = True
+    stiffness: FloatArray | float = 0.0
+    damping: FloatArray | float = 0.0
+    _model: pin.Model = field(init=False, repr=False)
+    _data: pin.Data = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make a body, and scratch memory."""
+        model = pin.Model(self.robot.model)
+        if not self.weighs:
+            model.gravity.linear = np.zeros(3)
+        object.__setattr__(self, '_model', model)
+        object.__setattr__(self, '_data', model.createData())
+
+    def torque(
+        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
+    ) -> FloatArray:
+        """Return the torque, shape (n,); see `Controller.torque`."""
+        behind, slower = desired[0] - q, desired[1] - dq
+        ddq = self.bandwidth**2 * behind
+        ddq += 2.0 * self.bandwidth * slower
+        if self.follows:
+            ddq += desired[2]
+        tau: FloatArray = pin.rnea(self._model, self._data, q, self.follows * dq, ddq)
+        tau += self.added_inertia.dot(ddq)
+        tau += self.stiffness * behind
+        tau += self.damping * slower
+        tau += feedforward
+        return tau
+
+
+class Controller:
     """
     A law from where the arm is, and where it should be, to the torque it is given.
 
@@ -69,10 +127,13 @@ class Controller(ABC):
     ----------
     acts_once : bool
         Whether it keeps something from step to step, so that it may act once a step only.
+    feedback : LinearFeedback, or None
+        What it does, where that has this form.
 
     """
 
     acts_once: ClassVar[bool] = False
+    feedback: LinearFeedback | None = None
 
     def started(self) -> Controller:
         """Return one that has kept nothing yet: this one, where it never does."""
@@ -92,7 +153,6 @@ class Controller(ABC):
         """Return torques that depend on the reference only, shape (N, n) [N m]."""
         return np.zeros_like(desired.q)
 
-    @abstractmethod
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
@@ -109,6 +169,8 @@ class Controller(ABC):
             Row of `feedforward` that belongs to now.
 
         """
+        assert self.feedback is not None, f'{type(self).__name__} has no feedback and no torque'
+        return self.feedback.torque(q, dq, desired, feedforward)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,17 +193,13 @@ class ComputedTorque(Controller):
 
     arm: ArmModel
     bandwidth: float = BANDWIDTH
-    _robot: Robot = field(init=False, repr=False)
-    _data: pin.Data = field(init=False, repr=False)
-    _inertia: FloatArray | None = field(init=False, repr=False)
+    feedback: LinearFeedback = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Collect what the effects of the nominal arm do."""
-        action = self.arm.action()
-        robot = action.robot or self.arm.robot
-        object.__setattr__(self, '_robot', robot)
-        object.__setattr__(self, '_data', robot.model.createData())
-        object.__setattr__(self, '_inertia', action.inertia)
+        robot, inertia = _body(self.arm)
+        feedback = LinearFeedback(robot, inertia, self.bandwidth, follows=True)
+        object.__setattr__(self, 'feedback', feedback)
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return damping, dry friction and other torques at the reference, shape (N, n)."""
@@ -149,21 +207,7 @@ class ComputedTorque(Controller):
         depends = action.dry_friction is not None and action.dry_friction.load_share is not None
         load = self.arm.load(desired) if depends else np.zeros_like(desired.q)
         effort = action.effort(desired, desired, load)
-        return effort if self._inertia is None else effort - desired.ddq @ self._inertia.T
-
-    def torque(
-        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
-    ) -> FloatArray:
-        """Return the computed torque, shape (n,)."""
-        q_desired, dq_desired, ddq_desired = desired
-        ddq = self.bandwidth**2 * (q_desired - q)
-        ddq += 2.0 * self.bandwidth * (dq_desired - dq)
-        ddq += ddq_desired
-        tau: FloatArray = pin.rnea(self._robot.model, self._data, q, dq, ddq)
-        if self._inertia is not None:
-            tau += self._inertia.dot(ddq)
-        tau += feedforward
-        return tau
+        return np.asarray(effort - desired.ddq @ self.feedback.added_inertia.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,28 +230,24 @@ class GravityPD(Controller):
     arm: ArmModel
     stiffness: FloatArray = field(init=False)
     damping: FloatArray = field(init=False)
-    _robot: Robot = field(init=False, repr=False)
-    _data: pin.Data = field(init=False, repr=False)
+    feedback: LinearFeedback = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Choose the gains."""
-        action = self.arm.action()
-        robot = action.robot or self.arm.robot
-        data = robot.model.createData()
-        inertia = np.diag(pin.crba(robot.model, data, robot.middle_pose)).copy()
-        if action.inertia is not None:
-            inertia += np.diag(action.inertia)
-        stiffness = inertia * BANDWIDTH**2
-        object.__setattr__(self, '_robot', robot)
-        object.__setattr__(self, '_data', data)
-        object.__setattr__(self, 'stiffness', read_only(stiffness))
-        object.__setattr__(self, 'damping', read_only(2.0 * np.sqrt(inertia * stiffness)))
+        robot, added = _body(self.arm)
+        inertia = np.diag(pin.crba(robot.model, robot.model.createData(), robot.middle_pose))
+        inertia = inertia + np.diag(added)
+        stiffness = read_only(inertia * BANDWIDTH**2)
+        damping = read_only(2.0 * np.sqrt(inertia * stiffness))
+        feedback = LinearFeedback(robot, added, stiffness=stiffness, damping=damping)
+        object.__setattr__(self, 'stiffness', stiffness)
+        object.__setattr__(self, 'damping', damping)
+        object.__setattr__(self, 'feedback', feedback)
 
-    def torque(
-        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
-    ) -> FloatArray:
-        """Return spring, damper and gravity, shape (n,)."""
-        tau = pin.computeGeneralizedGravity(self._robot.model, self._data, q)
-        tau += self.stiffness * (desired[0] - q)
-        tau += self.damping * (desired[1] - dq)
-        return np.asarray(tau)
+
+def _body(arm: ArmModel) -> tuple[Robot, FloatArray]:
+    """Return the rigid body of an arm with its effects, and the inertia they add, (n, n)."""
+    action = arm.action()
+    robot = action.robot or arm.robot
+    n = robot.n_joints
+    return robot, np.zeros((n, n)) if action.inertia is None else action.inertia

@@ -86,26 +86,8 @@ def _end_velocity(
     dq: FloatArray,
     modes: Modes,
 ) -> tuple[FloatArray, FloatArray, Modes]:
-    """
-    Return velocity at the end and acceleration of a step, and what friction elements and stops do.
-
-    Mostly that is what they did: then what slips takes a known torque and what sticks is no part
-    of the system, and it remains to see that all obey their laws.
-
-    """
-    dt, pattern = plant.spans[0], contacts.pattern(modes)
-    if pattern is not None:
-        right, system = force - pattern.taken, inertia
-        if pattern.held is not None:
-            moving, both, stuck = pattern.held
-            right *= moving
-            system = inertia * both
-            system += stuck
-        ddq = _solve(plant, system, right)
-        dq_next = dq + dt * ddq
-        taken = None if pattern.held is None else force - inertia.dot(ddq)
-        if contacts.obeyed(dq_next, modes, taken):
-            return dq_next, ddq, modes
+    """Return velocity at the end and acceleration, and what friction elements and stops do."""
+    dt = plant.spans[0]
     directions = contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions

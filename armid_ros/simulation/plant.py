@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
@@ -295,7 +295,7 @@ class Plant:
                 if loaded is None or loaded.load_share is None
                 else np.append(loaded.load_share, np.zeros(len(hit))),
             )
-            self._at_stops[key] = replace(Contacts.of(elements), own=False)
+            self._at_stops[key] = Contacts.of(elements)
         return self._at_stops[key]
 
 

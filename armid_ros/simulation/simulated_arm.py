@@ -12,6 +12,7 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.closed_loop import command, run, Trace
+from armid_ros.simulation.compiled import CompiledLoop
 from armid_ros.simulation.controller import ComputedTorque, Controller, Targets
 from armid_ros.simulation.course import Course
 from armid_ros.simulation.motor_control import MotorControl
@@ -126,6 +127,7 @@ class SimulatedArm:
         self.accelerometers = accelerometers or LinkAccelerometers(self.plant.robot)
         self.rng = rng
         start = self.plant.robot.middle_pose if start is None else start
+        self._compiled = CompiledLoop.of(self.plant, self.controller)
         self._home = self.plant.state(start).q
         self._course = Course(self.plant.robot, self.plant.dt)
         self._state: State
@@ -201,6 +203,7 @@ class SimulatedArm:
         now = self._state
         self.plant = self.successor(arm)
         self._state = self.plant.state(now.q, now.dq, now.ddq, now.steps)
+        self._compiled = CompiledLoop.of(self.plant, self.controller)
         self._past = self._new_past()
 
     def successor(self, arm: ArmModel) -> Plant:
@@ -262,7 +265,9 @@ class SimulatedArm:
                 row = 1
             taken = min(steps, len(self._targets) - row)
             targets = self._targets[row : row + taken]
-            trace = run(self.plant, self._acting, self._state, self._torque, targets)
+            trace = run(
+                self.plant, self._acting, self._state, self._torque, targets, self._compiled
+            )
             self._state, self._torque = trace.state, trace.tau[-1]
             self._past.extend(trace)
             steps -= taken
@@ -296,7 +301,7 @@ class SimulatedArm:
         self._course.follow(reference, steps)
         self._acting = self.controller.started()
         self._previous = self._previous_link = None
-        self._look_ahead()
+        self._look_ahead(steps=1)
         self._act()
         self._past = self._new_past()
 
@@ -309,10 +314,10 @@ class SimulatedArm:
         """Let the controller do what the course says now."""
         self._torque = command(self.plant, self._acting, self._state, next(iter(self._targets)))
 
-    def _look_ahead(self, asked: FloatArray | None = None) -> None:
-        """Evaluate the reference from now on, for some time; motors were to be here now."""
+    def _look_ahead(self, asked: FloatArray | None = None, steps: int = _BLOCK) -> None:
+        """Evaluate the reference from now on, for some steps; motors were to be here now."""
         self._first = self._state.steps
-        desired = self._course.desired(self._first, _BLOCK + 1)
+        desired = self._course.desired(self._first, steps + 1)
         self._targets = self.controller.targets(desired, asked)
 
     def _new_past(self) -> RecentPast:

@@ -8,7 +8,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, merge_actions
 from armid_ros.errors import ModelError
 from armid_ros.simulation import Plant, State, step
-from armid_ros.simulation.contacts import Contacts
 import numpy as np
 import pytest
 
@@ -127,26 +126,3 @@ def test_two_joints_and_their_shared_shaft_can_stick_together(pendulum) -> None:
 def test_friction_with_negative_width_is_refused(slider) -> None:
     with pytest.raises(ModelError, match='friction'):
         Plant(with_coulomb(slider(), [-1.0]))
-
-
-def test_elements_that_go_on_as_they_did_are_solved_for_like_any_others(humanoid, monkeypatch):
-    """What slips or sticks as in the last step takes a short way, to where the long one leads."""
-    rub = np.array([2.0, 2.0, 0.5, 0.5, 0.02, 0.02])
-    plant = Plant(with_coulomb(humanoid.with_gravity([0.0, 0.0, 0.0]), rub))
-
-    def swing() -> list[State]:
-        states = [plant.state(np.full(6, 0.3))]
-        for k in range(400):
-            torque = 1.5 * rub * np.cos(0.05 * k + np.arange(6.0))
-            states.append(step(plant, states[-1], torque))
-        return states
-
-    short = swing()
-    monkeypatch.setattr(Contacts, 'pattern', lambda self, modes: None)
-    long = swing()
-    modes = np.array([state.modes for state in short])
-    assert all(np.mean(modes == mode) > 0.05 for mode in (-1, 0, 1))
-    np.testing.assert_array_equal(modes, [state.modes for state in long])
-    for one, other in zip(short, long, strict=True):
-        np.testing.assert_allclose(one.q, other.q, atol=1e-10)
-        np.testing.assert_array_equal(one.dq == 0.0, other.dq == 0.0)

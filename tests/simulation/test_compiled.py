@@ -1,0 +1,122 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled steps are those of Python: the same body, the same run, the same errors."""
+
+from armid_ros.arm import ArmModel
+from armid_ros.effects import make_effect
+from armid_ros.robots import load_robot, robot_from_urdf
+from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate
+from armid_ros.simulation.compiled import CompiledLoop, dynamics, kernel, rigid_body
+from armid_ros.simulation.controller import LinearFeedback
+import numpy as np
+import pinocchio as pin
+import pytest
+
+pytestmark = pytest.mark.skipif(kernel() is None, reason='built without a compiler')
+
+#: A tree of a turning, a sliding and two more turning joints on skew axes, in skew gravity.
+TREE = """<robot name="tree"><link name="base"/>
+{links}
+{joints}
+</robot>""".format(
+    links='\n'.join(
+        f'<link name="l{k}"><inertial><origin xyz="0.1 {0.02 * k} -0.05" rpy="0.3 0.2 {k}"/>'
+        f'<mass value="{1 + k}"/><inertia ixx="0.03" ixy="0.002" ixz="0.001" iyy="0.04" '
+        'iyz="-0.003" izz="0.05"/></inertial></link>'
+        for k in range(4)
+    ),
+    joints='\n'.join(
+        f'<joint name="j{k}" type="{kind}"><parent link="{parent}"/><child link="l{k}"/>'
+        f'<origin xyz="0.2 -0.1 {0.1 * k}" rpy="0.5 {0.4 * k} -0.2"/><axis xyz="{axis}"/>'
+        '<limit lower="-2" upper="2" effort="80" velocity="5"/></joint>'
+        for k, (kind, parent, axis) in enumerate(
+            [
+                ('revolute', 'base', '0 0 1'),
+                ('prismatic', 'l0', '0.6 0 0.8'),
+                ('revolute', 'l1', '0 1 0'),
+                ('revolute', 'l0', '0.36 0.48 0.8'),
+            ]
+        )
+    ),
+)
+ROBOTS = ('humanoid_arm', 'two_link_elastic', TREE)
+
+
+def robot(source):
+    return robot_from_urdf(source) if source.startswith('<') else load_robot(source)
+
+
+def with_effects(body, names):
+    arm = ArmModel(body)
+    for name in names:
+        effect = make_effect(name, body)
+        arm = arm.with_effect(effect, np.full(len(effect.parameters(body)), 0.05))
+    return arm
+
+
+def swinging(body, seconds=0.8):
+    t = np.linspace(0.0, seconds, 33)
+    rates = np.linspace(4.0, 9.0, body.n_joints)
+    reach = np.minimum(0.3, 0.3 * body.velocity_limit / rates)
+    shift = np.sin(np.outer(t, rates)) * reach
+    return Reference(body.joints, t, body.middle_pose + shift)
+
+
+@pytest.mark.parametrize('source', ROBOTS)
+def test_body_is_that_of_pinocchio(source):
+    body, rng = robot(source), np.random.default_rng(3)
+    added = np.diag(rng.uniform(0.0, 0.1, body.n_joints))
+    data, structure = body.model.createData(), rigid_body(body, added)
+    for q, dq, ddq in rng.uniform(-2.0, 2.0, (20, 3, body.n_joints)):
+        tau, inertia = dynamics(structure, q, dq, ddq)
+        expected = pin.rnea(body.model, data, q, dq, ddq)
+        np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+        expected = pin.crba(body.model, data, q) + added
+        np.testing.assert_allclose(inertia, expected, rtol=0, atol=1e-14 * expected.max())
+
+
+@pytest.mark.parametrize('source', ROBOTS)
+@pytest.mark.parametrize(
+    ('names', 'stops'),
+    [
+        ((), False),
+        (('viscous_friction', 'coulomb_friction', 'rotor_inertia'), True),
+        (('coulomb_friction', 'quadratic_friction'), True),
+    ],
+)
+@pytest.mark.parametrize('kind', [ComputedTorque, GravityPD])
+def test_run_is_that_of_python(source, names, stops, kind, monkeypatch):
+    body = robot(source)
+    plant = Plant(with_effects(body, names), hard_stops=stops)
+    reference, controller = swinging(body), kind(ArmModel(body))
+    assert CompiledLoop.of(plant, controller) is not None
+    runs = [simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)]
+    monkeypatch.setattr(CompiledLoop, 'of', lambda *_: None)
+    runs += [simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)]
+    fast, slow = (run.truth for run in runs)
+    for name in ('q', 'dq', 'tau'):
+        ours, theirs = getattr(fast, name), getattr(slow, name)
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
+
+
+def test_a_torque_law_that_fails_is_an_error():
+    body = robot('humanoid_arm')
+    plant = Plant(with_effects(body, ['stribeck_friction']))
+
+    def broken(t, q, dq):
+        raise ZeroDivisionError(f'at {float(t):g} s')
+
+    object.__setattr__(plant, 'torque', broken)
+    with pytest.raises(ZeroDivisionError, match=r'at 0\.0005 s'):
+        simulate(plant, swinging(body), rng=np.random.default_rng(0))
+
+
+def test_feedback_without_gravity_or_reference_is_a_spring():
+    body = robot(TREE)
+    n = body.n_joints
+    law = LinearFeedback(body, np.eye(n), bandwidth=3.0, weighs=False, damping=2.0)
+    q, desired = np.full(n, 0.1), (np.full(n, 0.3), np.ones(n), np.ones(n))
+    pull = 9.0 * 0.2 * np.ones(n) + 6.0 * np.ones(n)
+    inertia = pin.crba(body.model, body.model.createData(), q) + np.eye(n)
+    tau = law.torque(q, np.zeros(n), desired, np.zeros(n))
+    np.testing.assert_allclose(tau, inertia @ pull + 2.0, rtol=1e-12)
