@@ -11,32 +11,26 @@ with its rigid body and known effects fitted anew, where only its structure coun
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm, plain_arm
 from armid_ros.diagnosis.data.baseline import Baseline
-from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, torque_rms
-from armid_ros.diagnosis.data.trajectory import at_rest, trajectories, Trajectory
-from armid_ros.diagnosis.doubt import doubt_as_it_is, doubt_of, doubt_of_names
-from armid_ros.diagnosis.prepare import choose_filters, mended, prepare, Prepared
+from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
+from armid_ros.diagnosis.data.trajectory import not_shown, trajectories, Trajectory
+from armid_ros.diagnosis.doubt import doubt_of, doubt_of_names
+from armid_ros.diagnosis.prepare import choose_filters, mended, prepare
 from armid_ros.diagnosis.search.choice import Explainer
 from armid_ros.diagnosis.search.explanation import as_bodies, Chosen, Explanation, NOISE
 from armid_ros.diagnosis.search.spans import acting_spans, Span
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.ties.ties import diagnose_ties
-from armid_ros.diagnosis.verdict.attribution import Names
+from armid_ros.diagnosis.verdict.attribution import headline, predicted
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
-from armid_ros.diagnosis.verdict.gap import (
-    blind_joints,
-    hiding,
-    measure_gap,
-    not_repeating,
-    places_held,
-)
-from armid_ros.diagnosis.verdict.naming import findings, not_named
-from armid_ros.diagnosis.verdict.remaining_misfit import RemainingMisfit
-from armid_ros.diagnosis.verdict.where import Excess, where_it_is, where_left
+from armid_ros.diagnosis.verdict.gap import measure_gap, not_repeating
+from armid_ros.diagnosis.verdict.naming import findings, small_print
+from armid_ros.diagnosis.verdict.remaining_misfit import places_held, RemainingMisfit
+from armid_ros.diagnosis.verdict.where import where_it_is, where_left
 from armid_ros.diagnosis.verdict.words import decide, Verdict
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.data_faults import check_data, mistaken_recordings
@@ -64,11 +58,6 @@ _NO_MODEL = (
 )
 #: Time by which the beginning and the end of a span are uncertain [s].
 _UNSURE = 0.25
-#: Note where shares and gap are of the data that names were found in, though others were given.
-_HARDLY_SHOWN = (
-    'the recordings to validate hardly show what is named: gap and shares are of the recordings '
-    'that it was found in; validate with a motion that shows it'
-)
 
 
 def diagnose(
@@ -146,26 +135,27 @@ def diagnose(
     notes += [f'prior knowledge given: {name} {how}' for name, how in settings.prior.items()]
     tell(0.1, 'noise floor')
     by_misfit = bool(baseline) and settings.partner is None
-    prepared = prepare(arm, recordings, used, data, settings, rng, by_misfit)
+    prepared = prepare(arm, used, data, settings, rng, by_misfit)
     if any(floor.period is None for floor in prepared.floors):
         notes.append(_ASSUMED)
     before = trajectories(baseline, prepared.used, arm, prepared.allowed)
     known = Baseline.of(arm, before, rng) if baseline else None
     if known is not None and known.errors[0] > 1.0:
         return _bad(given, data, [_NO_MODEL.format(known.errors[0])], notes)
+    seen = trajectories(validate, prepared.used, arm, prepared.allowed)
+    explainer = Explainer(arm, prepared, known, rng, tell, settings, misfit, seen)
     doubt = doubt_of(given, known, baseline, misfit, settings.thresholds)
-    asked = _Request(arm, given, prepared, known, doubt, validate, settings, rng, tell)
     if settings.partner is not None:
         tell(0.2, f'ties to {settings.partner.source}')
-        found = diagnose_ties(arm, recordings, prepared, settings, rng, tell)
-        if found is not None:
-            return _said(found, notes, asked)
-    chosen = _explainer(asked, misfit).chosen()
-    result = _said(chosen, notes, asked)
-    within = _within(result, chosen, asked, recordings, baseline, misfit)
+        tied = diagnose_ties(explainer, recordings, settings.partner)
+        if tied is not None:
+            return _said(tied, notes, explainer, doubt)
+    chosen = explainer.chosen()
+    result = _said(chosen, notes, explainer, doubt)
+    within = _within(result, chosen, explainer, (recordings, validate, baseline))
     if within is not None:
         return within
-    return _each_alone(result, ([*recordings, *validate], baseline), used, asked)
+    return _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
@@ -177,17 +167,16 @@ def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
 def _within(
     result: Diagnosis,
     chosen: Chosen,
-    asked: _Request,
-    recordings: Sequence[Recording],
-    baseline: Sequence[Recording],
-    misfit: Misfit | None,
+    explainer: Explainer,
+    read: tuple[Sequence[Recording], Sequence[Recording], Sequence[Recording]],
 ) -> Diagnosis | None:
     """Diagnose the seconds in which a cause acts alone; None if that explains no more."""
-    settings, look = asked.settings, chosen.look
+    settings, look = explainer.settings, chosen.look
+    recordings, validate, baseline = read
     if not settings.spans or look is None or not _hardly_explained(result, settings):
         return None
     spans = acting_spans(look, settings.thresholds)
-    cut = [_cut(*each) for each in zip(spans, [*recordings, *asked.validate], strict=False)]
+    cut = [_cut(*each) for each in zip(spans, [*recordings, *validate], strict=False)]
     shorter, unseen = (
         [one for one in part if one is not None]
         for part in (cut[: len(recordings)], cut[len(recordings) :])
@@ -196,14 +185,14 @@ def _within(
         return None
     try:
         found = diagnose(
-            asked.given,
+            plain_arm(explainer.arm),
             shorter,
             validate=unseen,
             baseline=baseline,
-            misfit=misfit,
+            misfit=explainer.misfit,
             settings=replace(settings, spans=False),
-            rng=asked.rng,
-            progress=asked.tell,
+            rng=explainer.rng,
+            progress=explainer.tell,
         )
     except IdentificationError:  # too short for the filters, or without motion
         return None
@@ -220,25 +209,20 @@ def _cut(span: Span, recording: Recording) -> Recording | None:
     return recording.select(inside[0] & inside[1]) if span.stop > span.start else None
 
 
-def _explainer(asked: _Request, misfit: Misfit | None) -> Explainer:
-    arm, prepared, known = asked.arm, asked.prepared, asked.before
-    written = None if misfit is None else misfit.of(arm.robot, torque_rms(prepared.data))
-    seen = trajectories(asked.validate, prepared.used, arm, prepared.allowed) if known else ()
-    information = None if misfit is None else misfit.information
-    own = arm, prepared, known, asked.rng, asked.tell, asked.settings
-    return Explainer(*own, written, seen, information)
-
-
 def _each_alone(
-    result: Diagnosis, days: Iterable[Sequence[Recording]], used: Conditioning, asked: _Request
+    result: Diagnosis,
+    days: Iterable[Sequence[Recording]],
+    used: Conditioning,
+    explainer: Explainer,
 ) -> Diagnosis:
     """Return a result, or that single recordings are at fault, where something stays open."""
+    arm = explainer.arm
     open_or_doubted = result.verdict in OPEN or bool(result.doubt)
-    if not open_or_doubted or asked.settings.partner is not None:
+    if not open_or_doubted or explainer.settings.partner is not None:
         return result
-    apart = [one for day in days for one in _apart(asked.arm, day, used)]
-    alone = mistaken_recordings(asked.arm, apart, used)
-    return _bad(asked.given, result.data, alone, result.notes) if alone else result
+    apart = [one for day in days for one in _apart(arm, day, used)]
+    alone = mistaken_recordings(arm, apart, used)
+    return _bad(plain_arm(arm), result.data, alone, result.notes) if alone else result
 
 
 def _apart(
@@ -257,146 +241,91 @@ def _apart(
             yield one, own
 
 
-@dataclass(frozen=True)
-class _Request:
-    """The parameters of `diagnose`; `given` is its arm, `arm` the same memoized."""
-
-    arm: ArmModel
-    given: ArmModel
-    prepared: Prepared
-    before: Baseline | None
-    doubt: str
-    validate: Sequence[Recording]
-    settings: DiagnosisSettings
-    rng: np.random.Generator
-    tell: Progress
-
-    def doubting(
-        self, found: Sequence[Finding], as_it_is: Excess | None, floor_in_words: str
-    ) -> _Request:
-        """Return the same, with a doubt of what was named, or of the model where nothing was."""
-        doubt = self.doubt or (doubt_of_names(found) if self.before else '')
-        if not (doubt or as_it_is is None):
-            doubt = doubt_as_it_is(as_it_is.ratio, self.arm.robot, floor_in_words)
-        return replace(self, doubt=doubt)
-
-
-def _said(chosen: Chosen, notes: Sequence[str], asked: _Request) -> Diagnosis:
+def _said(chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str) -> Diagnosis:
     """Return the diagnosis of an explanation, measured on held-out data."""
-    arm, settings = asked.arm, asked.settings
-    asked.tell(0.85, 'held-out gap')
+    arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
+    explainer.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation)
     notes = [*notes, *chosen.notes, *(said if explanation.steps else ())]
-    evidence = explanation.evidence
-    unseen = _unseen(asked, explanation, chosen)
-    names = Names.of(replace(chosen, explanation=explanation), unseen, settings)
-    measured = RemainingMisfit(chosen, unseen, asked.before, arm, settings)
-    if _mostly_open(names, measured, chosen, settings):
-        names = names.with_nothing_named(unseen, settings)
-    hardly = unseen is not None and not names.shares.predicted
-    explanation, notes = names.explanation, [*notes, *names.notes, *[_HARDLY_SHOWN] * hardly]
-    found = findings(explanation, names.shares, arm, asked.rng)
-    as_it_is = measured.patched(explanation) if found else measured.as_it_is(explanation)
+    unseen = _unseen(explainer.unseen, explanation, chosen)
+    least = 0.0 if chosen.measured else settings.thresholds.headline
+    explanation, shares = headline(explanation, least, settings)
+    if unseen is not None:
+        shares = predicted(explanation, shares.order, unseen)
+    measured = RemainingMisfit(chosen, unseen, before, arm, settings)
+    evidence, patched = explanation.evidence, explanation.fitted.arm
+    found = findings(explanation, shares, arm, explainer.rng)
+    minor = small_print(explanation)
     worse = measured.harmed(explanation)
-    floors = tuple(noise_floor(part, explanation.fitted.arm) for part in evidence.data)
+    floors = tuple(noise_floor(part, patched) for part in evidence.data)
     left, resting = measured.beside(explanation), measured.resting(explanation)
-    open_gap = any(one.ratio.max() > 1.0 for one in (*left, *resting))
-    asked = asked.doubting(found, None if open_gap else as_it_is, chosen.floor_in_words)
-    unnamed, matters = not_named(explanation, arm), settings.material * evidence.torque_rms
-    hides = None if chosen.measured else hiding(explanation, settings)
-    blind = blind_joints(evidence, arm.robot.joints, hides)
+    strange = not_repeating(floors, settings.thresholds, settings.material * evidence.torque_rms)
     word = decide(
         found,
-        not_repeating(floors, arm, settings.thresholds, matters) if chosen.measured else (),
+        [arm.robot.joints[k] for k in strange] if chosen.measured else (),
         [*left, *resting],
         arm,
         NOISE if chosen.measured else chosen.floor_in_words,
-        as_it_is,
-        unnamed,
-        hides,
+        None if found else measured.as_it_is(explanation),
+        minor,
     )
-    remarks = _unpatched(found, worse)
+    doubt = doubt or (doubt_of_names(found) if before else '')
     if not found:
         explanation = replace(explanation, reference=explanation.fitted)
-    shown, open_in = unseen if names.shares.predicted else None, measured.shown_in(left, evidence)
-    places = where_it_is(explanation, (shown or evidence) if found else open_in, settings)
-    asked.tell(1.0, word.word)
+    open_in = measured.shown_in(left, explanation)
+    places = where_it_is(explanation, (unseen or evidence) if found else open_in, settings)
+    hidden = set() if explanation.survey is None else explanation.survey.hidden
+    explainer.tell(1.0, word.word)
     return Diagnosis(
         verdict=word.word,
-        summary=' '.join([word.summary, *remarks, *_doubts(asked, chosen, word, blind)]),
+        summary=' '.join([word.summary, *_remarks(found, worse, chosen, word, doubt, explainer)]),
         findings=found,
-        minor=tuple(unnamed.minor),
+        minor=minor,
         where=places or places_held(arm, resting),
-        left=where_left(explanation, explanation.fitted.arm, open_in, settings),
-        gap=measure_gap(explanation, shown),
+        left=where_left(explanation, patched, open_in, settings),
+        gap=measure_gap(explanation, unseen),
         explanation=explanation.forgetting(),
-        arm=plain_arm(explanation.fitted.arm) if found and not worse else asked.given,
+        arm=plain_arm(patched if found and not worse else arm),
         data=tuple(evidence.data),
         floors=floors,
-        not_visible=_not_visible(explanation, settings),
+        not_visible=tuple(kind.name for kind in settings.kinds if kind.name in hidden),
         refitted=explanation.refitted,
         notes=tuple(notes),
         baseline=chosen.floor_in_words,
         harmful=bool(found and worse),
-        doubt=asked.doubt,
-        suspected=tuple(unnamed.suspected),
-        blind=blind,
+        doubt=doubt,
     )
 
 
-def _mostly_open(
-    names: Names, measured: RemainingMisfit, chosen: Chosen, settings: DiagnosisSettings
-) -> bool:
-    """
-    Return whether names take less than half of a gap, so that what is there is none of them.
-
-    That counts where the rest is a gap, or where recordings do not separate a change from another
-    motion's misfit.
-
-    """
-    if not names.explanation.steps or names.share > settings.thresholds.open_share:
-        return False
-    if chosen.untested:
-        return names.largest_share <= settings.thresholds.open_share
-    return max(float(one.ratio.max()) for one in measured.beside(names.explanation)) > 1.0
-
-
-def _unpatched(found: Sequence[Finding], worse: Sequence[str]) -> list[str]:
-    """Say why a model is not patched, if it is not."""
-    if not worse:
-        return []
+def _remarks(
+    found: Sequence[Finding],
+    worse: Sequence[str],
+    chosen: Chosen,
+    verdict: Verdict,
+    doubt: str,
+    explainer: Explainer,
+) -> list[str]:
+    """Say why a model is not patched or may be wrong, and what is not checked."""
+    still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
     names = ' and '.join(one.name.replace('_', ' ') for one in found)
-    return [f'The model is not patched: {names} would make it worse in {", ".join(worse)}.']
+    remarks = {
+        f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
+        chosen.untested: verdict.word == 'unknown',
+        doubt: True,
+        f'Not checked: {still} did not move.': still,
+    }
+    return [text for text, told in remarks.items() if text and told]
 
 
-def _doubts(asked: _Request, chosen: Chosen, verdict: Verdict, blind: Sequence[str]) -> list[str]:
-    """Say what would tell a change from a misfit, why a model may be wrong, what is not seen."""
-    remedy = chosen.untested if verdict.word == 'unknown' else ''
-    still = ', '.join(at_rest(asked.prepared.data, asked.arm.robot.joints))
-    not_checked = f'Not checked: {still} did not move.' if still else ''
-    short = (
-        f'Not checked: a change of all of the torque of {", ".join(blind)} would not show.'
-        if blind
-        else ''
-    )
-    return [text for text in (remedy, asked.doubt, not_checked, short) if text]
-
-
-def _unseen(asked: _Request, explanation: Explanation, chosen: Chosen) -> Evidence | None:
+def _unseen(
+    data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
+) -> Evidence | None:
     """Return the recordings to validate, which are only predicted, in the unit of the gap."""
-    if not asked.validate:
+    if not data:
         return None
-    prepared = asked.prepared
-    data = trajectories(asked.validate, prepared.used, explanation.fitted.arm, prepared.allowed)
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]
     sigma = [np.maximum(one, chosen.misfit) for one in noise]
     return Evidence(tuple(data), tuple(sigma), tuple(noise), explanation.evidence.varies)
-
-
-def _not_visible(chosen: Explanation, settings: DiagnosisSettings) -> tuple[str, ...]:
-    names = [kind.name for kind in settings.kinds]
-    hidden = chosen.survey.hidden if chosen.survey is not None else frozenset()
-    return tuple(name for name in names if name in hidden)
 
 
 def _bad(

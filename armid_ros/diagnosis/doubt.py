@@ -12,14 +12,12 @@ from armid_ros.diagnosis.data.evidence import torque_rms
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding
-from armid_ros.diagnosis.verdict.words import larger
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
-from armid_ros.robots import Robot
 import numpy as np
 
 _UNUSABLE = (
@@ -52,82 +50,54 @@ def doubt_of(
         How much a misfit varies from motion to motion.
 
     """
-    if baseline is not None:
-        said = _unlike(arm, baseline, recordings, misfit, thresholds) or _poor(arm, baseline)
-        if said:
-            return said
-    return _UNUSABLE if misfit is not None and misfit.unusable else ''
+    unusable = _UNUSABLE if misfit is not None and misfit.unusable else ''
+    if baseline is None:
+        return unusable
+    changed = '' if misfit is None else _changed(arm, baseline, recordings, misfit, thresholds)
+    return changed or _poor(arm, baseline) or unusable
 
 
 def doubt_of_names(findings: Sequence[Finding]) -> str:
     """Say that what was named never happens between two days; empty where it may have."""
-    never = [
-        one for one in findings if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects
-    ]
-    if not never:
-        return ''
-    return (
-        f'Links do not change between two days: unless that of {" and ".join(never[0].joints)} '
-        'was exchanged or something was bolted to it, what is not in the catalogue acts like it.'
-    )
+    for one in findings:
+        if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
+            return (
+                f'Links do not change between two days: unless that of {" and ".join(one.joints)} '
+                'was exchanged or something was bolted to it, what is not in the catalogue acts '
+                'like it.'
+            )
+    return ''
 
 
-def doubt_as_it_is(excess: FloatArray, robot: Robot, floor_in_words: str) -> str:
-    """Say that a body as it was leaves more than a floor can be; '' where it does not."""
-    worst, *others = np.argsort(-excess)
-    if excess[worst] <= 1.0:
-        return ''
-    too = ', '.join(robot.joints[k] for k in others if excess[k] > 1.0)
-    return (
-        f'Without a fit of its rigid body and friction, the error of {robot.joints[worst]} is '
-        f'{larger(np.sqrt(excess[worst]))} {floor_in_words} can be'
-        f'{f", and that of {too} is too large as well" if too else ""}.'
-    )
-
-
-def _unlike(
+def _changed(
     arm: ArmModel,
     baseline: Baseline,
     recordings: Sequence[Recording],
-    misfit: Misfit | None,
+    misfit: Misfit,
     thresholds: Thresholds,
 ) -> str:
     """Say that a model leaves much more of a baseline than when it was identified."""
-    if misfit is None:
-        return ''
-    times, most = _times(arm, baseline, misfit, thresholds)
-    if misfit.filters is not None and np.any(times > most):
-        times, most = _behind_its_filters(arm, recordings, misfit, thresholds)
-    worst = int(np.argmax(times / most))
-    if times[worst] <= most[worst]:
+
+    def compared(known: Baseline) -> tuple[FloatArray, FloatArray]:
+        times = known.misfit / np.maximum(misfit.of(arm.robot, torque_rms(known.data)), 1e-300)
+        most = np.sqrt(thresholds.other_motion * np.maximum(known.varies, 1.0))
+        return times, times / most
+
+    times, beyond = compared(baseline)
+    if misfit.filters is not None and beyond.max() > 1.0:  # behind others there is more noise
+        try:
+            parts = trajectories(recordings, Conditioning(*misfit.filters), arm)
+        except IdentificationError:  # too short for them, or of a lower rate: nothing to compare
+            return ''
+        times, beyond = compared(Baseline.of(arm, parts, np.random.default_rng(0)))
+    worst = int(np.argmax(beyond))
+    if beyond[worst] <= 1.0:
         return ''
     return (
         f'In the baseline the model leaves {times[worst]:.1f} times as much in '
         f'{arm.robot.joints[worst]} as when it was identified: it is not what the model was '
         'identified from, or something had changed by then.'
     )
-
-
-def _behind_its_filters(
-    arm: ArmModel, recordings: Sequence[Recording], misfit: Misfit, thresholds: Thresholds
-) -> tuple[FloatArray, FloatArray]:
-    """Compare behind the filters of the identification: a wider band has more noise."""
-    assert misfit.filters is not None
-    try:
-        parts = trajectories(recordings, Conditioning(*misfit.filters), arm)
-    except IdentificationError:  # too short for them, or of a lower rate: nothing to compare
-        return np.zeros(arm.robot.n_joints), np.ones(arm.robot.n_joints)
-    baseline = Baseline.of(arm, parts, np.random.default_rng(0))
-    return _times(arm, baseline, misfit, thresholds)
-
-
-def _times(
-    arm: ArmModel, baseline: Baseline, misfit: Misfit, thresholds: Thresholds
-) -> tuple[FloatArray, FloatArray]:
-    """Return how many times as much a model leaves, and how many times it may, each (n,)."""
-    known = misfit.of(arm.robot, torque_rms(baseline.data))
-    most = np.sqrt(thresholds.other_motion * np.maximum(baseline.varies, 1.0))
-    return baseline.misfit / np.maximum(known, 1e-300), most
 
 
 def _poor(arm: ArmModel, baseline: Baseline) -> str:

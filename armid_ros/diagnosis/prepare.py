@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import excited, refitted
 from armid_ros.diagnosis.data.evidence import Evidence, noise_floor, NoiseFloor
-from armid_ros.diagnosis.data.trajectory import thinnable, trajectories, Trajectory, UNSURE
+from armid_ros.diagnosis.data.trajectory import thinnable, Trajectory, UNSURE
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.identification.fitting.held_out import cutoff_of_torques
@@ -25,12 +25,6 @@ import numpy as np
 #: A diagnosis keeps six times the band of the motion where an identification keeps ten: what is
 #: beyond is mostly noise, which a gap has to stand out from.
 _BANDS = 6.0
-#: Where noise of positions makes the upper third of that band this many times as noisy as the
-#: lower third, in any joint, the upper third is cut off: it hides more than it shows.
-_GROWTH = 4.0
-#: With a narrower band, rows are wider and fewer of them informative next to reversals: at least
-#: this share of those has to stay.
-_MOVING = 0.7
 #: With a partner, noise of angles dominates. The pass band is wider by this factor than where the
 #: motion falls below it; else a fit reduces inertias to get rid of the noise of accelerations.
 _NARROW = 1.25
@@ -107,7 +101,6 @@ def choose_filters(
 
 def prepare(
     arm: ArmModel,
-    recordings: Sequence[Recording],
     used: Conditioning,
     data: Sequence[Trajectory],
     settings: DiagnosisSettings,
@@ -115,7 +108,7 @@ def prepare(
     misfit: bool = False,
 ) -> Prepared:
     """
-    Measure the noise of data, and again without the upper third of the band if noise fills that.
+    Measure the noise of data, and which of their rows are informative.
 
     Rows next to reversals are informative as far as noise exceeds the error of their friction.
     Where the unit is a misfit they are not: dry friction is what a model gets wrong most, and
@@ -124,13 +117,6 @@ def prepare(
     """
     whole = arm.base_parameters(rng)
     prepared = _measured(arm, used, data, whole)
-    growth = [floor.growth for floor in prepared.floors if floor.period is not None]
-    free = settings.partner is None and settings.signals.decimation is None
-    if free and growth and np.max(np.mean(growth, axis=0)) > _GROWTH:
-        narrower = thinnable(replace(used, decimation=round(1.5 * used.decimation + 0.1)))
-        fewer = trajectories(recordings, narrower)
-        if np.all(_informative_share(fewer) >= _MOVING * _informative_share(data)):
-            prepared = _measured(arm, narrower, fewer, whole)
     if misfit:
         return prepared
     fuller, _ = with_friction(arm, settings.library)
@@ -152,11 +138,6 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
             fuller = fuller.with_effect(kind.on(arm.robot, joints))
             added += [kind.on(arm.robot, (joint,)) for joint in joints]
     return fuller, tuple(added)
-
-
-def _informative_share(data: Sequence[Trajectory]) -> FloatArray:
-    """Return the share of the rows of each joint that are informative, shape (n,)."""
-    return np.asarray(np.concatenate([part.informative for part in data]).mean(axis=0))
 
 
 def _measured(

@@ -30,9 +30,6 @@ class Thresholds:
     inexact : float
         Share of what a cause explains by which its law is inexact: a lead of less is none, such a
         share may be left in a second, and a joint that has less of it is not where the gap is.
-    of_state : float
-        Share of a misfit, root mean square, that is a function of position, velocity and load:
-        without load 0.4 to 0.8 in half of the joints of 14 arms.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
         is small print; recordings hardly show causes that take less than this share of what they
@@ -51,8 +48,7 @@ class Thresholds:
         measure so well: of a thousand healthy arms one is `unknown`.
     predicted : float
         Factor by which squares may be larger on motions that were not used: values that other data
-        gave are not exact there, and a misfit is another one. By as much again in the worst second
-        of such a motion: of 38 healthy arms two leave more than 4 times the worst second before.
+        gave are not exact there, and a misfit is another one.
     open_share : float
         Share of the squares of a joint in which a gap is open that a cause takes if it matters
         there, however little that is of the gap of the arm; and of the whole gap that a cause
@@ -76,7 +72,6 @@ class Thresholds:
     alone: float = 2.0
     tie: float = 3.0
     inexact: float = 0.02
-    of_state: float = 0.6
     headline: float = 0.1
     same_fit: float = 1.5
     uncertain: float = 0.25

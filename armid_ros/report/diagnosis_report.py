@@ -42,12 +42,12 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
     """
     Return the colour of a verdict.
 
-    None is good if the model is doubted, or not patched with what was named, if a cause is
-    suspected, a joint not checked, or a simulation got worse in some joints.
+    None is good if the model is doubted, or not patched with what was named, if a joint is not
+    checked, or a simulation got worse in some joints.
 
     """
     tone = _TONES.get(diagnosis.verdict, 'bad')
-    open_ends = diagnosis.not_checked, diagnosis.doubt, diagnosis.suspected, diagnosis.harmful
+    open_ends = diagnosis.not_checked, diagnosis.doubt, diagnosis.harmful
     return 'fair' if tone == 'good' and (any(open_ends) or worse) else tone
 
 
@@ -84,7 +84,7 @@ class Extras:
     def sentences(self, diagnosis: Diagnosis) -> list[str]:
         """Return shares of what was named, minor effects, what was made of it, and notes."""
         lines = [
-            f'{names_and_places(group)}: {share_in_words(group[0], interval=True)}'
+            f'{names_and_places(group)}: {share_in_words(group[0])}'
             + (', together' if len(group) > 1 else '')
             for group in by_cause(diagnosis.findings)
         ]

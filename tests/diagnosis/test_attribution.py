@@ -6,7 +6,7 @@ from armid_ros.diagnosis.data.evidence import Evidence, noise_floor
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.posterior import JointFit
-from armid_ros.diagnosis.verdict.attribution import attribute, Attribution
+from armid_ros.diagnosis.verdict.attribution import Attribution, left_out, predicted
 from armid_ros.effects import CATALOGUE
 import numpy as np
 import pytest
@@ -50,13 +50,10 @@ def test_a_share_is_that_of_the_squares_and_lies_in_its_interval():
 
 
 def test_data_with_a_cause_show_it_and_data_without_do_not(bench, sprung):
-    assert attribute(sprung, evidence_of(bench, spring)).share([0]) > 0.95
-    assert attribute(sprung, evidence_of(bench, None)).share([0]) < 0.0
+    assert predicted(sprung, [0], evidence_of(bench, spring)).share([0]) > 0.95
+    assert predicted(sprung, [0], evidence_of(bench, None)).share([0]) < 0.0
 
 
 def test_folds_that_were_not_fitted_show_it_as_well(sprung):
-    folds = attribute(sprung, None)
-    assert not folds.predicted
-    assert folds.share([0]) == pytest.approx(
-        attribute(sprung, sprung.evidence).share([0]), abs=0.01
-    )
+    folds, whole = left_out(sprung), predicted(sprung, [0], sprung.evidence)
+    assert folds.share([0]) == pytest.approx(whole.share([0]), abs=0.01)

@@ -54,7 +54,7 @@ def test_the_gap_is_where_the_cause_is_and_not_where_a_motion_shows_more_of_the_
     assert 'shoulder' in [place.joint for place in found.left]
 
 
-def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not_and_measures_nothing(bench):
+def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not(bench):
     def stirring(motion, tau):
         return hose(motion, tau) + np.array([0.0, 0.5]) * motion.dq * np.abs(motion.dq)
 
@@ -62,8 +62,6 @@ def test_a_slow_recording_that_hardly_shows_a_cause_denies_it_not_and_measures_n
     slow = bench.recordings(stirring, seed=3)[:1]
     found = asked(bench, bench.recordings(hose, seed=1), after, slow)
     assert [one.name for one in found.findings] == ['quadratic_friction'], found.summary
-    assert any('hardly show' in note for note in found.notes)
-    assert [place.joint for place in found.where] == ['elbow']
 
 
 @pytest.mark.long
@@ -183,21 +181,6 @@ def test_a_model_that_was_unusable_is_doubted(bench):
     assert result.verdict == 'consistent'
     assert 'unusable' in result.summary
     assert tone_of(result) == 'fair'
-
-
-def test_a_joint_in_which_all_of_the_torque_may_hide_is_not_checked(bench):
-    """The model was of recordings that hardly have a torque beside the misfit."""
-
-    def shaken(motion, tau):
-        return 40.0 * np.sin(9.0 * motion.q[:, ::-1] + motion.q) * [0.0, 1.0] - tau * [0.0, 1.0]
-
-    before = bench.recordings(shaken, seed=1)
-    result = diagnose(
-        bench.arm, bench.recordings(shaken, seed=2), baseline=before, rng=np.random.default_rng(0)
-    )
-    assert 'elbow' in result.blind
-    assert 'Not checked' in result.summary
-    assert tone_of(result) != 'good'
 
 
 def test_what_slow_motion_does_not_tell_of_a_body_is_no_change(bench):

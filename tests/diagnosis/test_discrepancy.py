@@ -3,14 +3,13 @@
 """What a model lacks in every motion is no change, wherever the other day has moved."""
 
 from armid_ros.diagnosis import diagnose
-from armid_ros.diagnosis.data.baseline import described_precision
-from armid_ros.diagnosis.data.discrepancy import Discrepancy
+from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification import identify
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.model import BaseParameters, inverse_dynamics
+from armid_ros.model import inverse_dynamics
 import numpy as np
 import pytest
 
@@ -20,45 +19,15 @@ def data(bench):
     return trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
 
 
-@pytest.fixture
-def discrepancy(bench, data):
-    return Discrepancy.over(data, np.array([0.3, 0.2]), bench.arm)
-
-
-def test_torque_is_columns_times_values(bench, data, discrepancy):
-    values = np.random.default_rng(0).normal(size=len(discrepancy.parameters(bench.robot)))
-    arm = bench.arm.with_effect(discrepancy, values)
-    motion = data[0].motion
-    np.testing.assert_allclose(
-        arm.torque(motion) - bench.arm.torque(motion),
-        arm.columns_of(discrepancy, motion) @ values,
-        atol=1e-12,
-    )
-
-
-def test_between_knots_it_is_linear_and_beyond_them_constant(bench, data, discrepancy):
-    law = discrepancy.action(np.arange(22.0) ** 2, bench.arm).link_torque
-    first, second = discrepancy.position[1][1:3]
-    q, still = np.zeros((3, 2)), np.zeros((3, 2))
-    q[:, 1] = first, (first + second) / 2.0, second
-    torque = law(np.zeros(3), q, still)[:, 1]
-    assert torque[1] == pytest.approx((torque[0] + torque[2]) / 2.0)
-    q[:, 1] = discrepancy.position[1][-1], 10.0, 100.0
-    assert np.ptp(law(np.zeros(3), q, still)[:, 1]) == 0.0
-
-
-def test_all_functions_together_are_as_large_as_is_said(bench, discrepancy):
-    arm = bench.arm.with_effect(discrepancy)
-    count, size = len(arm.parameters), len(discrepancy.parameters(bench.robot))
-    own = np.arange(count - size, count)
-    base = BaseParameters(
-        arm.parameters,
-        tuple(arm.parameters[k] for k in own),
-        own,
-        np.eye(count)[own],
-    )
-    expected = 3.0 * np.repeat([0.3, 0.2], size // 2) ** -2.0
-    np.testing.assert_allclose(described_precision(base, arm), np.diag(expected), atol=1e-9)
+def test_columns_are_a_unit_at_each_knot_and_of_one_joint(bench, data):
+    """Hats of position and of velocity add up to one each; friction has a size of one."""
+    found = np.concatenate(discrepancy_columns(data, bench.arm))
+    each = found.shape[2] // 2
+    assert not found[:, 0, each:].any() and not found[:, 1, :each].any()
+    own = found[:, 1, each:]
+    np.testing.assert_allclose(own[:, :4].sum(axis=1), 1.0)
+    np.testing.assert_allclose(own[:, 4:10].sum(axis=1), 1.0)
+    np.testing.assert_allclose(np.sqrt(np.mean(own[:, 10:] ** 2, axis=0)), 1.0)
 
 
 def slow_at_low_speed(bench, motion):

@@ -48,7 +48,7 @@ def test_every_field_of_the_schema_is_there(document):
     assert document['schema'] == 'armid/diagnosis/1'
     assert document['verdict'] == 'named'
     assert set(document) == {
-        *('schema', 'verdict', 'summary', 'effects', 'minor', 'suspected', 'baseline', 'where'),
+        *('schema', 'verdict', 'summary', 'effects', 'minor', 'baseline', 'where'),
         *('gap', 'filters', 'candidates', 'not_visible', 'detectable', 'model', 'spans'),
     }
     assert document['baseline'] == 'noise'

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.diagnosis import diagnose, known_misfit
-from armid_ros.diagnosis.data.baseline import described_precision, excited
-from armid_ros.diagnosis.data.discrepancy import Discrepancy
+from armid_ros.diagnosis.data.baseline import described_precision
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
 from armid_ros.diagnosis.search.cause import SelectedEffect
@@ -28,11 +27,6 @@ def data(bench):
     return trajectories(recordings, conditioning(recordings, SignalSettings()), bench.arm)
 
 
-@pytest.fixture
-def discrepancy(bench, data):
-    return Discrepancy.over(data, np.array([0.3, 0.1]), bench.arm)
-
-
 def told_of(found):
     """Return what an identification tells of its parameters, and that of a model file."""
     read = parameters_of('identification.json', identification_document(found, 'arm', {}))
@@ -44,17 +38,6 @@ def test_base_parameters_are_as_sure_as_they_were_identified(bench):
     precision = described_precision(found.base, found.arm, told_of(found))
     std = np.sqrt(np.diag(np.linalg.inv(precision)))
     np.testing.assert_allclose(std, found.estimate.std, rtol=0.01)  # the description tells little
-
-
-def test_what_was_not_identified_is_as_sure_as_its_description(bench, data, discrepancy):
-    size = len(bench.arm.parameters)
-    arm = memoized_arm(bench.arm.with_effect(discrepancy))
-    base, _ = excited(arm, arm.base_parameters(np.random.default_rng(0)), data)
-    precision = described_precision(base, arm, 1e12 * np.eye(size))
-    told = np.any(base.grouping[:, :size] != 0.0, axis=1)
-    covariance = np.linalg.inv(precision)[np.ix_(~told, ~told)]
-    grouping, spread = base.grouping[~told][:, size:], discrepancy.spread(bench.robot)
-    np.testing.assert_allclose(covariance, (grouping * spread**2) @ grouping.T, rtol=1e-3)
 
 
 def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
@@ -81,17 +64,17 @@ def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     assert np.mean(np.abs(as_exact) < 2.0) < 0.7, as_exact
 
 
-def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench, discrepancy):
+def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench):
     """A precision of zero is the limit of a variance without end."""
     arm = bench.arm.with_effect(CATALOGUE['torque_offset'].on(bench.robot, bench.robot.joints))
-    arm = memoized_arm(arm.with_effect(discrepancy))
+    arm = memoized_arm(arm)
     base = arm.base_parameters(np.random.default_rng(0))
-    size, more = len(bench.arm.parameters), discrepancy.spread(bench.robot)
+    size = len(bench.arm.parameters)
     body = described_spread(bench.robot).ravel()
     friction = np.abs(bench.arm.theta[len(body) :])
     offsets = np.full(2, 1e4)
-    spread = np.concatenate([body, friction, offsets, more])
-    assert len(spread) == len(arm.parameters) == size + 2 + len(more)
+    spread = np.concatenate([body, friction, offsets])
+    assert len(spread) == len(arm.parameters) == size + 2
     expected = np.linalg.inv((base.grouping * spread**2) @ base.grouping.T)
     scale = 1.0 / np.sqrt(np.diag(expected))
     error = (described_precision(base, arm) - expected) * np.outer(scale, scale)

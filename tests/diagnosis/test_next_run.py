@@ -81,17 +81,6 @@ def test_nothing_is_to_be_run_where_no_name_is_in_doubt(named):
     assert next_run(found, np.random.default_rng(1)) is None
 
 
-def test_a_provisional_name_is_held_against_the_next_best(bench):
-    hidden = bench.recordings(lambda m, tau: [0.0, 0.08] * m.dq * np.abs(m.dq))
-    found = diagnose(bench.arm, hidden, rng=np.random.default_rng(0))
-    (step,) = found.explanation.steps
-    alone = replace(found.explanation, steps=(replace(step, rivals=()),))
-    run = next_run(replace(found, verdict='partial', explanation=alone), np.random.default_rng(1))
-    assert {pair.name for pair in run.separations} == {'quadratic_friction'}
-    ranking = [t.effect.name for t in found.explanation.survey.ranking]
-    assert {pair.rival for pair in run.separations} <= set(ranking) - {'quadratic_friction'}
-
-
 def test_a_run_that_tells_nothing_is_none(bench):
     """A load of a link is that link: any motion would be in vain."""
     hidden = bench.recordings(

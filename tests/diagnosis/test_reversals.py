@@ -27,7 +27,7 @@ def prepared(bench, noise, arm=None, without=0.0, shaken=0.0, misfit=False):
     ]
     data = trajectories(recordings, USED)
     arm = arm or bench.arm
-    return prepare(arm, recordings, USED, data, DiagnosisSettings(), rng, misfit)
+    return prepare(arm, USED, data, DiagnosisSettings(), rng, misfit)
 
 
 def friction(bench, recording):

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from armid_ros.diagnosis import diagnose
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.next_run.steps import next_steps
-from armid_ros.diagnosis.verdict.gap import standing
+from armid_ros.diagnosis.verdict.remaining_misfit import standing
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.report.diagnosis_report import tone_of
@@ -124,7 +124,7 @@ def test_a_joint_that_never_moves_is_said_not_to_be_checked(bench, baseline):
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
     found = diagnose(bench.arm, list(without_elbow(0)), baseline=before, rng=rng)
     assert found.verdict == 'consistent', found.summary
-    assert found.at_rest == ('elbow',)
+    assert found.not_checked == ('elbow',)
     *_, unchecked = found.summary.split('. ')
     assert 'Not checked' in unchecked and found.summary.count('elbow') == 1
     steps = next_steps(found)

@@ -4,7 +4,6 @@
 
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import trajectories
-from armid_ros.diagnosis.verdict.gap import _at_times
 from armid_ros.diagnosis.verdict.where import locate
 from armid_ros.identification.rows.signals import Conditioning
 import numpy as np
@@ -69,17 +68,3 @@ def test_a_line_that_misses_zero_is_in_proportion_to_nothing_and_its_mean_is_kno
     assert found.mean == pytest.approx(every.mean())
     assert found.mean_share == pytest.approx(every.mean() ** 2 / np.mean(every**2))
     assert 'in proportion' not in found.signature
-
-
-@pytest.mark.parametrize(('share', 'told'), [(0.3, True), (1.0, False)])
-def test_what_comes_and_goes_is_said_with_how_long_it_is_there(share, told):
-    bench = Bench(URDF)
-    data = trajectories(bench.recordings(), Conditioning(200.0, 10.0, 11))
-    residual = [np.full_like(part.torque, 0.05) for part in data]
-    for left in residual:
-        left[: int(share * len(left)), 1] = 2.0
-    noise = tuple(np.full(2, 0.1) for _ in data)
-    evidence = Evidence.over_noise(data, noise)
-    said = _at_times(evidence, residual, 1)
-    assert bool(said) == told
-    assert not told or 'the worst' in said

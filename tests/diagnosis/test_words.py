@@ -8,24 +8,19 @@ from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.settings import Thresholds
 from armid_ros.diagnosis.verdict.finding import Finding, Rival
 from armid_ros.diagnosis.verdict.gap import not_repeating
-from armid_ros.diagnosis.verdict.naming import _separating
 from armid_ros.diagnosis.verdict.where import Excess
 from armid_ros.diagnosis.verdict.words import (
     decide,
-    Hiding,
     names_and_places,
     percent,
     sentence,
     share_in_words,
-    Unnamed,
 )
 from armid_ros.effects import CATALOGUE
-from armid_ros.estimate import ParameterName
 from armid_ros.report.sections.diagnosed import named_section
 import numpy as np
 import pytest
 
-NOTHING = Unnamed()
 #: The floor of a gap, which a summary repeats.
 FLOOR = 'old misfit'
 
@@ -35,10 +30,10 @@ def excess(bench, ratio, more=''):
     return Excess(np.ones(bench.robot.n_joints) * ratio, 'in the recordings', more)
 
 
-def verdict(bench, *findings, left=0.5, as_it_is=None, unnamed=NOTHING, hides=None):
+def verdict(bench, *findings, left=0.5, as_it_is=None, minor=()):
     """Decide between a closed gap, by default, and an open one."""
     as_it_is = None if as_it_is is None else excess(bench, as_it_is)
-    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, as_it_is, unnamed, hides)
+    return decide(findings, (), [excess(bench, left)], bench.arm, FLOOR, as_it_is, minor)
 
 
 def finding(bench, share=0.3, name='encoder_offset', values=(0.1,), joints=('elbow',), **more):
@@ -60,48 +55,20 @@ def test_a_body_that_has_to_be_fitted_is_stated(bench, as_it_is, fitted):
 @pytest.mark.parametrize('as_it_is', [None, 4.0])
 @pytest.mark.parametrize(('share', 'mentioned'), [(0.45, True), (0.001, False)])
 def test_small_print_of_no_size_is_not_read_out(bench, as_it_is, share, mentioned):
-    small = Unnamed([finding(bench, share)])
-    text = verdict(bench, as_it_is=as_it_is, unnamed=small).summary
+    text = verdict(bench, as_it_is=as_it_is, minor=[finding(bench, share)]).summary
     assert ('encoder offset' in text) == ('45 %' in text) == mentioned
-
-
-@pytest.mark.parametrize('joints', [(), ('elbow',), ('shoulder',)])
-def test_a_joint_far_off_has_the_size_of_what_can_hide_there(bench, joints):
-    hides = Hiding(np.array([0.01, 0.13]), np.array([0.014, 0.18]))
-    minor = [finding(bench, joints=joints)] if joints else []
-    *_, hidden = verdict(bench, unnamed=Unnamed(minor), hides=hides).summary.split('. ')
-    assert all(fact in hidden for fact in ('elbow', '13 %', '18 %'))
-    assert ('encoder offset' in hidden) == (joints == ('elbow',))
 
 
 def test_what_is_not_explained_has_the_cause_that_explains_most_of_it(bench):
     plain = verdict(bench, left=4.0)
     assert plain.word == 'unknown' and '2.0 times' in plain.summary
-    nothing = Unnamed([finding(bench, 0.001)])
-    assert verdict(bench, left=4.0, unnamed=nothing) == plain
-    text = verdict(bench, left=4.0, unnamed=Unnamed([finding(bench)])).summary
+    assert verdict(bench, left=4.0, minor=[finding(bench, 0.001)]) == plain
+    text = verdict(bench, left=4.0, minor=[finding(bench)]).summary
     assert all(fact in text for fact in ('elbow', '0.100 +- 0.020 rad', '5.7 degrees', '30 %'))
 
 
-def test_what_is_unproven_or_suspected_is_stated_once_for_all_of_its_names(bench):
-    joints = tuple(f'joint_{k}' for k in range(5))
-    viscous = replace(finding(bench, 0.7), name='viscous_friction', joints=joints)
-    both = (
-        replace(viscous, together=('coulomb_friction',)),
-        replace(viscous, name='coulomb_friction', together=('viscous_friction',)),
-    )
-    for kind, left in (('suspected', 0.5), ('unproven', 4.0)):
-        text = verdict(bench, left=left, unnamed=Unnamed(**{kind: both})).summary
-        assert text.count('70 %') == text.count('5 joints') == 1
-        assert text.lower().index('viscous friction') < text.index('coulomb friction')
-
-
-def test_a_share_has_two_digits_and_the_joint_that_needs_it(bench):
-    small = finding(bench)
-    assert share_in_words(small).split(' of ')[0] == '30 %'
-    assert '20 % to 40 %' in share_in_words(small, interval=True)
-    beside = share_in_words(replace(small, share=0.001, of_joint=('elbow', 0.94)))
-    assert beside.startswith('0.1 %') and beside.endswith('elbow')
+def test_a_share_has_two_digits_and_its_interval(bench):
+    assert share_in_words(finding(bench)) == '30 % of the gap (20 % to 40 %)'
     assert [percent(x) for x in (0.957, 0.004, 0.0, -1e-5)] == ['96 %', '0.4 %', '0 %', '0 %']
 
 
@@ -139,25 +106,11 @@ def test_names_that_are_one_cause_have_one_share(bench):
         assert fact in text
 
 
-def test_friction_of_many_joints_is_stated_by_how_much_of_it_has_changed(bench):
-    joints = tuple(f'joint_{k}' for k in range(5))
-    both = {'viscous_friction': 'viscous_coefficient', 'coulomb_friction': 'coulomb_torque'}
-    had = np.arange(1.0, 6.0)
-
-    def changed(name, shares):
-        parameters = tuple(ParameterName(both[name], joint, 'N m') for joint in joints)
-        numbers = parameters, tuple(shares * had), tuple(0.005 * had)
-        other = tuple(one for one in both if one != name)
-        share = 0.97, (0.9, 1.0), 0.0
-        return Finding(name, joints, *numbers, *share, together=other, added_to=tuple(had))
-
-    for low, high, shown in ((-0.3, -0.2, '-30 to -20 %'), (-0.072, -0.068, '-7 %')):
-        shares = np.linspace(low, high, 5)
-        text = verdict(bench, *(changed(one, shares) for one in both)).summary
-        assert text.count('97 %') == 1 and shown in text and '5 joints' in text
-    group = [changed(one, np.ones(5)) for one in both]
-    assert names_and_places(group).endswith(', '.join(joints))
-    assert names_and_places([replace(group[0], joints=())]).endswith('whole arm')
+def test_names_that_are_one_cause_are_said_with_their_places(bench):
+    one = finding(bench, name='viscous_friction')
+    group = [one, replace(one, name='coulomb_friction')]
+    assert names_and_places(group) == 'viscous friction and coulomb friction of elbow'
+    assert names_and_places([replace(one, joints=())]).endswith('whole arm')
 
 
 @pytest.mark.parametrize(
@@ -185,21 +138,27 @@ def test_rivals_of_every_name_are_stated_whatever_is_left(bench, ratio, word):
     assert ('2.0 times' in found.summary) == (word == 'partial')
 
 
-def test_an_experiment_names_the_joints_of_both():
-    same = _separating('payload', ['elbow'], Rival('link_inertia', ('elbow',)))
-    assert 'link inertia' in same and 'elbow' in same
-    other = _separating('torque_offset', ['elbow'], Rival('link_inertia', ('wrist',)))
+def test_an_experiment_names_the_joints_of_both(bench):
+    def experiment(name, rival, joint):
+        rivals = (Rival(rival, (joint,)),)
+        return finding(bench, name=name, rivals=rivals).experiment
+
+    same = experiment('payload', 'link_inertia', 'elbow')
+    assert 'link inertia' in same and 'elbow' in same and 'Weigh' in same
+    other = experiment('torque_offset', 'link_inertia', 'wrist')
     assert 'offset of elbow' in other and 'inertia of wrist' in other
 
 
 def test_what_does_not_repeat_has_to_matter(bench):
     joints = bench.robot.n_joints
     one = np.ones(joints)
-    floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), 0.1 * one, one)
+    floor = NoiseFloor(0.1 * one, 8.0, 20.0 * one, np.array([0.05, 0.2]), 0.1 * one)
     closed = excess(bench, 0.5)
 
     def word(least):
-        strange = not_repeating([floor] * 3, bench.arm, Thresholds(), least * one)
+        strange = [
+            bench.robot.joints[k] for k in not_repeating([floor] * 3, Thresholds(), least * one)
+        ]
         return decide((), strange, [closed], bench.arm, FLOOR)
 
     assert word(0.1).word == 'not_repeatable'
@@ -215,7 +174,6 @@ def test_a_shape_that_the_data_do_not_determine_has_no_value(bench, time, std, t
     found = Finding('thermal_friction', ('elbow',), *numbers)
     summary = verdict(bench, found).summary
     assert ('206' in summary) is told
-    assert (effect.traits.shown_by in summary) is not told
     rows = named_section((found,)).blocks[0].rows
     assert ('not determined' in [row[-1] for row in rows]) is not told
     assert '0.4' in rows[0][-1]

@@ -138,9 +138,10 @@ def test_what_was_added_to_the_model_is_said(found, recordings, html):
     assert '>Patch</h2>' in html and '>Patch</h2>' not in page
 
 
-def test_what_is_suspected_and_not_checked_is_said_in_short(found):
+def test_what_is_not_checked_is_said_in_short(found):
     nothing = replace(found, verdict='consistent', findings=(), where=(), left=())
-    rows = dict(Story(replace(nothing, suspected=found.findings, blind=('elbow',))).rows)
+    still = [replace(part, unsure=np.array([0.0, np.inf]) + part.unsure) for part in found.data]
+    rows = dict(Story(replace(nothing, data=tuple(still))).rows)
     assert 'elbow' in rows['Where'][1]
     assert len(dict(Story(nothing).rows)['Where']) == 1
 

@@ -15,15 +15,11 @@ the recordings of both days jointly with whatever is tried.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.effects import Action, Effect, merge_actions, Quantity
 from armid_ros.effects.base import Arm
 from armid_ros.effects.catalogue import UNASKED_FRICTION
-from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.motion import FloatArray, Motion
-from armid_ros.robots import Robot
 import numpy as np
 
 #: Knots of the function of position, evenly over the range of motion.
@@ -31,122 +27,59 @@ _POSITIONS = 4
 #: Knots of the function of velocity on each side, over the top speed: friction changes most where
 #: a joint is slow.
 _SPEEDS = (0.03, 0.25, 1.0)
-_KNOTS = _POSITIONS + 2 * len(_SPEEDS)
-#: Functions of a joint: of position, of velocity, and further friction.
-_FUNCTIONS = 2 + len(UNASKED_FRICTION)
 
 
-@dataclass(frozen=True)
-class Discrepancy(Effect):
+def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray]:
     """
-    Torque of each joint as a function of its position, one of its velocity, and further friction.
+    Return the torque of the functions of each joint in rows.
 
-    Both functions are linear between knots and constant beyond them. Values are torques at the
-    knots, and root mean square torques of friction.
+    Functions of position and velocity are linear between knots and constant beyond them, with a
+    unit torque at a knot; friction has a root mean square torque of one.
 
-    Attributes
+    Parameters
     ----------
-    position, velocity : tuple of tuple of float
-        Knots of each joint [rad or m, rad/s or m/s].
-    size : tuple of float
-        Root mean square torque of each joint as a rule, to which all of them contribute alike
-        [N m].
-    units : tuple of tuple of float
-        Root mean square torque of a unit of each law of friction, of each joint.
+    data : sequence of Trajectory
+        The recordings of both days, whose motions give the knots.
+    arm : Arm
+        Gives the load that friction goes with.
+
+    Returns
+    -------
+    list of ndarray, each (M, n, n f)
+        Of each trajectory, the f functions of one joint after the other.
 
     """
-
-    position: tuple[tuple[float, ...], ...] = ()
-    velocity: tuple[tuple[float, ...], ...] = ()
-    size: tuple[float, ...] = ()
-    units: tuple[tuple[float, ...], ...] = ()
-
-    name = 'discrepancy'
-    summary = 'what the model leaves of any motion, over position and velocity, and by friction'
-    quantities = tuple(
-        Quantity(f'discrepancy_{k}', 'N m') for k in range(_KNOTS + len(UNASKED_FRICTION))
-    )
-    learned = True
-    smooth = True
-
-    @classmethod
-    def over(cls, data: Sequence[Trajectory], size: FloatArray, arm: Arm) -> Discrepancy:
-        """
-        Return a discrepancy of all joints whose knots are where data are.
-
-        Parameters
-        ----------
-        data : sequence of Trajectory
-            The recordings of both days.
-        size : ndarray, shape (n,)
-            Root mean square torque as a rule [N m].
-        arm : Arm
-            Gives the load that friction goes with.
-
-        """
-        motions = [part.at_rows for part in data]
-        q = np.concatenate([motion.q for motion in motions])
-        top = np.max([np.abs(motion.dq).max(axis=0) for motion in motions], axis=0)
-        units = [
-            np.sqrt(np.mean(np.concatenate([_own(law, m, arm) for m in motions]) ** 2, axis=0))
-            for law in _laws(data[0].motion.joints)
-        ]
-        sides = np.array([*(-share for share in reversed(_SPEEDS)), *_SPEEDS])
-        return cls(
-            data[0].motion.joints,
-            position=_rows(np.linspace(q.min(axis=0), q.max(axis=0), _POSITIONS, axis=1)),
-            velocity=_rows(np.outer(top, sides)),
-            size=tuple(size.tolist()),
-            units=_rows(np.where(np.array(units) > 0.0, units, 1.0)),
-        )
-
-    def columns(self, motion: Motion, arm: Arm) -> FloatArray:
-        """Return the torque of a unit at each knot, and of friction, shape (N, n, P)."""
-        link = arm.link_motion(motion)
-        pairs = zip(_laws(self.joints), np.array(self.units), strict=True)
-        friction = [_own(law, motion, arm) / unit for law, unit in pairs]
-        return joint_columns(self, motion, *self._shares(link.q, link.dq), *friction)
-
-    def action(self, values: FloatArray, arm: Arm) -> Action:
-        """Return the torque of all functions."""
-        whole = scatter(self, values, arm.robot)
-        at_knots, sizes = whole[:_KNOTS], whole[_KNOTS:] / np.array(self.units)
-        pairs = zip(_laws(self.joints), sizes, strict=True)
-
-        def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-            return np.asarray(np.einsum('k...j,kj->...j', self._shares(q, dq), at_knots))
-
-        friction = [law.action(size, arm) for law, size in pairs]
-        return merge_actions(arm.robot, [Action(link_torque=torque), *friction])
-
-    def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Return the standard deviations of the prior, shape (P,)."""
-        return np.repeat(np.array(self.size) / np.sqrt(_FUNCTIONS), len(self.quantities))
-
-    def _shares(self, q: FloatArray, dq: FloatArray) -> FloatArray:
-        """Return the share of each knot at states (..., n), shape (K, ..., n)."""
-        rows = zip(self.position, self.velocity, strict=True)
-        joints = [
-            [*_hats(q[..., joint], position), *_hats(dq[..., joint], velocity)]
-            for joint, (position, velocity) in enumerate(rows)
-        ]
-        return np.moveaxis(np.array(joints), 0, -1)
+    motions = [part.at_rows for part in data]
+    q = np.concatenate([motion.q for motion in motions])
+    top = np.max([np.abs(motion.dq).max(axis=0) for motion in motions], axis=0)
+    positions = np.linspace(q.min(axis=0), q.max(axis=0), _POSITIONS)
+    velocities = np.outer([*(-share for share in reversed(_SPEEDS)), *_SPEEDS], top)
+    friction = [_unasked_friction(motion, arm) for motion in motions]
+    size = np.sqrt(np.mean(np.concatenate(friction) ** 2, axis=0))
+    unit = np.where(size > 0.0, size, 1.0)
+    found = []
+    for motion, laws in zip(motions, friction, strict=True):
+        link, own = arm.link_motion(motion), laws / unit
+        count = len(positions) + len(velocities) + own.shape[2]
+        columns = np.zeros((*motion.q.shape, motion.n_joints * count))
+        for joint in range(motion.n_joints):
+            columns[:, joint, joint * count : (joint + 1) * count] = np.column_stack(
+                [
+                    *_hats(link.q[:, joint], positions[:, joint]),
+                    *_hats(link.dq[:, joint], velocities[:, joint]),
+                    own[:, joint],
+                ]
+            )
+        found.append(columns)
+    return found
 
 
-def _laws(joints: tuple[str, ...]) -> list[Effect]:
-    """Return the friction that nobody asked for, of all joints."""
-    return [kind(joints) for kind in UNASKED_FRICTION]
+def _unasked_friction(motion: Motion, arm: Arm) -> FloatArray:
+    """Return the torque of a unit of each law of friction in each joint, shape (N, n, L)."""
+    laws = [kind(motion.joints).columns(motion, arm) for kind in UNASKED_FRICTION]
+    return np.stack([np.diagonal(columns, axis1=1, axis2=2) for columns in laws], axis=2)
 
 
-def _own(law: Effect, motion: Motion, arm: Arm) -> FloatArray:
-    """Return the torque of a unit of a law in each joint, shape (N, n)."""
-    return np.diagonal(law.columns(motion, arm), axis1=1, axis2=2)
-
-
-def _hats(x: FloatArray, knots: tuple[float, ...]) -> list[FloatArray]:
+def _hats(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
     """Return the share of each knot in linear interpolation at x, each of the shape of x."""
     return [np.interp(x, knots, row) for row in np.eye(len(knots))]
-
-
-def _rows(table: FloatArray) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(row) for row in table.tolist())

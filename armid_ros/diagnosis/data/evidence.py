@@ -183,9 +183,6 @@ class NoiseFloor:
         Standard deviation of one period at low frequency [N m]; zero where nothing repeats.
     rough : ndarray, shape (n,)
         Upper estimate of noise that differs from row to row [N m].
-    growth : ndarray, shape (n,)
-        Power per bin of that difference in the upper third of the band that rows keep, over that
-        in the lower third: the model amplifies noise of positions with frequency.
 
     """
 
@@ -194,7 +191,6 @@ class NoiseFloor:
     structure: FloatArray
     slow: FloatArray
     rough: FloatArray
-    growth: FloatArray
 
 
 def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
@@ -220,25 +216,32 @@ def noise_floor(trajectory: Trajectory, arm: ArmModel) -> NoiseFloor:
     rough = np.maximum(_assumed(trajectory, smooth), least)
     if found is None:
         one, zero = np.ones(motion.n_joints), np.zeros(motion.n_joints)
-        return NoiseFloor(rough, None, one, zero, rough, one)
+        return NoiseFloor(rough, None, one, zero, rough)
     lag, where = found
     first = np.arange(max(where.start, half), min(where.stop, len(motion) - lag - half))
     rows = first[:: trajectory.used.decimation]
-    sigma, structure, slow, growth = np.empty((4, motion.n_joints))
-    kept = trajectory.used.kept_hz
+    sigma, structure, slow = np.ones((3, motion.n_joints))
     for joint in range(motion.n_joints):
         rest, used = _difference(trajectory, smooth, rows, lag, joint)
         freedom = max(1.0, used.sum() - 4.0)
         sigma[joint] = np.sqrt(np.sum(rest[used] ** 2) / freedom / 2.0)
         rest, used = _difference(trajectory, residual, first, lag, joint)
-        spectrum = _spectrum(np.where(used, rest, 0.0), trajectory.used.rate_hz)
-        structure[joint] = _over(spectrum, (0.0, _SLOW_HZ), _FAST_HZ)
-        slow[joint] = _deviation(spectrum) * np.sqrt(len(used) / max(2.0 * used.sum(), 1.0))
-        growth[joint] = _over(spectrum, (2.0 * kept / 3.0, kept), (kept / 12.0, kept / 3.0))
-    structure[sigma < least] = growth[sigma < least] = 1.0
+        rest = np.where(used, rest, 0.0)
+        length = min(len(rest), int(_WINDOW * trajectory.used.rate_hz))
+        frequency, power = signal.welch(
+            rest, fs=trajectory.used.rate_hz, nperseg=length, detrend=False
+        )
+        low = (frequency > 0.0) & (frequency < _SLOW_HZ)
+        fast = (frequency > _FAST_HZ[0]) & (frequency < _FAST_HZ[1])
+        if low.any() and fast.sum() >= 3:
+            structure[joint] = power[low].mean() / max(float(power[fast].mean()), 1e-300)
+        moving = np.sqrt(len(used) / max(2.0 * used.sum(), 1.0))
+        below = power[frequency < _SLOW_HZ].sum() * frequency[1]
+        slow[joint] = np.sqrt(below) * moving
+    structure[sigma < least] = 1.0
     sigma = np.maximum(sigma, least)
     period = lag * float(motion.t[1] - motion.t[0])
-    return NoiseFloor(sigma, period, structure, slow, rough, growth)
+    return NoiseFloor(sigma, period, structure, slow, rough)
 
 
 def _difference(
@@ -269,33 +272,6 @@ def _between_rows(
     """Return whether the row of a joint that is next to each sample is informative, (K,)."""
     nearest = np.clip(np.searchsorted(trajectory.rows, samples), 0, len(trajectory.rows) - 1)
     return np.asarray(trajectory.informative[nearest, joint])
-
-
-def _spectrum(difference: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Return frequencies [Hz] and the power per bin."""
-    length = min(len(difference), int(_WINDOW * rate))
-    frequency, power = signal.welch(difference, fs=rate, nperseg=length, detrend=False)
-    return frequency, power
-
-
-def _deviation(spectrum: tuple[FloatArray, FloatArray]) -> float:
-    """Return the standard deviation at low frequency."""
-    frequency, power = spectrum
-    low = frequency < _SLOW_HZ
-    return float(np.sqrt(np.sum(power[low]) * frequency[1]))
-
-
-def _over(
-    spectrum: tuple[FloatArray, FloatArray],
-    band: tuple[float, float],
-    other: tuple[float, float],
-) -> float:
-    """Return the power per bin of one band over that of another; 1 if either has too few bins."""
-    frequency, power = spectrum
-    upper, lower = (power[(frequency > low) & (frequency < high)] for low, high in (band, other))
-    if not len(upper) or len(lower) < 3:
-        return 1.0
-    return float(np.mean(upper) / max(float(np.mean(lower)), 1e-300))
 
 
 def _assumed(trajectory: Trajectory, smooth: FloatArray) -> FloatArray:

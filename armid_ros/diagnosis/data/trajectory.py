@@ -308,12 +308,13 @@ def count_recordings(data: Sequence[Trajectory]) -> int:
     return len({part.fold for part in data})
 
 
-def at_rest(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that are at rest throughout; none without data."""
+def not_shown(data: Sequence[Trajectory], joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that are at rest throughout, or of which no row is informative."""
     if not data:
         return ()
-    moves = moving(part.motion for part in data).tolist()
-    return tuple(joint for joint, moved in zip(joints, moves, strict=True) if not moved)
+    shown = moving(part.motion for part in data)
+    shown = shown & np.any([part.informative.any(axis=0) for part in data], axis=0)
+    return tuple(joint for joint, seen in zip(joints, shown.tolist(), strict=True) if not seen)
 
 
 def fold_rows(data: Sequence[Trajectory]) -> npt.NDArray[np.intp]:

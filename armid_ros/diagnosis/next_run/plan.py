@@ -16,7 +16,7 @@ payload, which alone separates a gain of the drives from the masses.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from armid_ros.diagnosis.next_run.separation import Doubt, Load, NOTHING, Separation
@@ -25,7 +25,6 @@ from armid_ros.effects.tied import Tied
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation import (
     ClearanceModel,
-    design,
     DesignProblem,
     DesignSettings,
     Excitation,
@@ -39,16 +38,12 @@ import numpy as np
 #: The file that a run is written to.
 EXPERIMENT_FILE = 'experiment.yaml'
 #: Names are separated beyond doubt at this many standard deviations: no payload is asked for
-#: where a motion alone does it, and no motion is designed where a template does.
+#: where a motion alone does it.
 _SURE = 5.0
 #: Standard deviations above which their number means nothing: noise is not known so well.
 _CERTAIN = 30.0
 #: Pairs of names in a sentence.
 _SAID = 3
-#: A provisional name without rivals is separated from so many of the next best of its ranking.
-_RUNNERS_UP = 3
-#: A search for a better motion than the templates: few steps, as each costs as much as a template.
-_STARTS, _CANDIDATES, _ITERATIONS = 1, 4, 25
 
 
 @dataclass(frozen=True)
@@ -163,24 +158,30 @@ def next_run(
         except TrajectoryError as error:
             refused.append(str(error))
             continue
-        runs.append(_run(diagnosis, doubts, template, trajectory))
-    plain = [run for run in runs if not run.template.loaded]
-    if plain:
-        best = max(plain, key=lambda run: run.worth)
-        runs += _designed(diagnosis, doubts, best, collision, rng)
+        load = Load.along(arm, trajectory) if template.loaded else None
+        pairs = tuple(Separation.of(diagnosis, doubt, trajectory, load) for doubt in doubts)
+        runs.append(_Run(template, trajectory, load, pairs))
     telling = [run for run in runs if any(one.distinct for one in run.separations)]
     if runs and not telling:
-        pairs = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
-        raise TrajectoryError(f'none of the planned motions tells {pairs}'.replace('_', ' '))
+        names = ', '.join(f'{one.name} from {one.rival}' for one in runs[0].separations)
+        raise TrajectoryError(f'none of the planned motions tells {names}'.replace('_', ' '))
     for run in _in_order(telling):
-        settings = _settings(run.template)
+        kind = run.template
+        settings = DesignSettings(
+            period=kind.period,
+            harmonics=kind.harmonics,
+            speed=kind.speed,
+            clearance=CLEARANCE,
+            samples=max(100, 10 * kind.harmonics),
+            processes=1,
+        )
         problem = DesignProblem.of(arm, settings, rng)
         try:
             excitation = placed(problem, run.trajectory)
         except TrajectoryError as error:
             refused.append(str(error))
             continue
-        return NextRun(excitation, run.template.name, run.load, run.separations)
+        return NextRun(excitation, kind.name, run.load, run.separations)
     raise TrajectoryError(f'no motion for the next run: {refused[-1]}')
 
 
@@ -208,72 +209,16 @@ def _in_order(runs: Sequence[_Run]) -> list[_Run]:
     return sorted(runs, key=lambda run: (enough and run.template.loaded, -run.worth))
 
 
-def _run(
-    diagnosis: Diagnosis,
-    doubts: Sequence[Doubt],
-    template: Template,
-    trajectory: FourierTrajectory,
-) -> _Run:
-    load = Load.along(diagnosis.arm, trajectory) if template.loaded else None
-    pairs = tuple(Separation.of(diagnosis, doubt, trajectory, load) for doubt in doubts)
-    return _Run(template, trajectory, load, pairs)
-
-
 def _doubts(diagnosis: Diagnosis) -> tuple[Doubt, ...]:
-    """Return pairs of a name and a rival, or a runner-up where the name is provisional."""
+    """Return pairs of a name and a rival."""
     explanation = diagnosis.explanation
     if explanation is None:
         return ()
     pairs = zip(explanation.fitted.named, explanation.steps, strict=True)
     found = {own.effect.name for own in explanation.fitted.named}
     doubts: dict[tuple[str, str], Doubt] = {}
-    for named, step in pairs:
-        others = [t.effect for t in step.rivals]
-        if not others and diagnosis.verdict == 'partial' and explanation.survey is not None:
-            others = [t.effect for t in explanation.survey.ranking if t.gain > 0.0]
-            others = [effect for effect in others if effect.name not in found][:_RUNNERS_UP]
-        for other in others:
-            if other.name in found:
-                continue
-            doubt = Doubt(named, other)
-            doubts.setdefault((doubt.named.effect.name, doubt.rival.name), doubt)
+    for named, trial in pairs:
+        for other in (rival.effect for rival in trial.rivals):
+            if other.name not in found:
+                doubts.setdefault((named.effect.name, other.name), Doubt(named, other))
     return tuple(doubts.values())
-
-
-def _designed(
-    diagnosis: Diagnosis,
-    doubts: Sequence[Doubt],
-    best: _Run,
-    collision: CollisionModel | None,
-    rng: np.random.Generator,
-) -> list[_Run]:
-    """Return a motion like the best template, designed for the pair that is separated least."""
-    doubtful = [k for k, pair in enumerate(best.separations) if NOTHING <= pair.z < _SURE]
-    if not doubtful:
-        return []
-    nearest = min(doubtful, key=lambda k: best.separations[k].power)
-    arm, rival = doubts[nearest].models(diagnosis)
-    settings = _settings(best.template, 'T', 'all' if diagnosis.refitted else 'effects')
-    bodies = collision or collision_model(arm.robot)
-    try:
-        found = design(arm, settings, rng, collision=bodies, rival=rival)
-    except TrajectoryError:
-        return []
-    made = replace(best.template, name='designed motion of all joints')
-    return [_run(diagnosis, doubts, made, found.excitation.trajectory)]
-
-
-def _settings(template: Template, criterion: str = 'D', target: str = 'all') -> DesignSettings:
-    return DesignSettings(
-        period=template.period,
-        harmonics=template.harmonics,
-        speed=template.speed,
-        clearance=CLEARANCE,
-        criterion=criterion,
-        target=target,
-        samples=max(100, 10 * template.harmonics),
-        starts=_STARTS,
-        candidates=_CANDIDATES,
-        iterations=_ITERATIONS,
-        processes=1,
-    )

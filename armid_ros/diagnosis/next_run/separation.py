@@ -12,15 +12,12 @@ with the nuisance parameters. The square root is the number of standard deviatio
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.verdict.finding import Diagnosis
 from armid_ros.effects import Effect
-from armid_ros.errors import ModelError
 from armid_ros.excitation import FourierTrajectory
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -35,8 +32,6 @@ _RATE = 50.0
 _PERIODS = 2
 #: A joint slower than this share of its top speed is not informative: dry friction is arbitrary.
 _SLOW = 0.02
-#: Shapes of a rival that are tried.
-_MOST_SHAPES = 12
 #: Torque of a known payload over the torque that a joint can give, or gives in the motion.
 _LOAD = 0.15
 #: A frame nearer than this to the last joint counts as at it [m].
@@ -68,15 +63,6 @@ class Doubt:
         if not self.named.effect.joints or not self.rival.joints:
             return ()
         return tuple(dict.fromkeys((*self.named.effect.joints, *self.rival.joints)))
-
-    def models(self, diagnosis: Diagnosis) -> tuple[ArmModel, ArmModel]:
-        """Return the patched model, and the same with the rival in place of the name."""
-        arm, own = diagnosis.arm, self.named.effect
-        kept = [k for k, effect in enumerate(arm.effects) if effect != own]
-        effects = tuple(arm.effects[k] for k in kept)
-        values = tuple(arm.values[k] for k in kept)
-        without = replace(arm, effects=effects, values=values)
-        return arm, without.with_effect(self.rival)
 
 
 @dataclass(frozen=True)
@@ -137,15 +123,13 @@ class Separation:
         free = _stack([_free(diagnosis, a, named, motion) for a in arms], weight)
         basis = _basis(free)
         rest = target - basis @ (basis.T @ target)
-        powers = []
-        for rival in _shapes(doubt.rival, motion, diagnosis.arm):
-            columns = _stack([a.columns_of(rival, motion) for a in arms], weight)
-            remainder = columns - basis @ (basis.T @ columns)
-            scale = np.linalg.norm(columns, axis=0)
-            visible = np.linalg.norm(remainder, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
-            own = _basis(remainder[:, visible])
-            powers.append(float(np.sum((rest - own @ (own.T @ rest)) ** 2)))
-        return Separation(named.said_as, doubt.rival.said_as, min(powers))
+        columns = _stack([a.columns_of(doubt.rival, motion) for a in arms], weight)
+        remainder = columns - basis @ (basis.T @ columns)
+        scale = np.linalg.norm(columns, axis=0)
+        visible = np.linalg.norm(remainder, axis=0) > 1e-6 * np.maximum(scale, 1e-300)
+        own = _basis(remainder[:, visible])
+        power = float(np.sum((rest - own @ (own.T @ rest)) ** 2))
+        return Separation(named.said_as, doubt.rival.said_as, power)
 
 
 @dataclass(frozen=True)
@@ -245,18 +229,3 @@ def _basis(columns: FloatArray) -> FloatArray:
         return columns
     basis, size, _ = np.linalg.svd(columns, full_matrices=False)
     return np.asarray(basis[:, size > _DEPENDENT * size[0]])
-
-
-def _shapes(rival: Effect, motion: Motion, arm: ArmModel) -> Iterator[Effect]:
-    """Yield the rival with the shape it was found with, and with others of its grid."""
-    yield rival
-    if not rival.shapes:
-        return
-    grids = rival.shape_grids(motion, arm)
-    chosen = list(product(*(range(grid.shape[1]) for grid in grids)))
-    for index in chosen[:: -(-len(chosen) // _MOST_SHAPES)]:
-        values = np.column_stack([grid[:, k] for grid, k in zip(grids, index, strict=True)])
-        try:
-            yield rival.with_shape(values)
-        except ModelError:
-            continue

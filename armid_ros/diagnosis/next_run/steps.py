@@ -14,8 +14,7 @@ from collections.abc import Sequence
 
 from armid_ros.diagnosis.next_run.plan import NextRun
 from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding, Rival
-from armid_ros.diagnosis.verdict.naming import on_one_link, shown_best, two_names
-from armid_ros.diagnosis.verdict.words import as_sure, by_cause, names_and_places
+from armid_ros.diagnosis.verdict.words import as_sure
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.fitting.identifiability import excludes_zero
 
@@ -49,8 +48,11 @@ def next_steps(
 
     """
     findings, verdict = diagnosis.findings, diagnosis.verdict
-    looks = [_looks(finding, diagnosis) for finding in findings]
-    steps = _first(list(dict.fromkeys(text for one in looks for text in one)))
+    looks = [text for finding in findings for text in _looks(finding, diagnosis)]
+    steps = list(dict.fromkeys(looks))
+    if steps:
+        head, _, what = steps[0].rpartition(':')
+        steps[0] = f'{head} first:{what}'
     if verdict == 'bad_data':
         steps.append('Correct the data, or the description, and diagnose again.')
     if verdict in ('unknown', 'partial'):
@@ -61,45 +63,35 @@ def next_steps(
         steps.append(run.sentence)
     elif no_run:
         steps.append(f'{no_run[0].upper()}{no_run[1:]}.')
-    steps += [text for finding in findings for text in _records(finding, run)]
+    told = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
     steps += [
-        'Record three more motions, and diagnose all recordings together: that tells whether '
-        f'{names_and_places(group)} changed.'
-        for group in by_cause(diagnosis.suspected)
+        one.experiment
+        for one in findings
+        if one.rivals and (one.name, one.rivals[0].name) not in told
     ]
-    unseen = _not_checked(diagnosis)
-    if unseen:
-        steps += unseen
-    elif worse:
-        steps.append(
-            f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
-            f'than the model before in {", ".join(worse)}. Record more motions of '
-            f'{", ".join(worse)}, and diagnose all recordings together.'
-        )
-    elif verdict in ('named', 'consistent') and not diagnosis.suspected:
-        anew = diagnosis.doubt or diagnosis.harmful
-        steps.append(_ANEW if anew else _use(diagnosis, model))
+    steps += _use_of_model(diagnosis, model, worse)
     if diagnosis.not_visible:
         hidden = ', '.join(name.replace('_', ' ') for name in diagnosis.not_visible)
         steps.append(f'These data cannot show: {hidden}. Other motions, or known values, can.')
     return steps
 
 
-def _not_checked(diagnosis: Diagnosis) -> list[str]:
-    """Say what to record of joints of which nothing can be said."""
-    steps = []
-    if diagnosis.blind:
-        joints = ', '.join(diagnosis.blind)
-        steps.append(f'Record longer, and more motions of {joints}, and diagnose again.')
-    if diagnosis.at_rest:
-        steps.append(f'Move {", ".join(diagnosis.at_rest)} as well, and record again.')
-    return steps
-
-
-def _use(diagnosis: Diagnosis, model: str) -> str:
-    """Say which model is to be used: the one that was given, unless it is patched."""
+def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> list[str]:
+    """Say which model may be used, or what to do before."""
+    if diagnosis.not_checked:
+        return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
+    if worse:
+        return [
+            f'Do not simulate with {model} yet: driven by the recorded torques, it is farther off '
+            f'than the model before in {", ".join(worse)}. Record more motions of '
+            f'{", ".join(worse)}, and diagnose all recordings together.'
+        ]
+    if diagnosis.verdict not in ('named', 'consistent'):
+        return []
+    if diagnosis.doubt or diagnosis.harmful:
+        return [_ANEW]
     which = f'the patched model, {model},' if diagnosis.findings else 'the model that was given'
-    return f'Use {which} in simulation and control; keep these bags to compare with.'
+    return [f'Use {which} in simulation and control; keep these bags to compare with.']
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
@@ -131,14 +123,6 @@ def _centre(finding: Finding) -> str:
     return f'. The load is centred at ({at}) m in the frame of that link'
 
 
-def _first(looks: list[str]) -> list[str]:
-    """Say of the first thing to look at that it is the first."""
-    if not looks:
-        return []
-    head, _, what = looks[0].rpartition(':')
-    return [f'{head} first:{what}', *looks[1:]]
-
-
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
     Return what an effect says is to be looked at; one that is not in the catalogue as well.
@@ -155,26 +139,3 @@ def _look_at(name: str, diagnosis: Diagnosis) -> str:
     if kind.traits.usual and name not in {own.said_as for own in given}:
         return ''
     return kind.traits.look_at
-
-
-def _records(finding: Finding, run: NextRun | None) -> list[str]:
-    """Say what else tells a name from its likeliest rival, unless the planned run does."""
-    separated = () if run is None else [(s.name, s.rival) for s in run.separations if s.distinct]
-    return [
-        _telling(finding, rival, run)
-        for rival in finding.rivals[:1]
-        if (finding.name, rival.name) not in separated
-    ]
-
-
-def _telling(finding: Finding, rival: Rival, run: NextRun | None) -> str:
-    """Say what tells a name from a rival; a load and the link below it move as one body."""
-    names = two_names(finding.name, finding.joints, rival)
-    best = shown_best(finding.name, finding.joints, rival)
-    if on_one_link(finding.name, finding.joints, rival):
-        return (
-            f'No motion tells {names}, as they move as one body. Weigh what the link carries, or '
-            f'record {best}.'
-        )
-    tried = 'looking does not tell' if run is None else 'neither looking nor that run tells'
-    return f'If {tried} {names}, record what shows them best: {best}.'

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.arm import ArmModel
+from armid_ros.arm import ArmModel, Misfit
 from armid_ros.arm.memoized_arm import memoized_arm
 from armid_ros.arm.misfit import louder
 from armid_ros.diagnosis.data.baseline import Baseline
@@ -85,12 +85,10 @@ class Explainer:
         Called with the share that is done and what is being done.
     settings : DiagnosisSettings
         Library and thresholds.
-    written : ndarray, shape (n,), or None
-        Misfit that the model is known to have, where there is no baseline [N m].
+    misfit : Misfit or None
+        What the model left when it was identified.
     unseen : sequence of Trajectory
         Further data of the day in question, which nothing is fitted to.
-    information : ndarray, shape (P, P), or None
-        What is known of the parameters of the model, where there is no baseline.
 
     """
 
@@ -100,17 +98,14 @@ class Explainer:
     rng: np.random.Generator
     tell: Progress
     settings: DiagnosisSettings
-    written: FloatArray | None = None
+    misfit: Misfit | None = None
     unseen: Sequence[Trajectory] = ()
-    information: FloatArray | None = None
 
     def chosen(self) -> Chosen:
         """Return the explanation that is given of the gap."""
         if self.baseline is not None:
             return self._since(self.baseline)
-        if self.written is not None:
-            return self._beside(self.written)
-        return self._alone()
+        return self._alone() if self.misfit is None else self._beside(self.misfit)
 
     def _alone(self) -> Chosen:
         """Explain what a model lacks of which nothing else is known."""
@@ -138,7 +133,7 @@ class Explainer:
         found = replace(found, evidence=replace(evidence, sigma=sigma))
         return Chosen(found, misfit, ESTIMATED, look=result.first)
 
-    def _beside(self, misfit: FloatArray) -> Chosen:
+    def _beside(self, written: Misfit) -> Chosen:
         """
         Explain what has changed since a model was identified, of whose misfit the size is known.
 
@@ -147,7 +142,8 @@ class Explainer:
         named.
 
         """
-        prepared, settings, known = self.prepared, self.settings, self.information
+        prepared, settings, known = self.prepared, self.settings, written.information
+        misfit = written.of(self.arm.robot, torque_rms(prepared.data))
         noise = _noise_within(misfit, prepared, 0.0)
         evidence = Evidence(prepared.data, tuple(np.maximum(s, misfit) for s in noise), noise)
         rows = Rows(prepared.data, evidence.sigma, 0, (misfit,) * count_recordings(prepared.data))
@@ -235,7 +231,7 @@ class Explainer:
         arm, settings = self.arm, self.settings
         fuller, unknown = with_friction(arm, settings.library)
         nuisance = Nuisance.of(rows, memoized_arm(fuller), self.rng, known)
-        changed = self.baseline is not None or self.written is not None
+        changed = self.baseline is not None or self.misfit is not None
         kinds = list(settings.kinds)
         if changed:
             given = zip(arm.effects, arm.values, strict=True)

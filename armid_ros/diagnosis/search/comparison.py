@@ -149,8 +149,6 @@ class CauseComparison:
             nuisance = nuisance.and_cause(best.best.cause, best.best.fit.size)
             accepted, nuisance = self._pruned(accepted, nuisance)
             look = self.look(nuisance)
-        if len(accepted) > 1:
-            accepted, nuisance = self._exchanged(accepted, nuisance)
         under = self._likeliest(nuisance)
         return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
 
@@ -176,23 +174,6 @@ class CauseComparison:
             if odds_to_winner > -levels.tie:
                 rated.append(replace(one, probability=float(np.exp(odds_to_winner - total))))
         return Accepted(rated[0], tuple(rated[1:]), look)
-
-    def _exchanged(
-        self, accepted: list[Accepted], nuisance: Nuisance
-    ) -> tuple[list[Accepted], Nuisance]:
-        """
-        Ask anew for each cause but the last, with those that were accepted after it.
-
-        The cause that is accepted first is compared while all the rest is unexplained: one that
-        takes a part of the rest as well is ahead of the right one.
-
-        """
-        for _ in range(len(accepted) - 1):
-            others = nuisance.without(0)
-            again = self.best(self.look(others), 0.0) or accepted[0]
-            accepted = [*accepted[1:], again]
-            nuisance = others.and_cause(again.best.cause, again.best.fit.size)
-        return accepted, nuisance
 
     def _settings(self, nuisance: Nuisance) -> list[Marginal]:
         """Return the nuisance parameters under all settings."""

@@ -5,15 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.cause import Cause, SelectedEffect
 from armid_ros.diagnosis.search.comparison import Result
 from armid_ros.diagnosis.search.explanation import Explanation
-from armid_ros.diagnosis.search.posterior import JointFit
-from armid_ros.diagnosis.search.trial import Key, Step, Survey, Trial
+from armid_ros.diagnosis.search.posterior import Fitted, JointFit
+from armid_ros.diagnosis.search.trial import Key, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.effects import Effect
 from armid_ros.motion import FloatArray
@@ -23,22 +22,13 @@ import numpy as np
 _UNKNOWN = 1e-12
 
 
-@dataclass(frozen=True)
-class Name:
-    """A cause to be fitted, how it was found, and first values of all its parameters."""
-
-    named: SelectedEffect
-    step: Step
-    values: FloatArray
-
-
 def explain(
     problem: JointFit,
     evidence: Evidence,
     result: Result,
     settings: DiagnosisSettings,
     unknown: Sequence[Effect] = (),
-    known: Sequence[Name] = (),
+    known: tuple[Fitted, Sequence[Trial]] | None = None,
 ) -> Explanation:
     """
     Fit the causes that matter.
@@ -55,44 +45,49 @@ def explain(
         Which share of a torque matters.
     unknown : sequence of Effect
         Friction and offsets without given values, which are named where they are there.
-    known : sequence of Name
-        Causes that were named before.
+    known : (Fitted, sequence of Trial), optional
+        Causes that were named before, with their values.
 
     """
-    material = settings.material
-    names, small = list(known), list[Trial]()
-    values = result.nuisance.means(result.under)
+    robot, material, alarm = problem.arm.robot, settings.material, settings.thresholds.alarm
+    fitted, steps = known or (None, ())
+    named, values = (list(fitted.named), list(fitted.values)) if fitted else ([], [])
+    steps, small = list(steps), list[Trial]()
+    means = result.nuisance.means(result.under)
     for one, span in zip(result.accepted, result.nuisance.spans, strict=True):
-        rivals = tuple(one.look.worth(other, material) for other in one.tied)
-        step = Step(one.look.worth(one.best, material), rivals)
-        if _matters(one.best.cause, values[span], result, material):
-            names.append(_name(step, one.best.cause, values[span], problem.arm))
-        else:
-            small.append(step.trial)
-    for effect, trial in _open(result, unknown, settings):
-        if not np.any(np.abs(trial.values) >= trial.least):
-            small += [trial] if trial.odds > settings.thresholds.alarm else []
-        elif trial.odds > settings.thresholds.alarm:
-            names.append(Name(SelectedEffect(effect, (0,)), Step(trial), trial.values))
+        trial = replace(
+            one.look.worth(one.best, material),
+            rivals=tuple(one.look.worth(other, material) for other in one.tied),
+        )
+        cause = one.best.cause
+        if not _matters(cause, means[span], result, material):
+            small.append(trial)
+            continue
+        whole = np.zeros(len(cause.effect.parameters(robot)))
+        whole[list(cause.kept)] = means[span]
+        effect, first = cause.effect.when_found(whole)
+        kept = cause.kept if effect is cause.effect else tuple(range(len(first)))
+        named.append(SelectedEffect(effect, kept))
+        values.append(first)
+        steps.append(trial)
+    for trial in _open(result, unknown, settings):
+        if trial.odds > alarm and np.any(np.abs(trial.values) >= trial.least):
+            named.append(trial.named)
+            values.append(trial.values)
+            steps.append(trial)
+        elif trial.odds > alarm:
+            small.append(trial)
     return Explanation(
         problem.arm,
-        problem.fit([one.named for one in names], [one.values for one in names]),
+        problem.fit(named, values),
         problem.fit(),
-        tuple(one.step for one in names),
-        survey_of(result, unknown, settings, [one.step.trial.key for one in names]),
+        tuple(steps),
+        survey_of(result, unknown, settings, [trial.key for trial in steps]),
         evidence,
         tuple(small),
         problem,
         problem.refits_body,
     )
-
-
-def _name(step: Step, cause: Cause, values: FloatArray, arm: ArmModel) -> Name:
-    whole = np.zeros(len(cause.effect.parameters(arm.robot)))
-    whole[list(cause.kept)] = values
-    effect, first = cause.effect.when_found(whole)
-    kept = cause.kept if effect is cause.effect else tuple(range(len(first)))
-    return Name(SelectedEffect(effect, kept), step, first)
 
 
 def _matters(cause: Cause, values: FloatArray, result: Result, material: float) -> bool:
@@ -103,7 +98,7 @@ def _matters(cause: Cause, values: FloatArray, result: Result, material: float) 
 
 def _open(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
-) -> Iterator[tuple[Effect, Trial]]:
+) -> Iterator[Trial]:
     """
     Yield friction and offsets without given values, which are fitted with all causes.
 
@@ -134,20 +129,17 @@ def _open(
         held = max(float(nuisance.described[k, k]), _UNKNOWN)
         odds = 0.5 * (means[k] ** 2 / variance + np.log(held * variance))
         seen = float(np.clip(1.0 - variance * held, 0.0, 1.0))
-        yield (
-            effect,
-            Trial(
-                SelectedEffect(effect, (0,)),
-                means[k : k + 1],
-                np.sqrt([variance]),
-                np.array([seen]),
-                np.array([settings.material * nuisance.rows.torque[joint] / max(rms, 1e-300)]),
-                np.sqrt(seen),
-                2.0 * odds,
-                odds,
-                min(means[k] ** 2 * square / max(left, 1e-300), 1.0),
-                len(today),
-            ),
+        yield Trial(
+            SelectedEffect(effect, (0,)),
+            means[k : k + 1],
+            np.sqrt([variance]),
+            np.array([seen]),
+            np.array([settings.material * nuisance.rows.torque[joint] / max(rms, 1e-300)]),
+            np.sqrt(seen),
+            2.0 * odds,
+            odds,
+            min(means[k] ** 2 * square / max(left, 1e-300), 1.0),
+            len(today),
         )
 
 
@@ -158,32 +150,17 @@ def survey_of(
     named: Collection[Key] = (),
 ) -> Survey:
     """Return what the first look showed of all causes, those that were named first."""
-    look, levels = result.first, settings.thresholds
+    look, material = result.first, settings.material
     ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
-    best = [look.worth(one, settings.material) for one in ranking]
-    others = (look.trial(one, settings.material) for one in look.others)
-    every = [*best, *others, *(t for _, t in _open(result, unknown, settings))]
-    seen = tuple(one for one in every if one.visible >= levels.least_visible)
-    names = {one.effect.said_as for one in seen}
+    every = [
+        *(look.worth(one, material) for one in ranking),
+        *(look.trial(one, material) for one in look.others),
+        *_open(result, unknown, settings),
+    ]
+    seen = tuple(one for one in every if one.visible >= settings.thresholds.least_visible)
     keys = {one.key[:2] for one in seen}
-    known = {effect.name: effect.said_as for effect in result.effects}
-    places = dict.fromkeys((effect.name, effect.joints) for effect in result.effects)
-    survey = Survey(
-        seen,
-        frozenset(known.values()) - names,
-        tuple((known[name], joints) for name, joints in places if (name, joints) not in keys),
+    places = {(effect.name, effect.joints): effect.said_as for effect in result.effects}
+    unseen = tuple(
+        (said, joints) for (name, joints), said in places.items() if (name, joints) not in keys
     )
-    if result.accepted or not look.nuisance.rows.before:
-        return survey
-    suspected = next(
-        (
-            one
-            for one in best
-            if one.odds > levels.alone
-            and one.share >= levels.headline
-            and np.any(np.abs(one.values) >= one.least)
-        ),
-        None,
-    )
-    unproven = best[0] if best and best[0].gain > 2.0 * levels.alarm else None
-    return replace(survey, suspected=suspected, unproven=unproven)
+    return Survey(seen, unseen)

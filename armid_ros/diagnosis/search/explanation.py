@@ -19,7 +19,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import plain_arm
 from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.search.posterior import Fitted, JointFit
-from armid_ros.diagnosis.search.trial import Look, Step, Survey, Trial
+from armid_ros.diagnosis.search.trial import Look, Survey, Trial
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
@@ -47,7 +47,7 @@ class Explanation:
         The arm with all named effects.
     reference : Fitted
         The same without them.
-    steps : tuple of Step
+    steps : tuple of Trial
         The names, in the order of those in ``fitted``.
     survey : Survey or None
         The first look at all candidates.
@@ -65,7 +65,7 @@ class Explanation:
     given: ArmModel
     fitted: Fitted
     reference: Fitted
-    steps: tuple[Step, ...]
+    steps: tuple[Trial, ...]
     survey: Survey | None
     evidence: Evidence
     minor: tuple[Trial, ...] = ()
@@ -75,7 +75,7 @@ class Explanation:
     def without(self, name: int) -> Explanation:
         """Return the explanation without one of its names, the others fitted anew."""
         fewer = self.only([k for k in range(len(self.steps)) if k != name])
-        return replace(fewer, minor=(*self.minor, self.steps[name].trial))
+        return replace(fewer, minor=(*self.minor, self.steps[name]))
 
     def only(self, keep: Sequence[int]) -> Explanation:
         """Return the explanation with some of its names, in this order, fitted anew."""
@@ -85,17 +85,10 @@ class Explanation:
         fitted = self.problem.fit(named, values)
         return replace(self, fitted=fitted, steps=tuple(self.steps[k] for k in keep))
 
-    def in_common_body(self) -> Explanation:
-        """Return the same names in an arm with the body and friction that both days have."""
-        assert self.problem is not None
-        problem = replace(self.problem, arm=self.problem.nuisance.arm, stated=True)
-        moved = replace(self, problem=problem, reference=problem.fit(), refitted=True)
-        return moved.only(range(len(self.steps)))
-
     def with_nothing_named(self) -> Explanation:
         """Return the explanation with all of its names in the small print."""
-        small = tuple(step.trial for step in self.steps)
-        return replace(self, fitted=self.reference, steps=(), minor=(*small, *self.minor))
+        minor = *self.steps, *self.minor
+        return replace(self, fitted=self.reference, steps=(), minor=minor)
 
     def forgetting(self) -> Explanation:
         """Return the explanation without what it was computed from."""

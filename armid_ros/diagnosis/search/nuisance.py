@@ -23,7 +23,7 @@ from functools import cached_property
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import described_precision, excited
 from armid_ros.diagnosis.data.days import Rows
-from armid_ros.diagnosis.data.discrepancy import Discrepancy
+from armid_ros.diagnosis.data.discrepancy import discrepancy_columns
 from armid_ros.diagnosis.search.cause import Cause
 from armid_ros.diagnosis.search.setting import Marginal, MotionDiscrepancy, Setting
 from armid_ros.model import BaseParameters
@@ -140,10 +140,10 @@ class Nuisance:
         joints = range(arm.robot.n_joints)
         flat = [x.reshape(-1, base.rank) for x in rows.weighted(columns, joints)]
         turn = _apart(np.concatenate(flat), described, unset)
-        functions = Discrepancy.over(rows.data, np.ones(arm.robot.n_joints), arm)
+        functions = discrepancy_columns(rows.data, arm)
         both = [
-            np.concatenate([x @ turn, part.columns(arm, functions)], axis=2)
-            for x, part in zip(columns, rows.data, strict=True)
+            np.concatenate([x @ turn, own], axis=2)
+            for x, own in zip(columns, functions, strict=True)
         ]
         rest = [part.residual(arm)[:, :, np.newaxis] for part in rows.data]
         weighted = rows.weighted(both, joints)

@@ -48,6 +48,8 @@ class Trial:
         Number of recordings that it explains more of than nothing does.
     probability : float
         Among all explanations; zero of one that was not named.
+    rivals : tuple of Trial
+        Causes that the data do not exclude in its place, the likeliest first.
 
     """
 
@@ -62,6 +64,7 @@ class Trial:
     share: float
     replicated: int
     probability: float = 0.0
+    rivals: tuple[Trial, ...] = ()
 
     @property
     def effect(self) -> Effect:
@@ -218,45 +221,23 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Step:
-    """
-    One name that was accepted.
-
-    Attributes
-    ----------
-    trial : Trial
-        What it is worth.
-    rivals : tuple of Trial
-        Causes that the data do not exclude in its place, the likeliest first.
-
-    """
-
-    trial: Trial
-    rivals: tuple[Trial, ...] = ()
-
-
-@dataclass(frozen=True)
 class Survey:
     """
-    What a look at all causes showed.
+    What the first look at all causes showed.
 
     Attributes
     ----------
     ranking : tuple of Trial
         All visible causes in their best shape, the likeliest first.
-    hidden : frozenset of str
-        Names of effects of which no cause is visible beyond the nuisance columns.
     unseen : tuple of (str, tuple of str)
-        Names and joints of the causes that are not visible.
-    suspected : Trial or None
-        The best cause that might be named if more recordings showed that it has changed.
-    unproven : Trial or None
-        The best cause of all, if the baseline does not tell whether it was there before.
+        Names and joints of the causes that are not visible beyond the nuisance columns.
 
     """
 
     ranking: tuple[Trial, ...]
-    hidden: frozenset[str]
     unseen: tuple[tuple[str, tuple[str, ...]], ...]
-    suspected: Trial | None = None
-    unproven: Trial | None = None
+
+    @property
+    def hidden(self) -> set[str]:
+        """Names of effects of which no cause is visible."""
+        return {name for name, _ in self.unseen} - {one.effect.said_as for one in self.ranking}

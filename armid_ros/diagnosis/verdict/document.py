@@ -55,7 +55,6 @@ def diagnosis_document(diagnosis: Diagnosis, model: str = 'model.yaml') -> dict[
         'summary': diagnosis.summary,
         'effects': [_finding(finding) for finding in diagnosis.findings],
         'minor': [_finding(finding) for finding in diagnosis.minor],
-        'suspected': [_finding(finding) for finding in diagnosis.suspected],
         'baseline': diagnosis.baseline,
         'where': [
             {'joint': w.joint, 'share_of_gap': w.share_of_gap, 'signature': w.signature}

@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.evidence import NoiseFloor
-from armid_ros.diagnosis.data.trajectory import at_rest, Trajectory
+from armid_ros.diagnosis.data.trajectory import not_shown, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
 from armid_ros.diagnosis.verdict.where import Where
+from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray
@@ -60,8 +61,6 @@ class Finding:
         Probability that it is not there, or has not changed.
     rivals : tuple of Rival
         Names that the data do not exclude in its place, the likeliest first.
-    experiment : str
-        The experiment that would separate them; empty if there are no rivals.
     gain : float
         Reduction of the held-out squares; twice the log Bayes factor in the small print.
     sign : str
@@ -73,9 +72,6 @@ class Finding:
     together : tuple of str
         Names that are one cause with it and have the share in common: a gravity of another
         direction and another size.
-    of_joint : tuple of (str, float)
-        Where its share of the whole gap is next to nothing, the joint in which it explains most of
-        what the other names leave, and that share; empty otherwise.
     added_to : tuple of float
         Values of the same parameters in the given model, which its values are added to; empty
         where none is known.
@@ -95,13 +91,11 @@ class Finding:
     share_interval: tuple[float, float]
     p: float
     rivals: tuple[Rival, ...] = ()
-    experiment: str = ''
     gain: float = 0.0
     sign: str = ''
     ties: tuple[Tie, ...] = ()
     weighs: bool = False
     together: tuple[str, ...] = ()
-    of_joint: tuple[str, float] = ('', 0.0)
     added_to: tuple[float, ...] = ()
     look_at: str = ''
     probability: float = 0.0
@@ -115,6 +109,36 @@ class Finding:
     def ambiguous_with(self) -> tuple[str, ...]:
         """Names that the data do not exclude in its place."""
         return tuple(rival.name for rival in self.rivals)
+
+    @property
+    def experiment(self) -> str:
+        """
+        Say which experiment separates it from its likeliest rival; empty if there is none.
+
+        No motion separates a payload from the link that carries it: it has to be taken off.
+
+        """
+        if not self.rivals:
+            return ''
+        rival = self.rivals[0]
+        kinds = [CATALOGUE[one] for one in (self.name, rival.name) if one in CATALOGUE]
+        carried = [kind for kind in kinds if kind.traits.comes_and_goes]
+        bodies = len(kinds) == 2 and all(kind.changes_body for kind in kinds)
+        alike = set(self.joints) == set(rival.joints)
+        own, other = (
+            f' of {", ".join(where)}' if where else '' for where in (self.joints, rival.joints)
+        )
+        first, second = (name.replace('_', ' ') for name in (self.name, rival.name))
+        names = f'{first}{"" if own == other else own} from {second}{other}'
+        one_body = bodies and bool(carried) and alike and bool(self.joints)
+        shown = [kind.traits.shown_by for kind in (carried if one_body else kinds)]
+        best = '; or '.join(dict.fromkeys(shown or [Effect.traits.shown_by]))
+        if one_body:
+            return (
+                f'No motion tells {names}, as they move as one body. Weigh what the link carries, '
+                f'or record {best}.'
+            )
+        return f'To tell {names}, record what shows them best: {best}.'
 
     def place_of(self, joint: str) -> str:
         """Return where the parameters of a joint act: its tied segment, or the joint itself."""
@@ -230,11 +254,6 @@ class Diagnosis:
         Whether the model is not patched, as the names would make it worse in some joint.
     doubt : str
         Why the model itself may be wrong, a sentence; empty if it need not be.
-    suspected : tuple of Finding
-        A cause that more recordings may tell from what those of one day differ by, where nothing
-        is named; empty if there is none.
-    blind : tuple of str
-        Joints that move and in which a change of all of the torque would not show.
     spans : tuple of Span
         Seconds of each recording in which the findings act; none if they act throughout.
 
@@ -257,8 +276,6 @@ class Diagnosis:
     baseline: str
     harmful: bool = False
     doubt: str = ''
-    suspected: tuple[Finding, ...] = ()
-    blind: tuple[str, ...] = ()
     spans: tuple[Span, ...] = ()
 
     def acting_in(self, spans: Sequence[Span]) -> Diagnosis:
@@ -287,13 +304,8 @@ class Diagnosis:
 
     @property
     def not_checked(self) -> tuple[str, ...]:
-        """Joints of which nothing can be said: at rest, or blind."""
-        return (*self.at_rest, *self.blind)
-
-    @property
-    def at_rest(self) -> tuple[str, ...]:
-        """Joints that are at rest throughout: what has changed in them does not show."""
-        return at_rest(self.data, self.arm.robot.joints)
+        """Joints that show nothing: at rest throughout, or turning round all the time."""
+        return not_shown(self.data, self.arm.robot.joints)
 
     def __repr__(self) -> str:
         """Return the verdict and its sentence."""

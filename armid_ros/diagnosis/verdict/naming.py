@@ -5,17 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.search.cause import SelectedEffect
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.patch import room
-from armid_ros.diagnosis.search.trial import Step, Trial
+from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.attribution import Attribution
-from armid_ros.diagnosis.verdict.finding import Finding, Rival, SAID
-from armid_ros.diagnosis.verdict.words import Unnamed
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.diagnosis.verdict.finding import Finding, Rival
+from armid_ros.effects import Effect
 from armid_ros.effects.tied import Tied
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import excludes_zero
@@ -79,20 +78,18 @@ def findings(
                 tuple(row[2] for row in rows),
                 attribution.share(indices),
                 attribution.interval(indices, rng),
-                max(step.trial.p for step in steps),
+                max(trial.p for trial in steps),
                 rivals,
-                _separating(name, order, rivals[0]) if rivals else '',
                 float(attribution.taken[indices].sum()),
                 parts[0].effect.traits.sign,
                 _ties([part.effect for part in parts], order),
                 parts[0].effect.traits.weighs,
                 tuple(other for other in together if other != name),
-                _of_joint(explanation, indices, attribution.share(indices)),
                 tuple(had.get((row[0].name, row[0].joint), 0.0) for row in rows),
                 explanation.fitted.named[own[0]].effect.traits.look_at
                 if len(together) > 1
                 else '',
-                min(step.trial.probability for step in steps),
+                min(trial.probability for trial in steps),
             )
         )
     return tuple(sorted(result, key=lambda one: -one.share))
@@ -109,23 +106,20 @@ def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, flo
     return [(parameter, *numbers) for parameter, numbers in rows.items()]
 
 
-def _of_joint(explanation: Explanation, names: Sequence[int], share: float) -> tuple[str, float]:
-    """Return the joint in which names of small share explain most of the rest, and how much."""
-    others = [k for k in range(len(explanation.steps)) if k not in names]
-    if share >= SAID or not others:
-        return '', 0.0
-    without = explanation.only(others).chi2_per_row
-    taken = 1.0 - explanation.chi2_per_row / np.maximum(without, 1e-300)
-    joint = int(np.argmax(taken))
-    return explanation.given.robot.joints[joint], float(taken[joint])
+def small_print(explanation: Explanation) -> tuple[Finding, ...]:
+    """
+    Return findings of causes that are significant and do not matter, the likeliest first.
 
+    A comparison lets values be beyond a bound by what noise makes; there is nothing to say of
+    those that exclude zero.
 
-def small_print(trials: Sequence[Trial], arm: ArmModel) -> tuple[Finding, ...]:
-    """Return findings of causes that are significant, can be, and do not matter."""
-    result = []
-    for trial in trials:
+    """
+    arm, result = explanation.given, []
+    for trial in sorted(explanation.minor, key=lambda trial: -trial.gain):
         effect, kept = trial.effect, list(trial.named.kept)
-        if not _can_be(trial, arm):
+        lower, upper = (bound[kept] for bound in room(effect, arm))
+        beyond = (trial.values < lower) | (trial.values > upper)
+        if np.any(beyond & excludes_zero(trial.values, trial.std)):
             continue
         names = effect.parameters(arm.robot)
         result.append(
@@ -145,45 +139,6 @@ def small_print(trials: Sequence[Trial], arm: ArmModel) -> tuple[Finding, ...]:
             )
         )
     return tuple(result)
-
-
-def not_named(explanation: Explanation, arm: ArmModel) -> Unnamed:
-    """Return the small print, and where nothing is named what may have changed."""
-    survey, small = explanation.survey, sorted(explanation.minor, key=lambda trial: -trial.gain)
-    minor = small_print(small, arm)
-    if survey is None or explanation.steps:
-        return Unnamed(minor)
-    return Unnamed(
-        minor, *(_as_looked_at(one, arm) for one in (survey.suspected, survey.unproven))
-    )
-
-
-def _as_looked_at(trial: Trial | None, arm: ArmModel) -> tuple[Finding, ...]:
-    """Return a cause of the first look as one finding for each of its names."""
-    if trial is None:
-        return ()
-    words = trial.effect.named_as(np.ones(len(trial.effect.parameters(arm.robot))), arm)
-    found = small_print([trial], arm)
-    if len(words) == 1:
-        return found
-    names = {part.name for part, _ in words}
-    return tuple(
-        replace(one, name=part.name, joints=part.joints, together=tuple(names - {part.name}))
-        for one in found
-        for part, _ in words
-    )
-
-
-def _can_be(trial: Trial, arm: ArmModel) -> bool:
-    """
-    Return whether values are within their bounds, where they exclude zero.
-
-    A search lets values be beyond a bound by what noise makes; there is nothing to say of those.
-
-    """
-    lower, upper = (bound[list(trial.named.kept)] for bound in room(trial.effect, arm))
-    beyond = (trial.values < lower) | (trial.values > upper)
-    return not np.any(beyond & excludes_zero(trial.values, trial.std))
 
 
 def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect]]:
@@ -257,7 +212,7 @@ def _ties(effects: Sequence[Effect], joints: Sequence[str]) -> tuple[Tie, ...]:
 
 
 def _rivals(
-    steps: Sequence[Step], own: Rival, others: set[str], arm: ArmModel
+    trials: Sequence[Trial], own: Rival, others: set[str], arm: ArmModel
 ) -> tuple[Rival, ...]:
     """
     Return the likeliest rivals of a name in its joints (`own`), with their joints.
@@ -266,12 +221,12 @@ def _rivals(
 
     """
     best: dict[str, list[Trial]] = {}
-    for step in steps:
+    for one in trials:
         here: dict[str, Trial] = {}
-        for trial in sorted(step.rivals, key=lambda trial: -trial.probability):
-            effect = trial.effect
+        for rival in sorted(one.rivals, key=lambda rival: -rival.probability):
+            effect = rival.effect
             if not (effect.said_as == own.name and set(effect.joints) <= set(own.joints)):
-                here.setdefault(effect.said_as, trial)
+                here.setdefault(effect.said_as, rival)
         for name in here.keys() - others:
             best.setdefault(name, []).append(here[name])
     likely = {name: max(trial.probability for trial in found) for name, found in best.items()}
@@ -287,39 +242,3 @@ def _joints(groups: Sequence[tuple[str, ...]], arm: ArmModel) -> tuple[str, ...]
     if any(len(group) > 1 for group in groups):
         return tuple(dict.fromkeys(joints))
     return tuple(joint for joint in arm.robot.joints if joint in joints)
-
-
-def _separating(name: str, joints: Sequence[str], rival: Rival) -> str:
-    """Say which experiment separates a name in some joints from a rival."""
-    return f'To separate {two_names(name, joints, rival)}: {shown_best(name, joints, rival)}.'
-
-
-def two_names(name: str, joints: Sequence[str], rival: Rival) -> str:
-    """Return a name and its rival in words, with their joints."""
-    own, other = (f' of {", ".join(where)}' if where else '' for where in (joints, rival.joints))
-    own = '' if own == other else own
-    first, second = (one.replace('_', ' ') for one in (name, rival.name))
-    return f'{first}{own} from {second}{other}'
-
-
-def on_one_link(name: str, joints: Sequence[str], rival: Rival) -> bool:
-    """Return whether a load and its rival are bodies on the same link, which no motion tells."""
-    both = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
-    bodies = len(both) == 2 and all(kind.changes_body for kind in both)
-    carried = any(kind.traits.comes_and_goes for kind in both)
-    return bodies and carried and bool(joints) and set(joints) == set(rival.joints)
-
-
-def shown_best(name: str, joints: Sequence[str], rival: Rival) -> str:
-    """
-    Return the recordings that show a name and its rival best.
-
-    No motion separates a payload from the link that carries it: it has to be taken off.
-
-    """
-    kinds = [CATALOGUE[one] for one in (name, rival.name) if one in CATALOGUE]
-    if on_one_link(name, joints, rival):
-        kinds = [kind for kind in kinds if kind.traits.comes_and_goes]
-    return '; or '.join(
-        dict.fromkeys([kind.traits.shown_by for kind in kinds] or [Effect.traits.shown_by])
-    )

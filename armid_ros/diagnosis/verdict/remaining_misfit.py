@@ -1,21 +1,39 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What names leave of the data, over what they may leave."""
+"""
+What names leave of the data, over what they may leave: the posterior predictive check.
+
+A misfit varies from motion to motion. Dry friction holds a joint at rest or in a reversal
+with any torque up to its own: such rows do not determine a model, and a residual beyond friction
+comes from a stop, a brake, or a contact.
+
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis.data.baseline import Baseline
 from armid_ros.diagnosis.data.evidence import Evidence
+from armid_ros.diagnosis.data.trajectory import REST_TIME
 from armid_ros.diagnosis.search.explanation import Chosen, ESTIMATED, Explanation
 from armid_ros.diagnosis.settings import DiagnosisSettings
-from armid_ros.diagnosis.verdict.gap import excess_of, for_a_second, harmed, held
-from armid_ros.diagnosis.verdict.where import Excess
+from armid_ros.diagnosis.verdict.where import Excess, Where
 from armid_ros.motion import FloatArray
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+#: Increase of the squares of a joint, as a share, that does not count as worse.
+_SLIGHTLY = 0.05
+#: Multiple of dry friction by which a joint at rest may be held: twice that of motion until it
+#: breaks away, and once that of the model, whose direction is arbitrary at rest.
+_HELD = 3.0
+#: Words for a joint that is held, for a table, and for the beginning and the end of a sentence.
+_WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
+_TURNING = 'where it stands still or turns round'
+_BESIDE = ' beside friction: a stop, a brake or a contact does that'
 
 
 @dataclass(frozen=True)
@@ -53,71 +71,127 @@ class RemainingMisfit:
         misfit.
 
         """
-        problem, parts = explanation.problem, self._parts(explanation.evidence)
+        problem, parts = explanation.problem, self._parts(explanation)
         left = [part.residuals(explanation.fitted.arm) for part in parts]
         if problem is not None and not self.chosen.measured:
             rest = problem.rest(explanation.fitted)
             first = len(explanation.evidence.data)
             left = [rest[:first], *(rest[first:] or one for one in left[1:])]
-        found = self._of_data(explanation.evidence, left)
-        if self.before is None:
-            return found
-        return found + [
-            for_a_second(one, part, self.before, self.given, self.settings)
-            for one, part in zip(left, parts, strict=True)
-        ]
-
-    def resting(self, explanation: Explanation) -> list[Excess]:
-        """Return by how much joints at rest are held by more than friction, for all data."""
-        if self.settings.partner is not None:
-            return []
-        arm, before, given = explanation.fitted.arm, self.before, self.given
-        parts = self._parts(explanation.evidence)
-        return [held(arm, part, before, given, self.settings) for part in parts]
-
-    def patched(self, explanation: Explanation) -> Excess:
-        """Return what the patched model leaves, whose body may be as it was given."""
-        arm, evidence = explanation.fitted.arm, explanation.evidence
-        left = self._of_data(evidence, [one.residuals(arm) for one in self._parts(evidence)])
-        return Excess(np.max([one.ratio for one in left], axis=0), '')
+        return list(self._of_whole(parts, left))
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
         """Return what the given model leaves; None if its rigid body is not fitted anew."""
         if not explanation.refitted:
             return None
-        evidence = explanation.evidence
-        return self._of_whole(evidence.residuals(self.given), evidence)
+        part = self._parts(explanation)[:1]
+        return next(self._of_whole(part, [part[0].residuals(self.given)]))
 
     def harmed(self, explanation: Explanation) -> tuple[str, ...]:
-        """Return the joints in which the patched model is worse than the given one."""
-        measured = replace(explanation, evidence=self._sure(explanation.evidence))
-        unseen = None if self.unseen is None else self._sure(self.unseen)
-        return harmed(measured, unseen, self.settings)
+        """
+        Return the joints in which the patched model is worse than the given one.
 
-    def shown_in(self, left: Sequence[Excess], evidence: Evidence) -> Evidence:
+        In no joint, in the data it was found in or in others, may its residual exceed that of the
+        given one by more than blocks of the data differ, unless it is no gap.
+
+        """
+        worse = np.zeros(self.given.robot.n_joints, dtype=bool)
+        thresholds = self.settings.thresholds
+        for part in self._parts(explanation) if explanation.steps else ():
+            residuals = [part.residuals(arm) for arm in (self.given, explanation.fitted.arm)]
+            had, has = (part.block_squares(rows) for rows in residuals)
+            more = has - had
+            spread = more.std(axis=0, ddof=1) * np.sqrt(len(more))
+            total = more.sum(axis=0)
+            floor = np.maximum(had.sum(axis=0), part.count)
+            limit = part.as_good(self.settings) + part.matters(self.settings)
+            surely = (total > thresholds.surely * spread) & (total > _SLIGHTLY * floor)
+            by_far = total > (thresholds.same_fit - 1.0) * floor
+            worse |= (surely | by_far) & (part.chi2_per_row(residuals[1]) > limit)
+        return tuple(j for j, bad in zip(self.given.robot.joints, worse, strict=True) if bad)
+
+    def _parts(self, explanation: Explanation) -> list[Evidence]:
+        """Return the data, in units of noise if the misfit is only estimated."""
+        both = self._data(explanation)
+        if self.chosen.floor_in_words != ESTIMATED:
+            return both
+        return [replace(part, sigma=part.noise) for part in both]
+
+    def shown_in(self, left: Sequence[Excess], explanation: Explanation) -> Evidence:
         """Return the data in which the worst of what is left shows, of which a sentence speaks."""
         worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
-        parts = self._parts(evidence)
-        return parts[worst % len(parts)]  # each kind of excess is there once for each of them
+        data = self._data(explanation)
+        return data[worst % len(data)]  # each kind of excess is there once for each of them
 
-    def _parts(self, evidence: Evidence) -> list[Evidence]:
-        return [evidence] if self.unseen is None else [evidence, self.unseen]
+    def _data(self, explanation: Explanation) -> list[Evidence]:
+        return [explanation.evidence, *([] if self.unseen is None else [self.unseen])]
 
-    def _of_data(self, evidence: Evidence, left: Sequence[Sequence[FloatArray]]) -> list[Excess]:
-        """Return residuals of the data, and of those that nothing was fitted to."""
-        found = [self._of_whole(left[0], evidence)]
-        if self.unseen is not None:
-            more, where = self.settings.thresholds.predicted, 'recordings that were not used'
-            found.append(excess_of(left[1], self._sure(self.unseen), self.settings, more, where))
+    def _of_whole(
+        self, parts: Sequence[Evidence], left: Sequence[Sequence[FloatArray]]
+    ) -> Iterator[Excess]:
+        """Yield residuals of the data, and of those that nothing was fitted to."""
+        usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
+        more = usual, self.settings.thresholds.predicted
+        where = 'in the recordings', 'in recordings that were not used'
+        for part, own, factor, words in zip(parts, left, more, where, strict=False):
+            limits = factor * part.limits(own, self.settings)
+            yield Excess(part.chi2_per_row(own) / limits, words)
+
+    def resting(self, explanation: Explanation) -> list[Excess]:
+        """Return by how much joints at rest are held by more than friction, for all data."""
+        if self.settings.partner is not None:
+            return []
+        surely, before, found = self.settings.thresholds.surely, self.before, list[Excess]()
+        for part in self._data(explanation):
+            arm = explanation.fitted.arm
+            excess = standing(arm, part, part.residuals(arm), surely)
+            if before is not None:  # what held a joint then, such as a brake, still does
+                unit = (before.misfit,) * len(before.data)
+                rows = Evidence.over_noise(before.data, unit)
+                then = standing(self.given, rows, before.residual, surely)
+                excess = excess / np.maximum(self.settings.thresholds.same_fit * then, 1.0)
+            found.append(Excess(excess, _TURNING, _BESIDE))
         return found
 
-    def _of_whole(self, residual: Sequence[FloatArray], evidence: Evidence) -> Excess:
-        """Return a residual of the data: a misfit varies from motion to motion."""
-        usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
-        return excess_of(residual, self._sure(evidence), self.settings, usual)
 
-    def _sure(self, evidence: Evidence) -> Evidence:
-        """Return data in units of noise if the misfit is only estimated, which excuses nothing."""
-        if self.chosen.floor_in_words != ESTIMATED:
-            return evidence
-        return replace(evidence, sigma=evidence.noise)
+def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
+    """Return the joints that are held, the worst first."""
+    excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
+    beyond = np.where(excess > 1.0, excess, 0.0)
+    order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
+    whole = float(beyond.sum())
+    return tuple(
+        Where(arm.robot.joints[j], float(beyond[j]) / whole, _WHERE, (), arm.robot.torque_units[j])
+        for j in order.tolist()
+    )
+
+
+def standing(
+    arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
+) -> FloatArray:
+    """
+    Return the ratio of the residual to friction at rest and in reversals, squared, (n,).
+
+    So many units of noise and misfit (`surely`) are added to friction, in proportion to the torque
+    that the model predicts: a joint accelerates most in a reversal, and the error of a model grows
+    with its torque. The residual is averaged over the time of the filter of positions, over which
+    its response to a jerk cancels, and over no less than a rest lasts, as what is shorter may be
+    chance. Zero where friction is not exceeded, and where no dry friction is known.
+
+    """
+    friction = arm.action().dry_friction
+    joints = arm.robot.n_joints
+    if friction is None:
+        return np.zeros(joints)
+    squares, time = np.zeros((2, joints))
+    usual = np.maximum(evidence.torque_rms, 1e-300)
+    for part, own, sigma in zip(evidence.data, residual, evidence.sigma, strict=True):
+        most = _HELD * friction.largest(arm.load(part.at_rows))
+        louder = np.maximum(np.abs(part.torque - own) / usual, 1.0)
+        period = float(part.t[1] - part.t[0])
+        shortest = max(REST_TIME, 1.0 / part.used.cutoff_hz)
+        lasting = uniform_filter1d(own, max(round(shortest / period), 1), axis=0)
+        beyond = (lasting / (most + surely * sigma * louder)) ** 2
+        more = ~part.informative & (most > 0.0) & (beyond > 1.0)
+        time += period * more.sum(axis=0)
+        squares += period * np.sum(beyond, axis=0, where=more)
+    return np.where(time > REST_TIME, squares / np.maximum(time, 1e-300), 0.0)

@@ -19,7 +19,7 @@ import numpy as np
 _BINS = 16
 #: A quantity is named if the means of its bins hold this share of the residual's power.
 _TELLING = 0.15
-#: Means whose squares are off a constant, or a straight line, by less than this share are one.
+#: Means whose squares are off a constant, or a line through zero, by less than this are one.
 _CURVED = 0.15
 
 
@@ -206,30 +206,16 @@ def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
 
 
 def _in_words(axes: Sequence[Axis]) -> str:
+    """Return the quantity that the mean residual is a function of, and of which kind."""
     best = axes[0]
     if best.share < _TELLING:
         return 'no function of one quantity of the joint: fast in time, or of several joints'
-    peak = int(np.argmax(np.abs(best.means)))
-    line = np.polyfit(best.centres, best.means, 1)
-    straight = np.polyval(line, best.centres)
-    size = float(np.sum(best.means**2))
     share = f'{100 * best.share:.0f} % of its power'
-    if np.sum((best.means - best.means.mean()) ** 2) < _CURVED * size:
+    size = _CURVED * float(np.sum(best.means**2))
+    slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
+    if np.sum((best.means - best.means.mean()) ** 2) < size:
         return f'constant ({share})'
-    if np.sum((best.means - straight) ** 2) < _CURVED * size:
-        slope = float(best.centres @ best.means) / max(float(best.centres @ best.centres), 1e-300)
-        through_zero = np.sum((best.means - slope * best.centres) ** 2) < _CURVED * size
-        how = 'in proportion to' if through_zero else 'linear in'
-        return f'{how} {best.name} ({share})'
-    if best.name == 'velocity' and _jumps(best):
-        return f'a jump with the direction of motion ({share})'
-    return f'a function of {best.name}, largest at {best.centres[peak]:.3g} {best.unit} ({share})'
-
-
-def _jumps(axis: Axis) -> bool:
-    forward = axis.means[axis.centres > 0.0]
-    backward = axis.means[axis.centres < 0.0]
-    if len(forward) < 2 or len(backward) < 2:
-        return False
-    step = abs(forward.mean() - backward.mean())
-    return bool(step > 3.0 * max(forward.std(), backward.std()))
+    if np.sum((best.means - slope * best.centres) ** 2) < size:
+        return f'in proportion to {best.name} ({share})'
+    peak = best.centres[int(np.argmax(np.abs(best.means)))]
+    return f'a function of {best.name}, largest at {peak:.3g} {best.unit} ({share})'
