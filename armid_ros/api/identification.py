@@ -141,7 +141,9 @@ class IdentificationResult(ShownModel):
 
     @cached_property
     def _misfit(self) -> Misfit:
-        return known_misfit(self.core, self.recordings, self.held_out)
+        data = 'held-out' if self.held_out else 'training'
+        read = self.held_out or self.recordings
+        return known_misfit(self.core.arm, read, self.core.used, data)
 
     @property
     def grade(self) -> str:

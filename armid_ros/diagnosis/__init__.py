@@ -9,8 +9,8 @@ leaves, for later diagnoses.
 
 """
 
+from armid_ros.diagnosis.data.baseline import known_misfit
 from armid_ros.diagnosis.diagnose import diagnose
-from armid_ros.diagnosis.known_misfit import known_misfit
 from armid_ros.diagnosis.next_run.plan import EXPERIMENT_FILE, next_run, NextRun
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.diagnosis.verdict.document import diagnosis_document

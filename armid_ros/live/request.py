@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import time
 
 from armid_ros.arm import ArmModel, Misfit
-from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding
-from armid_ros.diagnosis.known_misfit import misfit_of
+from armid_ros.diagnosis import diagnose, Diagnosis, DiagnosisSettings, Finding, known_misfit
 from armid_ros.diagnosis.prepare import choose_filters
 from armid_ros.errors import ArmidError
 from armid_ros.identification.rows.signals import Conditioning
@@ -49,7 +48,7 @@ class Healthy:
             If the motion is too short for the filters.
 
         """
-        return misfit_of(self.arm, [self.recording], filters, 'held-out')
+        return known_misfit(self.arm, [self.recording], filters, 'held-out')
 
 
 @dataclass(frozen=True)

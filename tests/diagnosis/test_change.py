@@ -97,7 +97,11 @@ def test_a_baseline_that_the_model_is_not_of_is_doubted(bench, changed):
     torque = with_drag if changed else hose
     days = [bench.recordings(torque, seed=seed) for seed in (2, 3)]
     result = diagnose(
-        found.arm, days[1], baseline=days[0], misfit=known_misfit(found, old), rng=rng
+        found.arm,
+        days[1],
+        baseline=days[0],
+        misfit=known_misfit(found.arm, old, found.used),
+        rng=rng,
     )
     assert result.verdict == 'consistent', result.summary
     assert ('elbow' in result.doubt) == changed
@@ -158,7 +162,7 @@ def test_the_noise_of_a_wider_band_is_no_reason_to_doubt_a_baseline(bench, told)
     narrow, wide = SignalSettings(cutoff_hz=4.0, decimation=25), SignalSettings(decimation=1)
     rng = np.random.default_rng(0)
     found = identify(bench.arm, before, settings=IdentificationSettings(signals=narrow), rng=rng)
-    misfit = known_misfit(found, before)
+    misfit = known_misfit(found.arm, before, found.used)
     misfit = misfit if told else replace(misfit, filters=None)
     settings = DiagnosisSettings(signals=wide)
     result = diagnose(found.arm, after, baseline=before, misfit=misfit, settings=settings, rng=rng)
@@ -175,7 +179,7 @@ def test_a_model_that_was_unusable_is_doubted(bench):
     rng = np.random.default_rng(0)
     before = bench.recordings(hose, seed=1)
     found = identify(bench.arm, before, rng=rng)
-    misfit = replace(known_misfit(found, before), unusable=True)
+    misfit = replace(known_misfit(found.arm, before, found.used), unusable=True)
     after = bench.recordings(hose, seed=2)
     result = diagnose(found.arm, after, baseline=before, misfit=misfit, rng=rng)
     assert result.verdict == 'consistent'
@@ -242,7 +246,7 @@ def test_what_another_motion_makes_of_a_misfit_is_no_change(upright, seed):
     found = diagnose(
         model.arm,
         upright.recordings(clutter, seed),
-        misfit=known_misfit(model, before),
+        misfit=known_misfit(model.arm, before, model.used),
         rng=np.random.default_rng(0),
     )
     assert (found.verdict, found.findings) == ('consistent', ())
@@ -289,7 +293,11 @@ def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
 
     before = bench.recordings(seed=1)
     model = identify(bench.arm, before, rng=np.random.default_rng(0))
-    known = {'baseline': before} if with_baseline else {'misfit': known_misfit(model, before)}
+    known = (
+        {'baseline': before}
+        if with_baseline
+        else {'misfit': known_misfit(model.arm, before, model.used)}
+    )
     for hidden, wanted in ((None, 'consistent'), (push, 'unknown')):
         now = bench.recordings(hidden, seed=2)
         found = diagnose(model.arm, now, rng=np.random.default_rng(0), **known)

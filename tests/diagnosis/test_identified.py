@@ -89,7 +89,7 @@ def test_what_a_model_was_identified_wrong_is_no_change(upright, seed):
     known = upright.recordings(seed=seed)[:1]
     short = [replace_end(known[0], 0.25)]
     model = identify(upright.arm, short, rng=np.random.default_rng(0))
-    misfit = replace(known_misfit(model, short), information=told_of(model))
+    misfit = replace(known_misfit(model.arm, short, model.used), information=told_of(model))
     found = diagnose(
         model.arm, upright.recordings(seed=seed + 5), misfit=misfit, rng=np.random.default_rng(0)
     )

@@ -16,13 +16,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import Evidence
-from armid_ros.diagnosis.data.trajectory import fold_rows, Trajectory, weighted_rows
+from armid_ros.arm import ArmModel, Misfit
+from armid_ros.arm.misfit import RowFilters
+from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
+from armid_ros.diagnosis.data.trajectory import (
+    fold_rows,
+    trajectories,
+    Trajectory,
+    weighted_rows,
+)
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.normal_equations import informative_solution, scaled_inverse
+from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.model import BaseParameters, group_columns
 from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
 import numpy as np
 import scipy.linalg
 
@@ -182,3 +190,39 @@ class Baseline:
         torque = rows.count * np.maximum(rows.torque_rms**2, 1e-300)
         whole = (each**2 @ torque) / max(float(torque.sum()), 1e-300)
         return float(np.sqrt(whole)), each
+
+
+def known_misfit(
+    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, data: str = 'training'
+) -> Misfit:
+    """
+    Measure what a model leaves of recordings in which nothing is wrong, for later diagnoses.
+
+    Rows in which a joint rests or turns round do not count: a diagnosis learns nothing from the
+    friction there, of which a model gets most wrong.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        The model.
+    recordings : sequence of Recording
+        The recordings.
+    used : Conditioning
+        Filters; the narrower the band, the less noise.
+    data : {'held-out', 'training'}
+        Whether the model was fitted to them.
+
+    Raises
+    ------
+    IdentificationError
+        If a recording is too short for the filters.
+
+    """
+    parts = trajectories(recordings, used, arm)
+    found = Baseline.of(arm, parts, np.random.default_rng(0))
+    rms, torque = (
+        dict(zip(arm.robot.joints, each.tolist(), strict=True))
+        for each in (found.misfit, torque_rms(parts))
+    )
+    filters = RowFilters(used.rate_hz, used.cutoff_hz, used.decimation)
+    return Misfit(data, rms, 100.0 * found.errors[0], torque, filters=filters)

@@ -16,7 +16,6 @@ from armid_ros.effects import Effect, TorqueReading
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-import numpy.typing as npt
 
 #: Largest relative change of a shape in one step: the search has refined it already.
 _SHAPE_STEP = 0.1
@@ -52,34 +51,34 @@ class Patch:
             model = with_named(model, own.effect, values)
         return model
 
+    @property
+    def places(self) -> tuple[tuple[range, range], ...]:
+        """Positions among the fitted parameters of the values of each name, and of its shapes."""
+        places, start = [], 0
+        for own in self.named:
+            shapes = start + len(own.kept)
+            stop = shapes + len(own.effect.shape)
+            places.append((range(start, shapes), range(shapes, stop)))
+            start = stop
+        return tuple(places)
+
     def moved(self, change: FloatArray) -> Patch:
         """Return the patch after a step of all fitted parameters, within bounds."""
-        start, named, values = 0, list[SelectedEffect](), list[FloatArray]()
-        for own, old in zip(self.named, self.values, strict=True):
+        named, values = list[SelectedEffect](), list[FloatArray]()
+        for own, old, (place, shapes) in zip(self.named, self.values, self.places, strict=True):
             effect, kept = own.effect, list(own.kept)
             lower, upper = room(effect, self.arm)
             new = old.copy()
-            new[kept] += change[start : start + len(kept)]
+            new[kept] += change[list(place)]
             values.append(np.clip(new, lower, upper))
-            start += len(kept)
-            count = len(effect.shape)
-            if count:
+            if shapes:
                 low, high, step = _shape_bounds(effect)
                 shape = np.array(effect.shape)
                 limit = np.maximum(_SHAPE_STEP * np.abs(shape), 30.0 * step)
-                shape = shape + np.clip(change[start : start + count], -limit, limit)
+                shape = shape + np.clip(change[list(shapes)], -limit, limit)
                 effect = effect.with_shape(np.clip(shape, low, high))
-                start += count
             named.append(SelectedEffect(effect, own.kept))
         return Patch(self.arm, tuple(named), tuple(values))
-
-    @property
-    def linear(self) -> npt.NDArray[np.bool_]:
-        """Which of the fitted parameters are no shapes, (f,)."""
-        own = [np.zeros(0, dtype=bool)]
-        for named in self.named:
-            own += [np.ones(len(named.kept), dtype=bool), np.zeros(len(named.effect.shape), bool)]
-        return np.concatenate(own)
 
     def parameters(self) -> tuple[tuple[ParameterName, ...], FloatArray]:
         """Name the fitted parameters of the named effects, shapes behind quantities."""

@@ -74,13 +74,7 @@ class Fitted:
     @property
     def places(self) -> tuple[tuple[range, range], ...]:
         """Positions in the estimate of the values of each name, and of its shapes."""
-        places, start = [], 0
-        for own in self.named:
-            shapes = start + len(own.kept)
-            stop = shapes + len(own.effect.shape)
-            places.append((range(start, shapes), range(shapes, stop)))
-            start = stop
-        return tuple(places)
+        return Patch(self.arm, self.named, self.values).places
 
 
 @dataclass(frozen=True)
@@ -160,20 +154,21 @@ class JointFit:
 
         """
         state = Patch(self.arm, tuple(named), tuple(values))
-        linear = self._linear(state)
+        linear = self.linear(state)
         under = linear.marginal(self.setting, self.recordings)
         loss = self._loss(state)
         for _ in range(_MOST_ROUNDS if named else 0):
             means = linear.means(under)
             step = means[linear.spans[0].start : linear.spans[len(named) - 1].stop]
-            step = step - self._present(state)
+            for own, now, (kept, _) in zip(state.named, state.values, state.places, strict=True):
+                step[kept.start : kept.stop] -= now[list(own.kept)]
             tried = (state.moved(share * step) for share in _SHARES)
             better = ((self._loss(one), one) for one in tried)
             new, moved = next(((x, one) for x, one in better if x < loss), (loss, state))
             if moved is state:
                 break
             settled = loss - new < _SETTLED * max(abs(new), 1e-12)
-            state, linear = moved, self._linear(moved)
+            state, linear = moved, self.linear(moved)
             under, loss = linear.marginal(self.setting, self.recordings), new
             if settled:
                 break
@@ -240,13 +235,6 @@ class JointFit:
                     start += len(weight)
         return found
 
-    def _present(self, state: Patch) -> FloatArray:
-        """Return the values of a state, and zero for each shape."""
-        parts = [np.zeros(0)]
-        for own, values in zip(state.named, state.values, strict=True):
-            parts += [values[list(own.kept)], np.zeros(len(own.effect.shape))]
-        return np.concatenate(parts)
-
     def _weighted(self, model: ArmModel) -> list[FloatArray]:
         """Return the weighted residual of each recording, (n, M), with an arm as it is today."""
         rows = self.nuisance.rows
@@ -262,10 +250,6 @@ class JointFit:
                 weighted, self.nuisance.residual, rows.today, strict=True
             )
         ]
-
-    def linear(self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]) -> Nuisance:
-        """Return the nuisance columns with those of named effects, linear at their values."""
-        return self._linear(Patch(self.arm, tuple(named), tuple(values)))
 
     def _loss(self, state: Patch) -> float:
         """Return minus the log likelihood of values, the nuisance parameters integrated out."""
@@ -290,7 +274,7 @@ class JointFit:
         under = both.marginal(self.setting, self.recordings)
         return both.means(under)[size : len(means)] - means[size:]
 
-    def _linear(self, state: Patch) -> Nuisance:
+    def linear(self, state: Patch) -> Nuisance:
         """Return the nuisance columns with those of the names, linear in values at a state."""
         if not state.named:
             return self.nuisance

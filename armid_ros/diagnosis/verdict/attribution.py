@@ -18,6 +18,7 @@ from armid_ros.diagnosis.data.evidence import Evidence
 from armid_ros.diagnosis.data.trajectory import block_rows
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.nuisance import Nuisance
+from armid_ros.diagnosis.search.patch import Patch
 from armid_ros.diagnosis.search.posterior import JointFit
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.motion import FloatArray
@@ -108,7 +109,8 @@ def left_out(explanation: Explanation) -> Attribution:
     """Predict each fold from all other data, adding the name with the largest gain at a time."""
     assert explanation.problem is not None
     problem, own = explanation.problem, explanation.fitted
-    linear, count = problem.linear(own.named, own.values), len(own.named)
+    linear = problem.linear(Patch(problem.arm, own.named, own.values))
+    count = len(own.named)
     remaining, order = list(range(count)), list[int]()
     before = whole = _left(problem, linear, ())
     taken = np.zeros((count, len(whole)))
