@@ -178,25 +178,6 @@ def test_a_damaged_sample_is_mended_in_every_recording_and_said(bench, part):
     assert any('4 dropped' in note for note in found.notes)
 
 
-def exchanged(recording):
-    """Return a recording in which shoulder and elbow have the name of each other."""
-    order = [0, 2, 1]
-    return replace(recording, q=recording.q[:, order], tau=recording.tau[:, order])
-
-
-def in_degrees(recording):
-    return replace(recording, q=np.rad2deg(recording.q))
-
-
-@pytest.mark.parametrize(('harm', 'said'), [(exchanged, 'exchanged'), (in_degrees, 'in degrees')])
-def test_names_and_units_of_whole_joints_are_faults_of_the_data(upright, harm, said):
-    recordings = [harm(one) for one in upright.recordings()]
-    found = diagnose(upright.arm, recordings, rng=np.random.default_rng(0))
-    assert found.verdict == 'bad_data'
-    assert said in found.summary
-    assert 'jumps' not in found.summary
-
-
 def test_a_model_of_another_arm_is_doubted(bench):
     """What such a model leaves of both days is alike, and so nothing has changed."""
     other = replace(bench.arm, robot=bench.robot.with_gravity([3.0, 0.0, -9.0]))
@@ -223,24 +204,6 @@ def test_a_model_that_is_worse_than_none_is_refused(bench):
     found = diagnose(heavy, days[1], baseline=days[0], rng=np.random.default_rng(0))
     assert found.verdict == 'bad_data'
     assert 'no model' in found.summary
-
-
-@pytest.mark.parametrize(
-    ('since', 'remedy'),
-    [(0, 'held still'), (1000, 'time out')],
-)
-def test_a_torque_that_stays_the_same_while_its_joint_moves_is_dead(bench, since, remedy):
-    def dead(one):
-        tau = one.tau.copy()
-        tau[since:, 0] = tau[since, 0] if since else 0.0
-        return replace(one, tau=tau)
-
-    found = diagnose(
-        bench.arm, [dead(one) for one in bench.recordings()], rng=np.random.default_rng(0)
-    )
-    assert found.verdict == 'bad_data'
-    assert 'shoulder' in found.summary and 'elbow' not in found.summary
-    assert remedy in found.summary
 
 
 def test_torques_of_which_none_was_measured_are_one_fault(bench):

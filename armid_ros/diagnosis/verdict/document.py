@@ -21,7 +21,6 @@ from armid_ros.diagnosis.verdict.finding import Diagnosis, Finding
 from armid_ros.effects import CATALOGUE, Effect
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -128,33 +127,21 @@ def _ties(finding: Finding) -> dict[str, Any]:
 
 
 def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
-    joints = diagnosis.arm.robot.joints
+    joints, units = diagnosis.arm.robot.joints, diagnosis.arm.robot.torque_units
     gap = diagnosis.gap
 
-    def table(values: FloatArray) -> dict[str, float]:
-        return {joint: float(v) for joint, v in zip(joints, values, strict=True)}
+    def table(name: str) -> dict[str, float]:
+        rows = [] if gap is None else zip(joints, getattr(gap, name), strict=True)
+        return {joint: float(value) for joint, value in rows}
 
-    units = diagnosis.arm.robot.torque_units
-    of_what = {
+    return {
         'unit': 'N m' if 'N m' in units else units[0],
         'units': dict(zip(joints, units, strict=True)),
-    }
-    if gap is None:
-        return {
-            **of_what,
-            'before': {},
-            'after': {},
-            'noise_floor': {},
-            'closed_fraction': 0.0,
-            'data': 'none',
-        }
-    return {
-        **of_what,
-        'before': table(gap.before),
-        'after': table(gap.after),
-        'noise_floor': table(gap.floor),
-        'closed_fraction': gap.closed,
-        'data': gap.data,
+        'before': table('before'),
+        'after': table('after'),
+        'noise_floor': table('floor'),
+        'closed_fraction': gap.closed if gap else 0.0,
+        'data': gap.data if gap else 'none',
     }
 
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.evidence import NoiseFloor
 from armid_ros.diagnosis.data.trajectory import not_shown, Trajectory
 from armid_ros.diagnosis.search.explanation import Explanation
 from armid_ros.diagnosis.search.spans import Span
@@ -240,8 +239,6 @@ class Diagnosis:
         The patched model; the given one where nothing was named or a patch would harm.
     data : tuple of Trajectory
         The recordings in question.
-    floors : tuple of NoiseFloor
-        Noise of each trajectory.
     not_visible : tuple of str
         Names of the catalogue that these data cannot show.
     refitted : bool
@@ -269,7 +266,6 @@ class Diagnosis:
     explanation: Explanation | None
     arm: ArmModel
     data: tuple[Trajectory, ...]
-    floors: tuple[NoiseFloor, ...]
     not_visible: tuple[str, ...]
     refitted: bool
     notes: tuple[str, ...]
