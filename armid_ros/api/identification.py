@@ -141,9 +141,7 @@ class IdentificationResult(ShownModel):
 
     @cached_property
     def _misfit(self) -> Misfit:
-        data = 'held-out' if self.held_out else 'training'
-        read = self.held_out or self.recordings
-        return known_misfit(self.core.arm, read, self.core.used, data)
+        return known_misfit(self.core.arm, self.recordings, self.core.used, self.held_out)
 
     @property
     def grade(self) -> str:

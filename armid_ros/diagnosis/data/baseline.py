@@ -21,9 +21,9 @@ from armid_ros.arm.misfit import RowFilters
 from armid_ros.diagnosis.data.evidence import Evidence, torque_rms
 from armid_ros.diagnosis.data.trajectory import (
     fold_rows,
+    row_weights,
     trajectories,
     Trajectory,
-    weighted_rows,
 )
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.normal_equations import informative_solution, scaled_inverse
@@ -95,14 +95,11 @@ def refitted(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
     """Return an arm with base parameters fitted to data of noise (n,) [N m] each."""
-    matrix, vector = described_precision(base, arm), np.zeros(base.rank)
     columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
-    rows = weighted_rows(columns, data, sigma)
-    rest = weighted_rows([part.residual(arm) for part in data], data, sigma)
-    for x, y in zip(rows, rest, strict=True):
-        flat = x.reshape(-1, base.rank)
-        matrix += flat.T @ flat
-        vector += flat.T @ y.ravel()
+    weight = row_weights(data, sigma)
+    x = (np.concatenate(columns) * weight[:, :, np.newaxis]).reshape(-1, base.rank)
+    y = np.concatenate([part.residual(arm) for part in data]) * weight
+    matrix, vector = described_precision(base, arm) + x.T @ x, x.T @ y.ravel()
     theta = arm.theta
     change = informative_solution(matrix, vector)
     return arm.with_theta(base.lift(base.values(theta) + change, theta))
@@ -193,7 +190,10 @@ class Baseline:
 
 
 def known_misfit(
-    arm: ArmModel, recordings: Sequence[Recording], used: Conditioning, data: str = 'training'
+    arm: ArmModel,
+    recordings: Sequence[Recording],
+    used: Conditioning,
+    held_out: Sequence[Recording] = (),
 ) -> Misfit:
     """
     Measure what a model leaves of recordings in which nothing is wrong, for later diagnoses.
@@ -206,11 +206,11 @@ def known_misfit(
     arm : ArmModel
         The model.
     recordings : sequence of Recording
-        The recordings.
+        What it was fitted to.
     used : Conditioning
         Filters; the narrower the band, the less noise.
-    data : {'held-out', 'training'}
-        Whether the model was fitted to them.
+    held_out : sequence of Recording
+        What it was not fitted to, which counts alone where there is any.
 
     Raises
     ------
@@ -218,11 +218,12 @@ def known_misfit(
         If a recording is too short for the filters.
 
     """
-    parts = trajectories(recordings, used, arm)
+    parts = trajectories(held_out or recordings, used, arm)
     found = Baseline.of(arm, parts, np.random.default_rng(0))
     rms, torque = (
         dict(zip(arm.robot.joints, each.tolist(), strict=True))
         for each in (found.misfit, torque_rms(parts))
     )
     filters = RowFilters(used.rate_hz, used.cutoff_hz, used.decimation)
+    data = 'held-out' if held_out else 'training'
     return Misfit(data, rms, 100.0 * found.errors[0], torque, filters=filters)

@@ -13,12 +13,12 @@ neighbours, and reported as assumed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis.data.trajectory import block_rows, Trajectory, weighted_rows
+from armid_ros.diagnosis.data.trajectory import block_rows, row_weights, Trajectory
 from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification.rows.signals import TORQUE_RESOLUTION
 from armid_ros.motion import FloatArray
@@ -105,14 +105,10 @@ class Evidence:
         """Return measured torques minus those of an arm, each (M, n) [N m]."""
         return [part.residual(arm) for part in self.data]
 
-    def weighted(self, rows: Sequence[FloatArray]) -> Iterator[FloatArray]:
-        """Yield weighted rows (M, n) or (M, n, P) of each trajectory, zero if uninformative."""
-        return weighted_rows(rows, self.data, self.sigma)
-
     def block_squares(self, residual: Sequence[FloatArray]) -> FloatArray:
         """Return the squares of the weighted residual (M, n) by block and joint, (B, n)."""
         block, _ = block_rows(self.data)
-        rows = np.concatenate(list(self.weighted(residual)))
+        rows = np.concatenate(residual) * row_weights(self.data, self.sigma)
         return np.column_stack([np.bincount(block, column) for column in rows.T**2])
 
     @property

@@ -10,7 +10,7 @@ columns are computed; torques and columns are compared in rows, which are decima
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -292,15 +292,6 @@ def block_rows(
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
     """Return one over sigma of all rows, zero where uninformative, (R, n) [1/(N m)]."""
     return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
-
-
-def weighted_rows(
-    rows: Sequence[FloatArray], data: Sequence[Trajectory], sigma: Sequence[FloatArray]
-) -> Iterator[FloatArray]:
-    """Yield rows (M, n) or (M, n, P) of each trajectory, times the weights of `row_weights`."""
-    for own, part, s in zip(rows, data, sigma, strict=True):
-        weight = row_weights([part], [s])
-        yield own * (weight[:, :, np.newaxis] if own.ndim > 2 else weight)
 
 
 def count_recordings(data: Sequence[Trajectory]) -> int:
