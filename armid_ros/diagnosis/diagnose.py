@@ -152,10 +152,9 @@ def diagnose(
             return _said(tied, notes, explainer, doubt)
     chosen = explainer.chosen()
     result = _said(chosen, notes, explainer, doubt)
-    within = _within(result, chosen, explainer, (recordings, validate, baseline))
-    if within is not None:
-        return within
-    return _each_alone(result, ([*recordings, *validate], baseline), used, explainer)
+    return _within(result, chosen, explainer, (recordings, validate, baseline)) or _each_alone(
+        result, ([*recordings, *validate], baseline), used, explainer
+    )
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
