@@ -249,6 +249,9 @@ def _said(chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str
     unseen = _unseen(explainer.unseen, explanation, chosen)
     least = 0.0 if chosen.measured else settings.thresholds.headline
     explanation, shares = headline(explanation, least, settings)
+    whole = shares.share(range(len(explanation.steps)))
+    if chosen.untested and whole <= settings.thresholds.open_share:
+        explanation, shares = headline(explanation.with_nothing_named(), least, settings)
     if unseen is not None:
         shares = predicted(explanation, shares.order, unseen)
     measured = RemainingMisfit(chosen, unseen, before, arm, settings)

@@ -50,10 +50,8 @@ class Thresholds:
         Factor by which squares may be larger on motions that were not used: values that other data
         gave are not exact there, and a misfit is another one.
     open_share : float
-        Share of the squares of a joint in which a gap is open that a cause takes if it matters
-        there, however little that is of the gap of the arm; and of the whole gap that a cause
-        takes which is named though nothing shows that it has changed, or though each of its values
-        may be zero.
+        Share of the gap that names have to take where recordings do not tell a change from the
+        misfit of another motion; less of it is hardly explained.
     surely : float
         Deviations that noise may make: a value may be beyond what is possible by so many, and a
         joint is worse, or held, beyond them.

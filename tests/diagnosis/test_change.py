@@ -304,14 +304,23 @@ def test_what_happens_in_one_period_is_no_noise(bench, with_baseline):
         assert (found.verdict, found.findings) == (wanted, ()), found.summary
 
 
-def test_with_one_recording_a_day_a_note_says_what_is_not_excluded(bench):
-    def with_drag(motion, tau):
-        return hose(motion, tau) + 1.2 * np.array([0.0, 1.0]) * np.sign(motion.dq)
+def test_one_recording_a_day_names_what_takes_most_of_the_gap_alone(bench):
+    """Nothing tells a smaller cause from the misfit of another motion."""
+
+    def with_drag(size):
+        return lambda motion, tau: (
+            hose(motion, tau) + size * np.array([0.0, 1.0]) * np.sign(motion.dq)
+        )
 
     before = bench.recordings(hose, seed=1)[1:2]
-    found = asked(bench, before, bench.recordings(with_drag, seed=2)[1:2], ())
-    assert [one.name for one in found.findings] == ['coulomb_friction']
-    assert any('second motion' in note for note in found.notes)
+    large, small = (
+        asked(bench, before, bench.recordings(with_drag(size), seed=2)[1:2], ())
+        for size in (1.2, 0.7)
+    )
+    assert [one.name for one in large.findings] == ['coulomb_friction']
+    assert any('second motion' in note for note in large.notes)
+    assert not small.findings
+    assert [one.name for one in small.minor] == ['coulomb_friction']
 
 
 @pytest.mark.slow
