@@ -16,8 +16,7 @@ from armid_ros.excitation.limits import Limits, used_shares
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import Information
-from armid_ros.excitation.search.local import exact_cost, Found
-from armid_ros.excitation.search.parallel import search_all, Task
+from armid_ros.excitation.search.local import Search
 from armid_ros.excitation.settings import DesignSettings
 from armid_ros.motion import FloatArray
 from armid_ros.robots import CollisionModel
@@ -40,7 +39,7 @@ class DesignProgress:
     done : float
         Share of the work done, 0 ... 1.
     cost : float
-        Cost of the best feasible trajectory so far; see `SpectralCriterion`.
+        Cost of the best feasible trajectory so far; see `Criterion`.
 
     """
 
@@ -65,13 +64,13 @@ class Design:
     noise : ndarray, shape (n,)
         Torque noise that was reckoned with [N m or N].
     cost : float
-        What was made small; see `SpectralCriterion`.
+        What was made small; see `Criterion`.
     limits : Limits
         The limits it keeps.
     settings : DesignSettings
         What was asked for.
     stopped : str
-        '' when every search ran to its end; 'time budget' or 'interrupted' when the best so far
+        '' when the search ran to its end; 'time budget' or 'interrupted' when the best so far
         was taken, which the same seed need not give again.
 
     """
@@ -139,7 +138,7 @@ def design(
     Returns
     -------
     Design
-        The best found. KeyboardInterrupt ends the searches and the best so far is returned.
+        The best found. KeyboardInterrupt ends the search and the best so far is returned.
 
     Raises
     ------
@@ -152,13 +151,14 @@ def design(
     clearance = None if collision is None else ClearanceModel.of(collision)
     prior = _checked_prior(problem, prior_information, rival)
 
-    def watch(done: float, found: Found) -> None:
+    def watch(done: float, cost: float) -> None:
         if progress is not None:
-            progress(DesignProgress(done, found.cost))
+            progress(DesignProgress(done, cost))
 
-    task = Task(problem, clearance, prior)
-    found, stopped = search_all(task, rng.spawn(settings.starts), watch)
-    excitation = placed(problem, found.trajectory)
+    search = Search(problem, clearance, prior, rng, watch)
+    stopped = search.run()
+    assert search.trajectory is not None
+    excitation = placed(problem, search.trajectory)
     return evaluate(problem, excitation, prior, stopped=stopped)
 
 
@@ -230,13 +230,10 @@ def evaluate(
     if isinstance(excitation, FourierTrajectory):
         excitation = Excitation(excitation, settings.n_periods, settings.run_in)
     trajectory = excitation.trajectory
-    count = 4 * settings.samples
-    w = problem.periodic_columns(trajectory, count)[:, problem.base.independent]
-    weight = settings.rate * trajectory.period * excitation.n_periods / count
-    information = Information(problem.base.parameters, weight * (w.T @ w), problem.scale)
+    information = problem.recorded(trajectory, excitation.n_periods)
     if prior_information is not None:
         information = replace(information, matrix=information.matrix + prior_information)
-    cost = exact_cost(problem, trajectory, prior_information)
+    cost = problem.cost(trajectory, prior_information)
     described = problem.base.values(problem.arm.theta)
     return Design(
         excitation, information, described, problem.noise, cost, problem.limits, settings, stopped

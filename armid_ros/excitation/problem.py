@@ -11,13 +11,7 @@ from armid_ros.effects import Effect
 from armid_ros.errors import TrajectoryError
 from armid_ros.excitation.fourier import FourierTrajectory, MARGIN
 from armid_ros.excitation.limits import Limits
-from armid_ros.excitation.search.criteria import (
-    Criterion,
-    Information,
-    RivalCriterion,
-    SpectralCriterion,
-    SubsetCriterion,
-)
+from armid_ros.excitation.search.criteria import Criterion, Information
 from armid_ros.excitation.settings import DesignSettings
 from armid_ros.model import BaseParameters, group_columns, levelled, random_motion
 from armid_ros.motion import FloatArray, Motion, read_only
@@ -26,6 +20,9 @@ import numpy.typing as npt
 
 #: Share of the torque limit that a sensor's noise is taken to be when nothing is known of it.
 NOISE_SHARE = 0.01
+
+#: Samples per sample of the search with which information is computed.
+_EXACT = 6
 
 
 @dataclass(frozen=True)
@@ -47,10 +44,7 @@ class DesignProblem:
         Standard deviation of the torque noise [N m or N].
     scale : ndarray, shape (r,)
         See `Information`.
-    selected : ndarray of int, shape (r,)
-        Columns of ``arm.parameters`` that the criterion looks at: those of ``base``, or for a
-        comparison of two models the rival's and what it lacks.
-    criterion : SpectralCriterion, SubsetCriterion or RivalCriterion
+    criterion : Criterion
         The cost.
 
     """
@@ -61,7 +55,6 @@ class DesignProblem:
     base: BaseParameters
     noise: FloatArray = field(repr=False)
     scale: FloatArray = field(repr=False)
-    selected: npt.NDArray[np.intp] = field(repr=False)
     criterion: Criterion = field(repr=False)
 
     @classmethod
@@ -97,33 +90,55 @@ class DesignProblem:
         level = replace(whole, robot=levelled(whole.robot))
         flat = target_columns(level, settings.target, motion).reshape(-1, columns.shape[-1])
         base = group_columns(flat, whole.parameters)
-        columns = (columns / noise[:, np.newaxis]).reshape(flat.shape)
-        selected = base.independent
+        columns = (columns / noise[:, np.newaxis]).reshape(flat.shape)[:, base.independent]
+        scale = 1.0 / np.sqrt(np.sum(columns**2, axis=0) / len(motion))
+        wanted, values = np.ones(base.rank, dtype=bool), base.values(whole.theta)
         if rival is not None:
-            selected = _selection_against(whole, rival, columns)
-        size = np.sqrt(np.sum(columns**2, axis=0) / len(motion))
-        scale = 1.0 / size[base.independent]
-        criterion: Criterion
-        if rival is not None:
-            criterion = _rival_criterion(whole, rival, selected, columns[:, selected])
+            lacking = np.arange(len(whole.parameters)) >= len(rival.parameters)
+            wanted, values = lacking[base.independent], base.values(lacking * whole.theta)
         elif settings.focus:
-            criterion = SubsetCriterion(_wanted(whole, settings.focus, selected), scale)
-        else:
-            criterion = SpectralCriterion(settings.criterion, scale, settings.balance)
-        return cls(
-            whole, settings, limits, base, read_only(noise), read_only(scale), selected, criterion
-        )
+            wanted = _in_focus(whole, settings.focus)[base.independent]
+        criterion = Criterion(settings.criterion, scale, wanted, values, settings.balance)
+        problem = cls(whole, settings, limits, base, read_only(noise), read_only(scale), criterion)
+        problem._require_visible(columns.T @ columns)
+        return problem
+
+    def _require_visible(self, matrix: FloatArray) -> None:
+        """Raise a TrajectoryError where random motions tell nothing of what is wanted."""
+        criterion = self.criterion
+        if criterion.name != 'T' and not criterion.wanted.any():
+            raise TrajectoryError(
+                f'focus: no motion tells {", ".join(self.settings.focus)} from the rigid body; '
+                "take target 'effects', where the rigid body counts as known"
+            )
+        if criterion.name != 'T':
+            return
+        whole = float(criterion.values @ matrix @ criterion.values)
+        if criterion.cost(matrix) >= -np.log(max(1e-18 * whole, 1e-300)):
+            names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
+            raise TrajectoryError(
+                f'no motion can tell the two models apart, which have {names} between them: the '
+                'rival can make the same torques; give what it lacks another size'
+            )
 
     def columns(self, motion: Motion) -> FloatArray:
         """Return the weighted columns of all parameters, shape (N n, P)."""
         columns = target_columns(self.arm, self.settings.target, motion)
         return (columns / self.noise[:, np.newaxis]).reshape(-1, columns.shape[-1])
 
-    def periodic_columns(self, trajectory: FourierTrajectory, n_samples: int) -> FloatArray:
-        """Return the weighted columns of one period, shape (N n, P), of a motion without ends."""
-        motion = trajectory.with_margins(n_samples)
+    def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
+        """Return what a recording of a number of periods tells about the base parameters."""
+        count = _EXACT * self.settings.samples
+        motion = trajectory.with_margins(count)
         rows = self.columns(motion).reshape(len(motion), -1)[MARGIN:-MARGIN]
-        return rows.reshape(n_samples * trajectory.n_joints, -1)
+        w = rows.reshape(count * trajectory.n_joints, -1)[:, self.base.independent]
+        weight = self.settings.rate * trajectory.period * n_periods / count
+        return Information(self.base.parameters, weight * (w.T @ w), self.scale)
+
+    def cost(self, trajectory: FourierTrajectory, prior: FloatArray | None = None) -> float:
+        """Return the cost of a trajectory, given prior information of shape (r, r)."""
+        matrix = self.recorded(trajectory, self.settings.n_periods).matrix
+        return self.criterion.cost(matrix if prior is None else matrix + prior)
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
@@ -188,47 +203,15 @@ def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
     return joined
 
 
-def _selection_against(
-    whole: ArmModel, rival: ArmModel, columns: FloatArray
-) -> npt.NDArray[np.intp]:
-    """Columns the rival can use, as many as are independent, then what it lacks."""
-    own = len(rival.parameters)
-    usable = group_columns(columns[:, :own], whole.parameters[:own]).independent
-    return np.concatenate([usable, np.arange(own, columns.shape[1])])
-
-
-def _rival_criterion(
-    whole: ArmModel, rival: ArmModel, selected: npt.NDArray[np.intp], columns: FloatArray
-) -> RivalCriterion:
-    own = selected < len(rival.parameters)
-    values = np.where(own, 0.0, whole.theta[selected])
-    torque = columns @ values
-    fitted = columns[:, own] @ np.linalg.lstsq(columns[:, own], torque, rcond=None)[0]
-    if np.linalg.norm(torque - fitted) <= 1e-9 * max(float(np.linalg.norm(torque)), 1e-300):
-        names = ', '.join(e.name for e in whole.effects[len(rival.effects) :]) or 'nothing'
-        raise TrajectoryError(
-            f'no motion can tell the two models apart: what the rival lacks is {names}, with '
-            f'parameters {np.array2string(values[~own], precision=3)}, and it can make the same '
-            'torques' + ('' if values.any() else '; give what it lacks a size')
-        )
-    return RivalCriterion(own.astype(float), values)
-
-
-def _wanted(arm: ArmModel, focus: tuple[str, ...], selected: npt.NDArray[np.intp]) -> FloatArray:
-    """Mark the parameters of the effects in focus among those selected."""
+def _in_focus(arm: ArmModel, focus: tuple[str, ...]) -> npt.NDArray[np.bool_]:
+    """Mark the parameters of the effects in focus."""
     names = [effect.name for effect in arm.effects]
     unknown = [name for name in focus if name not in names]
     if unknown:
         raise TrajectoryError(
             f"focus: the arm has no effect '{unknown[0]}'; it has {', '.join(names) or 'none'}"
         )
-    marks = [np.zeros(len(arm.robot.rigid_parameters))]
+    marks = [np.zeros(len(arm.robot.rigid_parameters), dtype=bool)]
     for effect in arm.effects:
-        marks.append(np.full(len(effect.parameters(arm.robot)), float(effect.name in focus)))
-    wanted = np.concatenate(marks)[selected]
-    if not wanted.any():
-        raise TrajectoryError(
-            f'focus: no motion tells {", ".join(focus)} from the rigid body; take '
-            "target 'effects', where the rigid body counts as known"
-        )
-    return wanted
+        marks.append(np.full(len(effect.parameters(arm.robot)), effect.name in focus))
+    return np.concatenate(marks)

@@ -19,6 +19,9 @@ TARGETS = {
     'effects': 'those of the effects alone, the rigid body being known',
 }
 
+#: Samples of one period at which a search looks: at least, and per harmonic.
+_SAMPLES, _PER_HARMONIC = 64, 12
+
 
 @dataclass(frozen=True)
 class DesignSettings:
@@ -53,27 +56,24 @@ class DesignSettings:
         'all', 'gravity' or 'effects'.
     focus : tuple of str
         Names of effects: see these as well as possible, the other parameters being fitted too.
-        Empty: see all alike. With criterion 'D' only.
+        Empty: see all alike. Not with criterion 'T'.
     noise : ndarray, shape (n,), or None
         Standard deviation of the torque noise of each joint [N m or N]; None: 1 % of the torque
         limit, or of the largest such limit where a joint has none.
     rate : float
         Samples per second that the noise refers to [Hz], for the predicted deviations.
-    samples : int
-        Samples of one period at which a search looks.
-    starts : int
-        Number of searches, each from the best of ``candidates`` random trajectories.
     candidates : int
-        Number of random feasible trajectories that each search begins with; of an arm of more
-        than 10 joints, fewer in proportion.
+        Number of random feasible trajectories to begin with; of an arm of more than 10 joints,
+        fewer in proportion.
+    starts : int
+        Number of them, the best ones, that are improved; of these the better half goes on after
+        every round.
     iterations : int
-        Iterations of each search. This, not the time, decides between results.
+        Iterations of each of them. This, not the time, decides between results.
     time_budget : float
-        Processor time of each of ``processes`` [s]; infinite by default. Searches that use more
-        are stopped once one has found something; the same seed then need not give the same
-        trajectory, and the design says so.
-    processes : int
-        Searches at a time, each in a process of its own; 1: in this process.
+        Processor time [s]; infinite by default. A search that uses more is stopped once it has
+        found something; the same seed then need not give the same trajectory, and the design
+        says so.
 
     """
 
@@ -90,12 +90,10 @@ class DesignSettings:
     focus: tuple[str, ...] = ()
     noise: FloatArray | None = None
     rate: float = 100.0
-    samples: int = 100
     starts: int = 4
-    candidates: int = 25
+    candidates: int = 60
     iterations: int = 200
     time_budget: float = np.inf
-    processes: int = 2
 
     def __post_init__(self) -> None:
         """Check names and numbers."""
@@ -105,11 +103,8 @@ class DesignSettings:
         ):
             if name not in known:
                 raise TrajectoryError(f"no {kind} '{name}'; there are {', '.join(known)}")
-        if self.focus and self.criterion != 'D':
-            raise TrajectoryError(
-                f"focus goes with criterion 'D', not '{self.criterion}': it is the determinant of "
-                'what is learned about the parameters in focus'
-            )
+        if self.focus and self.criterion == 'T':
+            raise TrajectoryError("focus goes with every criterion but 'T', which has a rival")
         self._require_numbers()
 
     def _require_numbers(self) -> None:
@@ -117,11 +112,9 @@ class DesignSettings:
         for name in (
             'harmonics',
             'n_periods',
-            'samples',
             'starts',
             'candidates',
             'iterations',
-            'processes',
         ):
             if getattr(self, name) < 1:
                 raise TrajectoryError(f'{name}: {getattr(self, name)}; at least 1 is needed')
@@ -137,11 +130,11 @@ class DesignSettings:
                 f'{self.n_periods} periods of {self.period:g} s and run-ins of {self.run_in:g} s '
                 f'last {duration:.3g} s; a day is the most'
             )
-        if self.samples < 8 * self.harmonics:
-            raise TrajectoryError(
-                f'{self.samples} samples of a period cannot show {self.harmonics} harmonics; '
-                f'take {8 * self.harmonics} or more'
-            )
+
+    @property
+    def samples(self) -> int:
+        """Samples of one period at which a search looks."""
+        return max(_SAMPLES, _PER_HARMONIC * self.harmonics)
 
 
 def whole_period(duration: float, n_periods: int, run_in: float, rate: float) -> float:

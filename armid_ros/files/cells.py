@@ -18,11 +18,6 @@ def csv_cell(name: str) -> str:
     return text
 
 
-def cell_name(cell: str) -> str:
-    """Return the name that a cell holds, its quotes removed by the reader of the table."""
-    return cell[1:] if cell.startswith("'") and cell[1:].startswith(_GUARDED) else cell
-
-
 def parted(text: str, separator: str = ',') -> list[str]:
     """Split a text at a separator, except within double quotes, which stay."""
     parts, last = [], 0

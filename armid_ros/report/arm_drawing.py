@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.excitation.geometry.capsules import outline
+from armid_ros.excitation.geometry.heights import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import Templated
 from armid_ros.report.strip import CORNER, flat, Strip, svg_points

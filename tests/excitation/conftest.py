@@ -98,9 +98,7 @@ def quick():
     return DesignSettings(
         period=6.0,
         harmonics=3,
-        samples=40,
         starts=2,
         candidates=3,
         iterations=30,
-        processes=1,
     )

@@ -42,8 +42,8 @@ def planned(path):
     floor = FLOORS[path.stem]
     arm, scene = ArmModel(robot), CollisionScene.of(robot, 0.01, str(floor) if floor else None)
     settings = DesignSettings(
-        period=4.0, harmonics=3, samples=60, n_periods=1, run_in=1.0, speed='fast', starts=1,
-        iterations=2, time_budget=60.0, processes=1,
+        period=4.0, harmonics=3, n_periods=1, run_in=1.0, speed='fast', starts=1,
+        iterations=2, time_budget=60.0,
     )  # fmt: skip
     found = design(arm, settings, np.random.default_rng(0), collision=scene.bodies)
     clearance = ClearanceModel.of(scene.bodies)

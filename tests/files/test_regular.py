@@ -18,7 +18,6 @@ READERS = {
     'model.yaml': load_model,
     'identification.json': read_parameters,
     'excitation.yaml': load_excitation,
-    'excitation.csv': load_excitation,
     'environment.yaml': load_environment,
     'robot.urdf': load_robot,
     'robot.urdf.xacro': load_robot,

@@ -64,14 +64,13 @@ def model(robot, folder):
 
 @pytest.fixture(scope='module')
 def excitation(folder):
-    """Return an excitation.yaml and an excitation.csv as texts."""
+    """Return an excitation.yaml as a text."""
     series = FourierTrajectory(
         ('a', 'b'), 4.0, np.zeros(2), np.full((2, 3), 0.1), np.full((2, 3), 0.2)
     )
     run = Excitation(series, 2, 1.0)
     save_excitation(run, folder / 'whole_run.yaml')
-    save_excitation(run, folder / 'whole_run.csv')
-    return {suffix: (folder / f'whole_run{suffix}').read_text() for suffix in ('.yaml', '.csv')}
+    return (folder / 'whole_run.yaml').read_text()
 
 
 def identification(more=0.0):
@@ -191,15 +190,15 @@ def sound_model(arm, _):
 @given(edits=TREE_EDITS)
 def test_excitation_tree(folder, excitation, edits):
     path = folder / 'excitation.yaml'
-    path.write_text(to_yaml(edited_tree(yaml.safe_load(excitation['.yaml']), edits)))
+    path.write_text(to_yaml(edited_tree(yaml.safe_load(excitation), edits)))
     judge('excitation.yaml, tree', load_excitation, path, None, sound_excitation)
 
 
-@given(edits=TEXT_EDITS, suffix=st.sampled_from(['.yaml', '.csv']))
-def test_excitation_text(folder, excitation, edits, suffix):
-    path = folder / f'excitation_text{suffix}'
-    path.write_text(edited_text(excitation[suffix], edits), errors='replace')
-    judge(f'excitation{suffix}, text', load_excitation, path, None, sound_excitation)
+@given(edits=TEXT_EDITS)
+def test_excitation_text(folder, excitation, edits):
+    path = folder / 'excitation_text.yaml'
+    path.write_text(edited_text(excitation, edits), errors='replace')
+    judge('excitation.yaml, text', load_excitation, path, None, sound_excitation)
 
 
 def sound_excitation(run, _):

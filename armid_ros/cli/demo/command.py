@@ -140,7 +140,7 @@ def _held_out_error(arm: ArmModel, truth: ArmModel, rng: np.random.Generator) ->
     from armid_ros.robots import collision_model
     import numpy as np
 
-    settings = DesignSettings(period=10.0, starts=1, candidates=1, iterations=1, processes=1)
+    settings = DesignSettings(period=10.0, starts=1, candidates=1, iterations=1)
     motion = design(arm, settings, rng, collision=collision_model(arm.robot)).excitation.motion(
         100.0
     )

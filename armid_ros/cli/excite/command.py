@@ -231,7 +231,7 @@ def excite(
     )
     from armid_ros.cli.origin import provenance
     from armid_ros.excitation import CollisionScene, with_joint_limits
-    from armid_ros.excitation.search.parallel import INTERRUPTED
+    from armid_ros.excitation.search.local import INTERRUPTED
     from armid_ros.files import json_text
     from armid_ros.files.cells import parted
 

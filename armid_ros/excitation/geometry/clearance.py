@@ -3,7 +3,7 @@
 """
 Clearance between bodies: where they come near, how that changes, and a proof for a whole path.
 
-Far pairs are told by their bounding capsules, near ones measured by coal.
+Far pairs are told by their bounding spheres, near ones measured by coal.
 
 """
 
@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from armid_ros.excitation.geometry.capsules import Capsules
 from armid_ros.excitation.geometry.environment import body_name
-from armid_ros.excitation.geometry.pose import carried_by, cross, Pose
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import CollisionModel, Robot
+import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -88,8 +88,12 @@ class ClearanceModel:
     ----------
     collision : CollisionModel
         Bodies and pairs.
-    capsules : Capsules
-        Bounds of the bodies.
+    joints : ndarray of int, shape (number of bodies,)
+        Joint that carries each body, -1 for those that do not move.
+    spheres : ndarray, shape (number of bodies, 4)
+        Centre in the frame of that joint and radius of a sphere around each body [m].
+    planes : ndarray, shape (number of bodies, 4)
+        Normal and offset [m] of half spaces, the points x with normal x <= offset; NaN for others.
     numbers : ndarray of int, shape (number of pairs,)
         Number of each pair in the collision model.
     pairs : ndarray of int, shape (number of pairs, 2)
@@ -102,7 +106,9 @@ class ClearanceModel:
     """
 
     collision: CollisionModel
-    capsules: Capsules = field(repr=False)
+    joints: IntArray = field(repr=False)
+    spheres: FloatArray = field(repr=False)
+    planes: FloatArray = field(repr=False)
     numbers: IntArray = field(repr=False)
     pairs: IntArray = field(repr=False)
     between: FloatArray = field(repr=False)
@@ -111,24 +117,32 @@ class ClearanceModel:
     @classmethod
     def of(cls, collision: CollisionModel) -> ClearanceModel:
         """Prepare a collision model."""
-        robot = collision.robot
-        capsules = Capsules.of(collision.geometry)
-        joints = capsules.joints
+        robot, bodies = collision.robot, list(collision.geometry.geometryObjects)
+        joints = np.array([int(body.parentJoint) - 1 for body in bodies], dtype=np.intp)
+        spheres, planes = np.zeros((len(bodies), 4)), np.full((len(bodies), 4), np.nan)
+        for number, body in enumerate(bodies):
+            shape, place = body.geometry, body.placement
+            if isinstance(shape, coal.Halfspace):
+                normal = place.rotation @ shape.n
+                planes[number] = (*normal, shape.d + normal @ place.translation)
+            else:
+                shape.computeLocalAABB()
+                spheres[number] = (*place.act(shape.aabb_center), shape.aabb_radius)
         pairs = np.array(
             [(int(p.first), int(p.second)) for p in collision.geometry.collisionPairs],
             dtype=np.intp,
         ).reshape(-1, 2)
-        moved = np.hstack(
-            [carried_by(robot), np.zeros((robot.n_joints, 1))]
-        ).T  # base: last row, -1
+        moved = np.zeros((robot.n_joints + 1, robot.n_joints))  # base: last row, -1
+        for number, joint in enumerate(robot.geometry):
+            moved[number, list(joint.movers)] = 1.0
         between = moved[joints[pairs[:, 1]]] - moved[joints[pairs[:, 0]]]
+        reach = np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]
         levers = np.array(
-            [_levers(robot, j, r) for j, r in zip(joints, capsules.reach(), strict=True)]
+            [_levers(robot, joint, length) for joint, length in zip(joints, reach, strict=True)]
         ).reshape(len(joints), robot.n_joints)
         first, second = levers[pairs[:, 0]], levers[pairs[:, 1]]
-        reach = np.where(between > 0.0, second, np.where(between < 0.0, first, 0.0))
-        numbers = np.arange(len(pairs))
-        return cls(collision, capsules, numbers, pairs, between, reach)
+        most = np.where(between > 0.0, second, np.where(between < 0.0, first, 0.0))
+        return cls(collision, joints, spheres, planes, np.arange(len(pairs)), pairs, between, most)
 
     def watched(self, q: FloatArray, reach: float) -> ClearanceModel:
         """Return the model with those pairs only that come closer than ``reach`` [m] in poses."""
@@ -148,22 +162,25 @@ class ClearanceModel:
         Pairs further apart than that may be missing from the answer or in it.
 
         """
-        pose = Pose.of(self.collision.robot, q)
-        sample, pair = np.nonzero(self.capsules.distance(pose, self.pairs) < reach)
+        frames = LinkFrames.of(self.collision.robot, q)
+        sample, pair = np.nonzero(self._bound(frames) < reach)
         distance, normal, point = self._measure(q, sample, pair)
         keep = distance < reach
         sample, pair, distance = sample[keep], pair[keep], distance[keep]
         normal, point = normal[keep], point[keep, np.newaxis]
-        axes = pose.axes[sample]  # (m, n, 6)
         other = point + (distance[:, np.newaxis] * normal)[:, np.newaxis]
         moved = np.where((self.between[pair] > 0.0)[..., np.newaxis], other, point)
-        motion = axes[..., :3] + cross(axes[..., 3:], moved)
+        lines, turns = (
+            axes[..., sample].transpose(2, 0, 1) for axes in (frames.lines, frames.turns)
+        )
+        motion = lines + np.cross(turns, moved)
         along = np.einsum('mjc,mc->mj', motion, normal)
         return NearPairs(sample, pair, distance, along * self.between[pair])
 
     def smallest(self, q: FloatArray, reach: float = np.inf) -> FloatArray:
         """Return the smallest distance of each pose, shape (N,) [m]; at most ``reach``."""
-        sample, pair = np.nonzero(self._bound(q) < reach)
+        frames = LinkFrames.of(self.collision.robot, q)
+        sample, pair = np.nonzero(self._bound(frames) < reach)
         distance, _, _ = self._measure(q, sample, pair)
         result = np.full(len(q), reach)
         np.minimum.at(result, sample, distance)
@@ -222,13 +239,18 @@ class ClearanceModel:
             moment, place = np.unique(np.concatenate([left, right]), return_inverse=True)
             motion = path(moment)
             needed, slot = np.unique(
-                np.concatenate([place[: len(left)], place[len(left) :]]) * len(self.pairs)
-                + np.concatenate([pair, pair]),
-                return_inverse=True,
+                place * len(self.pairs) + np.concatenate([pair, pair]), return_inverse=True
             )
             sample, number = np.divmod(needed, len(self.pairs))
-            travel = self._travel(motion, place[: len(left)], right - left, acceleration, pair)
-            distance = self._lower_bound(motion.q, sample, number, slot, travel, margin)
+            duration = right - left
+            speed = np.abs(motion.dq[place[: len(left)]])
+            speed += 0.5 * acceleration * duration[:, np.newaxis]
+            travel = (self.levers[pair] * speed).sum(axis=1) * duration
+            within = np.full(len(needed), margin)
+            np.maximum.at(within, slot, margin + np.tile(travel, 2))
+            distance = self._bound(LinkFrames.of(self.collision.robot, motion.q))[sample, number]
+            near = np.flatnonzero(distance < within)
+            distance[near] = self._measure(motion.q, sample[near], number[near])[0]
             worst = int(np.argmin(distance))
             if distance[worst] < margin:
                 return self._approach(
@@ -236,7 +258,7 @@ class ClearanceModel:
                 )
             ends = distance[slot]
             bound = 0.5 * (ends[: len(left)] + ends[len(left) :] - travel)
-            open_ = (bound < margin) & (right - left > _SHORTEST_INTERVAL)
+            open_ = (bound < margin) & (duration > _SHORTEST_INTERVAL)
             middle = 0.5 * (left + right)[open_]
             left, right, pair = (
                 np.concatenate([left[open_], middle]),
@@ -245,38 +267,18 @@ class ClearanceModel:
             )
         return None
 
-    def _travel(
-        self,
-        motion: Motion,
-        sample: IntArray,
-        duration: FloatArray,
-        acceleration: FloatArray,
-        pair: IntArray,
-    ) -> FloatArray:
-        """Bound the relative motion of the bodies of pairs over intervals [m]."""
-        speed = np.abs(motion.dq[sample]) + 0.5 * acceleration * duration[:, np.newaxis]
-        return np.asarray((self.levers[pair] * speed).sum(axis=1) * duration)
-
-    def _lower_bound(
-        self,
-        q: FloatArray,
-        sample: IntArray,
-        pair: IntArray,
-        slot: IntArray,
-        travel: FloatArray,
-        margin: float,
-    ) -> FloatArray:
-        """Distances of pairs in samples; bounds where those are enough."""
-        bounds = self._bound(q)[sample, pair]
-        needed = np.zeros(len(sample))
-        np.maximum.at(needed, slot, np.tile(travel, 2))
-        near = np.flatnonzero(bounds < margin + needed)
-        bounds[near] = self._measure(q, sample[near], pair[near])[0]
-        return bounds
-
-    def _bound(self, q: FloatArray) -> FloatArray:
+    def _bound(self, frames: LinkFrames) -> FloatArray:
         """Bound the distance of every pair from below, shape (N, number of pairs) [m]."""
-        return self.capsules.distance(Pose.of(self.collision.robot, q), self.pairs)
+        centre = np.empty((frames.lines.shape[2], len(self.joints), 3))
+        for body, joint in enumerate(self.joints):
+            place = self.spheres[body, :3]
+            centre[:, body] = place if joint < 0 else frames.places(frames.joints[joint], place)
+        first, second = self.pairs.T
+        apart = np.linalg.norm(centre[:, second] - centre[:, first], axis=2)
+        for pair in np.flatnonzero(np.isfinite(self.planes[second, 3])):
+            plane = self.planes[second[pair]]
+            apart[:, pair] = centre[:, first[pair]] @ plane[:3] - plane[3]
+        return np.asarray(apart - self.spheres[first, 3] - self.spheres[second, 3])
 
     def _measure(
         self, q: FloatArray, sample: IntArray, pair: IntArray

@@ -6,13 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
-from armid_ros.excitation.geometry.capsules import outline
-from armid_ros.excitation.geometry.pose import Pose
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import CollisionModel
 import coal
 import numpy as np
+
+#: A shape with a coordinate beyond this has no bounds, such as a half space [m].
+_ENDLESS = 1e6
 
 
 @dataclass(frozen=True)
@@ -81,14 +84,14 @@ def link_heights(
 
     """
     robot = collision.robot
-    pose = Pose.of(robot, q)
+    frames = LinkFrames.of(robot, q).frames
     seen: set[int] = set()
     for body in collision.geometry.geometryObjects:
         joint = int(body.parentJoint) - 1
         name = str(robot.model.frames[body.parentFrame].name)
         if joint >= 0:
             seen.add(joint)
-            down, origin = pose.rotation[:, joint].transpose(0, 2, 1) @ up, pose.position[:, joint]
+            down, origin = (up @ frames[joint].rotation.transpose(2, 0, 1)), frames[joint].origin.T
         elif fixed:
             down, origin = np.tile(up, (len(q), 1)), np.zeros((len(q), 3))
         else:
@@ -103,7 +106,7 @@ def link_heights(
         )
     for joint, link in enumerate(robot.links):
         if joint not in seen:
-            height = pose.position[:, joint] @ up
+            height = frames[joint].origin.T @ up
             yield link, height, height
 
 
@@ -111,6 +114,22 @@ def vertical(gravity: FloatArray) -> FloatArray:
     """Return the unit vector against gravity; z of the base where there is none."""
     size = float(np.linalg.norm(gravity))
     return np.asarray(-gravity / size) if size > 0.0 else np.array([0.0, 0.0, 1.0])
+
+
+def outline(shape: coal.CollisionGeometry) -> tuple[FloatArray, float]:
+    """Return points and a radius about their convex hull that contain a shape; none if endless."""
+    if isinstance(shape, coal.Convex):
+        return np.array(shape.points()), 0.0
+    if isinstance(shape, coal.Sphere):
+        return np.zeros((1, 3)), float(shape.radius)
+    if isinstance(shape, coal.Cylinder | coal.Capsule):
+        end = np.array([0.0, 0.0, shape.halfLength])
+        return np.array([end, -end]), float(shape.radius)
+    shape.computeLocalAABB()
+    ends = np.array([shape.aabb_local.min_, shape.aabb_local.max_])
+    if not np.all(np.abs(ends) < _ENDLESS):
+        return np.empty((0, 3)), 0.0
+    return np.array(list(product(*ends.T))), 0.0
 
 
 def _support(shape: coal.CollisionGeometry, direction: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ _STRETCHES = 20
 
 #: Samples per sample of the settings at which position, velocity and acceleration are looked at,
 #: and those at which torque and clearance are.
-_DENSE, _STATES = 3, 2
+_DENSE, _STATES = 5, 3
 
 #: Values of some constraints, and what works out their gradients.
 Part = tuple[FloatArray, Callable[[], FloatArray]]

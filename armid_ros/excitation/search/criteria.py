@@ -19,6 +19,7 @@ from armid_ros.errors import TrajectoryError
 from armid_ros.estimate import ParameterName
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
+import numpy.typing as npt
 
 #: Criteria to design for, each with what it stands for.
 CRITERIA = {
@@ -97,19 +98,28 @@ class Information:
 
 
 @dataclass(frozen=True)
-class SpectralCriterion:
+class Criterion:
     """
-    D, A, E or the condition number: a function of the eigenvalues of the information matrix.
+    Cost of an information matrix M, shape (r, r), to be made small.
+
+    Parameters that are not wanted are nuisance parameters, fitted too: what counts is the Schur
+    complement S = M_ww - M_wn M_nn^+ M_nw of their block.
 
     Attributes
     ----------
     name : str
-        'D': -log det / r, plus ``balance`` times the log of the condition number of the weighted
-        regressor. 'A': log of the mean variance in units of ``scale``. 'E': log of the
-        largest variance in any direction, in the same units. 'condition': log of the condition
-        number of the weighted regressor.
+        A function of the eigenvalues of S. 'D': -log det / r, plus ``balance`` times the log of
+        the condition number of the weighted regressor. 'A': log of the mean variance in units of
+        ``scale``. 'E': log of the largest variance in any direction, in the same units.
+        'condition': log of the condition number of the weighted regressor. Or 'T': -log of the
+        sum of squares, in noise units, that a rival leaves which lacks the wanted parameters.
+        Source of 'T': Atkinson and Fedorov 1975, for models linear in their parameters.
     scale : ndarray, shape (r,)
         See `Information`.
+    wanted : ndarray of bool, shape (r,)
+        The parameters that count.
+    values : ndarray, shape (r,)
+        Parameters, for 'T'.
     balance : float
         Weight of the condition number in 'D'; 0 is D-optimality and nothing else.
 
@@ -117,21 +127,13 @@ class SpectralCriterion:
 
     name: str
     scale: FloatArray
+    wanted: npt.NDArray[np.bool_]
+    values: FloatArray
     balance: float = 0.0
 
     def cost(self, matrix: FloatArray) -> float:
         """Return the cost of an information matrix, shape (r, r); inf where it is singular."""
-        values = np.linalg.eigvalsh(self._scaled(matrix))
-        if values[0] <= 0.0:
-            return float(np.inf)
-        if self.name == 'A':
-            return float(np.log(np.mean(1.0 / values)))
-        if self.name == 'E':
-            return float(-np.log(values[0]))
-        condition = float(0.5 * np.log(values[-1] / values[0]))
-        if self.name == 'condition':
-            return condition
-        return float(-np.mean(np.log(values))) + self.balance * condition
+        return self._evaluated(matrix, np.inf)[0]
 
     def smooth(self, matrix: FloatArray) -> tuple[float, FloatArray]:
         """
@@ -140,123 +142,60 @@ class SpectralCriterion:
         Returns
         -------
         cost : float
-            Equal to the cost for A and D without balance; inf where the matrix is singular.
+            Equal to the cost for A, T, and D without balance; inf where the matrix is singular.
         gradient : ndarray, shape (r, r)
             Derivative by the entries of the matrix.
 
         """
-        values, vectors = np.linalg.eigh(self._scaled(matrix))
+        return self._evaluated(matrix, _NORM)
+
+    def _evaluated(self, matrix: FloatArray, norm: float) -> tuple[float, FloatArray]:
+        wanted, nuisance = np.flatnonzero(self.wanted), np.flatnonzero(~self.wanted)
+        projection = np.eye(len(matrix))[wanted]  # S = P M P'
+        if len(nuisance):
+            block, reach = matrix[np.ix_(nuisance, nuisance)], matrix[np.ix_(nuisance, wanted)]
+            projection[:, nuisance] = -_least_squares(block, reach).T
+        units = self.scale[wanted] if self.name in 'AE' else np.ones(len(wanted))
+        projection *= units[:, np.newaxis]
+        left = projection @ matrix @ projection.T
+        if self.name == 'T':
+            direction = projection.T @ self.values[wanted]
+            power = float(self.values[wanted] @ left @ self.values[wanted])
+            if power <= 0.0:
+                return float(np.inf), np.zeros_like(matrix)
+            return float(-np.log(power)), -np.outer(direction, direction) / power
+        values, vectors = np.linalg.eigh(left)
         if values[0] <= 0.0:
             return float(np.inf), np.zeros_like(matrix)
-        count = len(values)
+        cost, slope = self._of_eigenvalues(values, norm)
+        vectors = projection.T @ vectors
+        return cost, (vectors * slope) @ vectors.T
+
+    def _of_eigenvalues(self, values: FloatArray, norm: float) -> tuple[float, FloatArray]:
+        """Return the cost of eigenvalues in ascending order, and its derivative by them."""
         if self.name == 'A':
             total = np.sum(1.0 / values)
-            cost, slope = np.log(total / count), -1.0 / (values**2 * total)
-        elif self.name == 'E':
-            cost, slope = _smooth_largest(1.0 / values)
-            slope = -slope / values**2
-        else:
-            small, by_small = _smooth_largest(1.0 / values)
-            large, by_large = _smooth_largest(values)
-            cost, slope = 0.5 * (small + large), 0.5 * (by_large - by_small / values**2)
-            if self.name == 'D':
-                cost = -np.mean(np.log(values)) + self.balance * cost
-                slope = -1.0 / (count * values) + self.balance * slope
-        gradient = (vectors * slope) @ vectors.T
-        units = self._units()
-        return float(cost), gradient * np.outer(units, units)
-
-    def _units(self) -> FloatArray:
-        return self.scale if self.name in 'AE' else np.ones_like(self.scale)
-
-    def _scaled(self, matrix: FloatArray) -> FloatArray:
-        units = self._units()
-        return matrix * np.outer(units, units)
+            return float(np.log(total / len(values))), -1.0 / (values**2 * total)
+        variance, slope = _log_norm(1.0 / values, norm)
+        slope = -slope / values**2
+        if self.name == 'E':
+            return variance, slope
+        largest, by_largest = _log_norm(values, norm)
+        condition, slope = 0.5 * (variance + largest), 0.5 * (slope + by_largest)
+        if self.name == 'condition':
+            return condition, slope
+        cost = float(-np.mean(np.log(values))) + self.balance * condition
+        return cost, -1.0 / (len(values) * values) + self.balance * slope
 
 
-def _smooth_largest(values: FloatArray) -> tuple[float, FloatArray]:
+def _log_norm(values: FloatArray, norm: float) -> tuple[float, FloatArray]:
     """Return the log of a p-norm of positive numbers, and its gradient."""
-    powers = (values / values.max()) ** _NORM
+    powers = (values / values.max()) ** norm
     total = powers.sum()
-    return float(np.log(values.max()) + np.log(total) / _NORM), powers / (total * values)
+    return float(np.log(values.max()) + np.log(total) / norm), powers / (total * values)
 
 
-@dataclass(frozen=True)
-class SubsetCriterion:
-    """
-    Ds-optimality: see some parameters, whatever the others are.
-
-    Attributes
-    ----------
-    wanted : ndarray of bool, shape (r,)
-        True for the parameters that count; the rest are nuisance.
-    scale : ndarray, shape (r,)
-        See `Information`.
-
-    """
-
-    wanted: FloatArray
-    scale: FloatArray
-
-    def cost(self, matrix: FloatArray) -> float:
-        """Return - log det of the information about the wanted ones, the others being fitted."""
-        return self.smooth(matrix)[0]
-
-    def smooth(self, matrix: FloatArray) -> tuple[float, FloatArray]:
-        """Return the cost and its gradient by the matrix."""
-        count = int(np.count_nonzero(self.wanted))
-        scaled = matrix * np.outer(self.scale, self.scale)
-        sign, whole = np.linalg.slogdet(scaled)
-        if sign <= 0:
-            return float(np.inf), np.zeros_like(matrix)
-        gradient = -np.linalg.inv(scaled)
-        rest = np.flatnonzero(~np.asarray(self.wanted, dtype=bool))
-        nuisance = 0.0
-        if len(rest):
-            block = scaled[np.ix_(rest, rest)]
-            nuisance = float(np.linalg.slogdet(block)[1])
-            gradient[np.ix_(rest, rest)] += np.linalg.inv(block)
-        wanted_scale = self.scale[np.asarray(self.wanted, dtype=bool)]
-        cost = (-(whole - nuisance) + 2.0 * np.sum(np.log(wanted_scale))) / count
-        return float(cost), gradient * np.outer(self.scale, self.scale) / count
-
-
-@dataclass(frozen=True)
-class RivalCriterion:
-    """
-    T-optimality: make the torque that a rival model cannot explain as large as possible.
-
-    The information matrix is over the columns of the rival and those of what it lacks.
-    Source: Atkinson and Fedorov 1975, for models linear in their parameters.
-
-    Attributes
-    ----------
-    rival : ndarray of bool, shape (r,)
-        True for the columns that the rival can use.
-    values : ndarray, shape (r,)
-        Parameters of what the rival lacks; zero for its own columns.
-
-    """
-
-    rival: FloatArray
-    values: FloatArray
-
-    def cost(self, matrix: FloatArray) -> float:
-        """Return - log of the sum of squares, in noise units, that the rival leaves."""
-        return self.smooth(matrix)[0]
-
-    def smooth(self, matrix: FloatArray) -> tuple[float, FloatArray]:
-        """Return the cost and its gradient by the matrix."""
-        own = np.flatnonzero(self.rival)
-        direction = np.array(self.values, dtype=float)
-        direction[own] -= _best_fit(matrix[np.ix_(own, own)], matrix[own] @ direction)
-        power = float(direction @ matrix @ direction)
-        if power <= 0.0:
-            return float(np.inf), np.zeros_like(matrix)
-        return float(-np.log(power)), -np.outer(direction, direction) / power
-
-
-def _best_fit(block: FloatArray, reach: FloatArray) -> FloatArray:
+def _least_squares(block: FloatArray, reach: FloatArray) -> FloatArray:
     """
     Solve the normal equations, also where a motion does not tell all columns apart.
 
@@ -266,9 +205,5 @@ def _best_fit(block: FloatArray, reach: FloatArray) -> FloatArray:
     size = np.sqrt(np.maximum(np.diag(block), 0.0))
     unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
     values, vectors = np.linalg.eigh(block * np.outer(unit, unit))
-    seen = values > _BLIND
-    along = vectors[:, seen]
-    return np.asarray(unit * (along @ ((along.T @ (unit * reach)) / values[seen])))
-
-
-Criterion = SpectralCriterion | SubsetCriterion | RivalCriterion
+    along = unit[:, np.newaxis] * vectors[:, values > _BLIND]
+    return np.asarray((along / values[values > _BLIND]) @ (along.T @ reach))

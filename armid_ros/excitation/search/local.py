@@ -1,11 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-One search: from the best of some random trajectories to a local optimum inside every limit.
+The search: from the best of random trajectories to local optima inside every limit.
 
-The solver is SLSQP of SciPy, sequential quadratic programming; docs/excitation.md compares it
-with others. It works on samples; after each round the result is examined between them, and where
-something is wrong there the time is added to those that the next round looks at.
+Several searches begin. After each round the worse half of them ends, so that most of the work is
+spent on the best. The solver is SLSQP of SciPy, sequential quadratic programming;
+docs/excitation.md compares it with others. It works on samples; after each round the result is
+examined between them, and where something is wrong there the time is added to those that the next
+round looks at.
 
 """
 
@@ -14,9 +16,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 import math
+import time
 from typing import Generic, TypeVar
 
-from armid_ros.excitation.feasibility import Faults, trajectory_faults
+from armid_ros.excitation.feasibility import trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Limits
@@ -27,6 +30,9 @@ from armid_ros.excitation.search.objective import Objective
 from armid_ros.motion import FloatArray
 import numpy as np
 import scipy.optimize
+
+#: Why a search did not end by itself.
+INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 
 #: Sharpness of the soft maximum, coarse for as long as that gains anything, then fine.
 _SHARPNESS = (60.0, 300.0)
@@ -47,7 +53,7 @@ _CHECK = 200
 #: to look at it; the proof of clearance looks at all.
 _POSES, _WATCHED = 1000, 0.01
 
-#: Joints up to which a search draws all its candidates; the time of each grows with the joints.
+#: Joints up to which all candidates are drawn; the time of each grows with the joints.
 _CANDIDATE_JOINTS = 10
 
 #: Factor by which a trajectory that is not quite feasible is made smaller, and how often.
@@ -59,66 +65,13 @@ _NO_COST = 1e3
 _Result = TypeVar('_Result')
 
 
-@dataclass(frozen=True)
-class Found:
+class _OutOfTime(Exception):
+    """The time budget is used up."""
+
+
+class Search:
     """
-    What a search has found.
-
-    Attributes
-    ----------
-    trajectory : FourierTrajectory
-        Feasible, at and between all samples.
-    cost : float
-        Its cost.
-
-    """
-
-    trajectory: FourierTrajectory
-    cost: float
-
-
-#: Receives the share of the work that is done, and the best so far.
-Watch = Callable[[float, Found], None]
-
-
-@dataclass
-class _Best:
-    """The best feasible trajectory so far, and who wants to know."""
-
-    problem: DesignProblem
-    prior: FloatArray | None
-    watch: Watch
-    found: Found | None = None
-    done: float = 0.0
-
-    def offer(self, trajectory: FourierTrajectory) -> float:
-        """Take a feasible trajectory into account; return what it gains."""
-        cost = exact_cost(self.problem, trajectory, self.prior)
-        gain = np.inf if self.found is None else self.found.cost - cost
-        if gain > 0.0:
-            self.found = Found(trajectory, cost)
-        self.tell(self.done)
-        return gain
-
-    def tell(self, done: float) -> None:
-        self.done = done
-        if self.found is not None:
-            self.watch(done, self.found)
-
-
-class Stopped(Exception):
-    """Raised by what watches a search to end it."""
-
-
-def search(
-    problem: DesignProblem,
-    clearance: ClearanceModel | None,
-    prior: FloatArray | None,
-    rng: np.random.Generator,
-    watch: Watch,
-) -> Found:
-    """
-    Search once.
+    A search that can be ended at any time, with the best trajectory so far.
 
     Parameters
     ----------
@@ -131,142 +84,197 @@ def search(
     rng : Generator
         Source of randomness.
     watch : callable
-        Receives the share done and the best so far; may raise Stopped to end the search with that.
+        Receives the share of the work that is done, and the cost of the best so far.
 
-    Raises
-    ------
-    TrajectoryError
-        If nothing is feasible.
+    Attributes
+    ----------
+    trajectory : FourierTrajectory or None
+        Best so far; feasible, at and between all samples.
+    cost : float
+        Its cost.
 
     """
-    best = _Best(problem, prior, watch)
-    objective = Objective.of(problem, prior)
-    try:
-        start = _best_of_random(problem, clearance, rng, best)
-        _improve(objective, clearance, start, best, rng)
-    except Stopped:
-        pass
-    assert best.found is not None
-    return best.found
 
+    def __init__(
+        self,
+        problem: DesignProblem,
+        clearance: ClearanceModel | None,
+        prior: FloatArray | None,
+        rng: np.random.Generator,
+        watch: Callable[[float, float], None],
+    ) -> None:
+        self.problem, self.clearance, self.prior, self.rng = problem, clearance, prior, rng
+        self.trajectory: FourierTrajectory | None = None
+        self.cost = np.inf
+        self._watch, self._begun, self._steps = watch, time.process_time(), 0
+        settings = problem.settings
+        share = min(1.0, _CANDIDATE_JOINTS / problem.arm.robot.n_joints)
+        self._candidates = max(math.ceil(share * settings.candidates), settings.starts)
+        self._work = self._candidates + settings.iterations + 2 * _ROUND * (settings.starts - 1)
 
-def exact_cost(
-    problem: DesignProblem, trajectory: FourierTrajectory, prior: FloatArray | None
-) -> float:
-    """Return the cost with the true direction of motion and many samples."""
-    settings = problem.settings
-    count = 4 * settings.samples
-    w = problem.periodic_columns(trajectory, count)[:, problem.selected]
-    weight = settings.rate * settings.period * settings.n_periods / count
-    matrix = weight * (w.T @ w)
-    return problem.criterion.cost(matrix if prior is None else matrix + prior)
+    def run(self) -> str:
+        """
+        Search, and say why it ended early: 'time budget', 'interrupted', or '' where it did not.
 
+        Raises
+        ------
+        TrajectoryError
+            If nothing is feasible.
+        KeyboardInterrupt
+            If interrupted before anything was found.
 
-def _best_of_random(
-    problem: DesignProblem,
-    clearance: ClearanceModel | None,
-    rng: np.random.Generator,
-    best: _Best,
-) -> FourierTrajectory:
-    settings = problem.settings
-    share = min(1.0, _CANDIDATE_JOINTS / problem.arm.robot.n_joints)
-    for _ in range(math.ceil(share * settings.candidates)):
-        best.offer(
-            random_feasible(
+        """
+        try:
+            self._improve(self._draw())
+        except _OutOfTime:
+            return OUT_OF_TIME
+        except KeyboardInterrupt:
+            if self.trajectory is None:
+                raise
+            return INTERRUPTED
+        self._watch(1.0, self.cost)
+        return ''
+
+    def offer(self, trajectory: FourierTrajectory) -> float:
+        """Take a feasible trajectory into account, and return its cost."""
+        cost = self.problem.cost(trajectory, self.prior)
+        if cost < self.cost or self.trajectory is None:
+            self.trajectory, self.cost = trajectory, cost
+        self.step()
+        return cost
+
+    def step(self) -> None:
+        """Count a step of the work."""
+        self._steps += 1
+        self._watch(min(self._steps / self._work, 1.0), self.cost)
+        if time.process_time() - self._begun > self.problem.settings.time_budget:
+            raise _OutOfTime
+
+    def _draw(self) -> list[FourierTrajectory]:
+        """Return the best of the candidates, one to start each search from."""
+        problem, settings = self.problem, self.problem.settings
+        drawn: list[tuple[float, FourierTrajectory]] = []
+        for _ in range(self._candidates):
+            trajectory = random_feasible(
                 problem.arm,
                 problem.limits,
                 settings.period,
                 settings.harmonics,
-                rng,
-                collision=clearance,
+                self.rng,
+                collision=self.clearance,
                 margin=settings.clearance,
             )
-        )
-    assert best.found is not None
-    return best.found.trajectory
+            drawn.append((self.offer(trajectory), trajectory))
+        drawn.sort(key=lambda pair: pair[0])
+        return [trajectory for _, trajectory in drawn[: settings.starts]]
+
+    def _improve(self, starts: list[FourierTrajectory]) -> None:
+        """Go on in rounds from several trajectories; the worse half ends after each."""
+        objective, watched = Objective.of(self.problem, self.prior), self._watched()
+        branches = [_Branch(self, objective, watched, start) for start in starts]
+        while branches:
+            for branch in branches:
+                branch.advance()
+            branches = sorted(branches, key=lambda branch: branch.cost)[: -(-len(branches) // 2)]
+            branches = [branch for branch in branches if branch.left > 0]
+
+    def _watched(self) -> ClearanceModel | None:
+        """Leave out the pairs of bodies that stay apart in all of many poses."""
+        if self.clearance is None:
+            return None
+        lower, upper = position_range(self.problem.limits)
+        poses = self.rng.uniform(lower, upper, (_POSES, len(lower)))
+        return self.clearance.watched(poses, self.problem.settings.clearance + _WATCHED)
 
 
-def _improve(
-    objective: Objective,
-    clearance: ClearanceModel | None,
-    start: FourierTrajectory,
-    best: _Best,
-    rng: np.random.Generator,
-) -> None:
-    """Run the solver in rounds, within a box about the last trajectory that was feasible."""
-    problem = objective.problem
-    settings = problem.settings
-    scale = _coefficient_scale(problem.limits, settings.period, settings.harmonics)
-    lower, upper = _coefficient_range(problem.limits, scale)
-    watched = _watched(problem, clearance, rng)
-    x = start.coefficients / scale
-    left, times, box, sharpness = settings.iterations, np.empty(0), _BOX, _SHARPNESS[0]
-    while left > 0:
+@dataclass
+class _Branch:
+    """One local search: where it stands, and the box and the times of its next round."""
+
+    search: Search
+    objective: Objective
+    watched: ClearanceModel | None
+    trajectory: FourierTrajectory
+    cost: float = np.inf
+
+    def __post_init__(self) -> None:
+        problem = self.search.problem
+        self.left = problem.settings.iterations
+        self.scale = _coefficient_scale(problem)
+        self.lower, self.upper = _coefficient_range(problem.limits, self.scale)
+        self.times, self.box, self.sharpness = np.empty(0), _BOX, _SHARPNESS[0]
+
+    def advance(self) -> None:
+        """Run the solver for a round, within a box about the last feasible trajectory."""
+        problem, clearance = self.search.problem, self.search.clearance
+        settings = problem.settings
         constraints = Constraints.of(
             problem,
-            watched,
+            self.watched,
             margin=settings.clearance + _SLACK,
             reserve=_RESERVE,
-            sharpness=sharpness,
-            more_times=times,
+            sharpness=self.sharpness,
+            more_times=self.times,
         )
-
-        def step(count: int, before: float = best.done) -> None:
-            best.tell(before + count / settings.iterations)
-
-        z, used = _solve(
-            objective,
-            constraints,
-            scale,
-            x,
-            (np.maximum(lower, x - box), np.minimum(upper, x + box)),
-            min(_ROUND, left),
-            step,
-        )
-        left -= used
-        trajectory = FourierTrajectory.of(problem.limits.joints, settings.period, z * scale)
-        more = _faulty_times(problem, clearance, trajectory, settings.clearance)
-        times = np.concatenate([times, more])
+        z, used = self._solve(constraints, min(_ROUND, self.left))
+        self.left -= used
+        trajectory = FourierTrajectory.of(problem.limits.joints, settings.period, z * self.scale)
+        self.times = np.concatenate([self.times, _faulty_times(problem, clearance, trajectory)])
         feasible = _made_feasible(problem, clearance, trajectory)
         if feasible is None:
-            box /= 3.0
-            continue
-        gain = best.offer(feasible)
-        x = feasible.coefficients / scale
-        box = min(2.0 * box, _BOX)
+            self.box /= 3.0
+            return
+        cost = self.search.offer(feasible)
+        gain, self.cost = self.cost - cost, min(cost, self.cost)
+        self.trajectory, self.box = feasible, min(2.0 * self.box, _BOX)
         if gain < _SETTLED:
-            if sharpness == _SHARPNESS[-1]:
-                break
-            sharpness = _SHARPNESS[-1]
-    best.tell(1.0)
+            self.left = 0 if self.sharpness == _SHARPNESS[-1] else self.left
+            self.sharpness = _SHARPNESS[-1]
 
+    def _solve(self, constraints: Constraints, iterations: int) -> tuple[FloatArray, int]:
+        """Return where SLSQP ends, shape (n, 1 + 2 H) in units of the scale, and its steps."""
+        count, scale = 0, self.scale
+        x = self.trajectory.coefficients / scale
+        cost = _Last(lambda z: self.objective.value(z.reshape(scale.shape) * scale))
+        limits = _Last(lambda z: constraints.value(z.reshape(scale.shape) * scale))
 
-def _watched(
-    problem: DesignProblem, clearance: ClearanceModel | None, rng: np.random.Generator
-) -> ClearanceModel | None:
-    """Leave out the pairs of bodies that stay apart in all of many poses."""
-    if clearance is None:
-        return None
-    lower, upper = position_range(problem.limits)
-    poses = rng.uniform(lower, upper, (_POSES, len(lower)))
-    return clearance.watched(poses, problem.settings.clearance + _WATCHED)
+        def counted(z: FloatArray) -> None:
+            nonlocal count
+            count += 1
+            self.search.step()
+
+        result = scipy.optimize.minimize(
+            lambda z: cost(z)[0] if np.isfinite(cost(z)[0]) else _NO_COST,
+            x.ravel(),
+            jac=lambda z: (cost(z)[1]() * scale).ravel(),
+            method='SLSQP',
+            bounds=scipy.optimize.Bounds(
+                np.maximum(self.lower, x - self.box).ravel(),
+                np.minimum(self.upper, x + self.box).ravel(),
+            ),
+            constraints=[
+                {
+                    'type': 'ineq',
+                    'fun': lambda z: -limits(z)[0],
+                    'jac': lambda z: -(limits(z)[1]() * scale).reshape(-1, scale.size),
+                }
+            ],
+            options={'maxiter': iterations, 'ftol': 1e-5},
+            callback=counted,
+        )
+        return np.asarray(result.x).reshape(scale.shape), max(count, 1)
 
 
 def _faulty_times(
-    problem: DesignProblem,
-    clearance: ClearanceModel | None,
-    trajectory: FourierTrajectory,
-    margin: float,
+    problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FloatArray:
     """Return the times at which torque or clearance is worst between the samples of the solver."""
     motion = trajectory.one_period(_CHECK * trajectory.harmonics)
-    limits = problem.limits
-    excess = (np.abs(problem.arm.joint_torque(motion)) / limits.torque).max(axis=1) - 1.0
+    torque = np.abs(problem.arm.joint_torque(motion))
+    excess = (torque / problem.limits.torque).max(axis=1) - 1.0
     if clearance is not None:
-        near = clearance.near(motion.q, margin)
-        lack = np.zeros(len(motion))
-        np.maximum.at(lack, near.sample, margin - near.distance)
-        excess = np.maximum(excess, lack)
+        margin = problem.settings.clearance
+        excess = np.maximum(excess, margin - clearance.smallest(motion.q, reach=margin))
     peak = (excess >= np.roll(excess, 1)) & (excess > np.roll(excess, -1)) & (excess > 0.0)
     return np.asarray(motion.t[peak])
 
@@ -274,93 +282,28 @@ def _faulty_times(
 def _made_feasible(
     problem: DesignProblem, clearance: ClearanceModel | None, trajectory: FourierTrajectory
 ) -> FourierTrajectory | None:
-    """Make a trajectory a little smaller until nothing is wrong with it, if that is enough."""
+    """Make joints at fault, or all where it is not clear which, a little smaller."""
     for _ in range(_SHRINKS):
         faults = trajectory_faults(
             problem.arm, problem.limits, trajectory, clearance, problem.settings.clearance
         )
         if not faults:
             return trajectory
-        trajectory = _smaller(trajectory, faults)
+        own = {v.joint for v in faults.violations if v.limit != 'torque'}
+        everywhere = len(own) < len(faults.violations) + len(faults.approaches)
+        factor = [_SHRINK if everywhere or j in own else 1.0 for j in trajectory.joints]
+        trajectory = trajectory.scaled(np.array(factor))
     return None
 
 
-def _smaller(trajectory: FourierTrajectory, faults: Faults) -> FourierTrajectory:
-    """Shrink the joints at fault, all of them where it is not clear which."""
-    own = {v.joint for v in faults.violations if v.limit != 'torque'}
-    everywhere = len(own) < len(faults.violations) + len(faults.approaches)
-    factor = [_SHRINK if everywhere or j in own else 1.0 for j in trajectory.joints]
-    return trajectory.scaled(np.array(factor))
-
-
-def _solve(
-    objective: Objective,
-    constraints: Constraints,
-    scale: FloatArray,
-    x: FloatArray,
-    bounds: tuple[FloatArray, FloatArray],
-    iterations: int,
-    step: Callable[[int], None],
-) -> tuple[FloatArray, int]:
-    """
-    Run SLSQP.
-
-    Parameters
-    ----------
-    objective, constraints : Objective, Constraints
-        What to make small, and what to keep.
-    scale, x : ndarray, shape (n, 1 + 2 H)
-        Unit of every coefficient, and where to begin in these units.
-    bounds : tuple of ndarray
-        Least and largest values, in these units.
-    iterations : int
-        How many at most.
-    step : callable
-        Told the number of iterations after each.
-
-    Returns
-    -------
-    z : ndarray, shape (n, 1 + 2 H)
-        Where it ended, in these units.
-    count : int
-        Iterations it took, one at least.
-
-    """
-    count = 0
-    cost = _Last(lambda z: objective.value(z.reshape(scale.shape) * scale))
-    limits = _Last(lambda z: constraints.value(z.reshape(scale.shape) * scale))
-
-    def counted(z: FloatArray) -> None:
-        nonlocal count
-        count += 1
-        step(count)
-
-    result = scipy.optimize.minimize(
-        lambda z: cost(z)[0] if np.isfinite(cost(z)[0]) else _NO_COST,
-        x.ravel(),
-        jac=lambda z: (cost(z)[1]() * scale).ravel(),
-        method='SLSQP',
-        bounds=scipy.optimize.Bounds(bounds[0].ravel(), bounds[1].ravel()),
-        constraints=[
-            {
-                'type': 'ineq',
-                'fun': lambda z: -limits(z)[0],
-                'jac': lambda z: -(limits(z)[1]() * scale).reshape(-1, scale.size),
-            }
-        ],
-        options={'maxiter': iterations, 'ftol': 1e-5},
-        callback=counted,
-    )
-    return np.asarray(result.x).reshape(scale.shape), max(count, 1)
-
-
-def _coefficient_scale(limits: Limits, period: float, harmonics: int) -> FloatArray:
+def _coefficient_scale(problem: DesignProblem) -> FloatArray:
     """Size of every coefficient that alone reaches a limit, shape (n, 1 + 2 H)."""
+    limits, settings = problem.limits, problem.settings
     lower, upper = position_range(limits)
     half = 0.5 * (upper - lower)[:, np.newaxis]
-    k = 2.0 * np.pi / period * np.arange(1, harmonics + 1)
+    k = 2.0 * np.pi / settings.period * np.arange(1, settings.harmonics + 1)
     largest = np.minimum(limits.velocity[:, np.newaxis], limits.acceleration[:, np.newaxis] / k)
-    amplitude = np.minimum(half * k, largest) / np.sqrt(harmonics)
+    amplitude = np.minimum(half * k, largest) / np.sqrt(settings.harmonics)
     return np.column_stack([half, amplitude, amplitude])
 
 

@@ -3,8 +3,8 @@
 """
 The cost of a trajectory and its gradient by the Fourier coefficients.
 
-Columns of effects that add to the rigid body are those of the body. All others are differentiated
-by finite differences, those that depend on nothing but the state of all samples at once.
+Columns that depend on the state alone are differentiated by finite differences of the states of
+all samples at once, those that depend on the motion's past by differences of every coefficient.
 
 """
 
@@ -12,43 +12,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
-from armid_ros.arm import ArmModel
-from armid_ros.effects import Effect
 from armid_ros.effects.direction import BlurredMotion
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.search.rigid_gradient import RigidRegressor
+from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
+import numpy.typing as npt
 
 #: The direction of motion is blurred below this share of a joint's velocity limit.
 _BLUR = 0.05
 
 #: Step of finite differences, of a state of size 1.
-_STEP = 1e-6
+_STEP = 1e-7
 
-#: Derivative of a number by the samples q, dq and ddq, each of shape (N, n).
-Gradient = tuple[FloatArray, FloatArray, FloatArray]
-
-
-@dataclass(frozen=True)
-class EffectColumns:
-    """
-    Columns of one effect with their gradient.
-
-    Attributes
-    ----------
-    columns : ndarray, shape (N, n, P)
-        Sensitivities.
-    pullback : callable
-        From derivatives of a number by the columns, shape (N, n, P), to those by the samples, or
-        to those by the Fourier coefficients, shape (n, 1 + 2 H).
-
-    """
-
-    columns: FloatArray
-    pullback: Callable[[FloatArray], Gradient | FloatArray]
+#: Joints that are moved at a time, each in all samples: their columns are in memory together.
+_TOGETHER = 8
 
 
 @dataclass(frozen=True)
@@ -87,11 +68,6 @@ class Objective:
         basis = fourier_basis(t, settings.period, settings.harmonics)
         return cls(problem, prior, t, basis, width)
 
-    def motion(self, x: FloatArray) -> Motion:
-        """Return the samples of coefficients X."""
-        states = (basis @ x.T for basis in self.basis)
-        return BlurredMotion(self.problem.limits.joints, self.t, *states, width=self.width)
-
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
         """
         Return the smooth cost, and what works out its gradient.
@@ -109,18 +85,13 @@ class Objective:
             Derivative by the coefficients; a line search does without most of them.
 
         """
-        problem, motion = self.problem, self.motion(x)
-        still = problem.settings.target == 'gravity' or problem.arm.quasi_static
-        felt = motion.at_rest() if still else motion
-        rigid = RigidRegressor.of(problem.arm.body, felt)
-        body = rigid.matrix()
-        if problem.settings.target == 'effects':
-            body = np.zeros_like(body)
-        effects = [self._effect(effect, motion, x) for effect in problem.arm.effects]
-        columns = np.concatenate([body, *(effect.columns for effect in effects)], axis=2)
-        inverse_noise = (1.0 / problem.noise)[:, np.newaxis]
-        w = (columns[:, :, problem.selected] * inverse_noise).reshape(-1, len(problem.selected))
-        settings = problem.settings
+        problem, settings = self.problem, self.problem.settings
+        states = (basis @ x.T for basis in self.basis)
+        motion = BlurredMotion(problem.limits.joints, self.t, *states, width=self.width)
+        columns = np.concatenate(self._by_state(motion) + self._by_past(x), axis=2)
+        order = self._order[problem.base.independent]
+        inverse_noise = 1.0 / problem.noise[:, np.newaxis]
+        w = (columns[:, :, order] * inverse_noise).reshape(-1, len(order))
         weight = settings.rate * settings.period * settings.n_periods / len(self.t)
         matrix = weight * (w.T @ w)
         if self.prior is not None:
@@ -129,105 +100,75 @@ class Objective:
 
         def gradient() -> FloatArray:
             weights = np.zeros_like(columns)
-            by_w = (2.0 * weight * (w @ by_matrix)).reshape(*motion.q.shape, -1)
-            weights[:, :, problem.selected] = by_w * inverse_noise
-            return self._gradient(weights, rigid, effects, still)
+            by_w = 2.0 * weight * (w @ by_matrix)
+            weights[:, :, order] = by_w.reshape(*motion.q.shape, -1) * inverse_noise
+            return self._state_gradient(motion, weights) + self._past_gradient(x, weights)
 
         return cost, gradient
 
-    def _gradient(
-        self,
-        weights: FloatArray,
-        rigid: RigidRegressor,
-        effects: list[EffectColumns],
-        still: bool,
-    ) -> FloatArray:
-        """Turn derivatives by the columns, shape (N, n, P), into those by the coefficients."""
-        size = 10 * weights.shape[1]
-        total = np.zeros((weights.shape[1], self.basis[0].shape[1]))
-        if self.problem.settings.target != 'effects':
-            by_q, by_dq, by_ddq = rigid.pullback(weights[:, :, :size])
-            total += self._chained(
-                (by_q, 0.0 * by_dq, 0.0 * by_ddq) if still else (by_q, by_dq, by_ddq)
-            )
-        start = size
-        for effect in effects:
-            stop = start + effect.columns.shape[2]
-            part = effect.pullback(weights[:, :, start:stop])
-            total += self._chained(part) if isinstance(part, tuple) else part
-            start = stop
+    def _state_gradient(self, motion: Motion, weights: FloatArray) -> FloatArray:
+        """Differentiate sum(weights * columns of the state) by the coefficients."""
+        count, n = motion.q.shape
+        total = np.zeros((n, self.basis[0].shape[1]))
+        state = np.array([motion.q, motion.dq, motion.ddq])
+        here = _weighted(self._by_state(motion), weights)
+        for argument, basis in enumerate(self.basis):
+            for joints in np.array_split(np.arange(n), -(-n // _TOGETHER)):
+                moved = np.tile(state, (1, len(joints), 1)).reshape(3, len(joints), count, n)
+                moved[argument, np.arange(len(joints)), :, joints] += _STEP
+                q, dq, ddq = moved.reshape(3, -1, n)
+                t = np.tile(motion.t, len(joints))
+                there = self._by_state(replace(motion, t=t, q=q, dq=dq, ddq=ddq))
+                total[joints] += (_weighted(there, weights) - here) @ basis / _STEP
         return total
 
-    def _chained(self, by_state: Gradient) -> FloatArray:
-        parts = [by.T @ basis for by, basis in zip(by_state, self.basis, strict=True)]
-        return np.asarray(sum(parts))
-
-    def _effect(self, effect: Effect, motion: Motion, x: FloatArray) -> EffectColumns:
-        arm = self.problem.arm
-        rows = effect.adds_to(arm.robot)
-        if rows:
-            felt = arm.felt(motion)
-            return _rigid_columns(rows, motion, RigidRegressor.of(arm.body, felt))
-        if effect.instantaneous:
-            return _columns_by_state(effect, motion, arm)
-        return self._columns_by_coefficient(effect, x)
-
-    def _columns_by_coefficient(self, effect: Effect, x: FloatArray) -> EffectColumns:
-        """Return columns that depend on the motion's past, with finite differences behind them."""
-        joints, period = self.problem.limits.joints, self.problem.settings.period
-
-        def columns(y: FloatArray) -> FloatArray:
-            motion = FourierTrajectory.of(joints, period, y).with_margins(len(self.t))
-            return self.problem.arm.columns_of(effect, motion)[MARGIN:-MARGIN]
-
-        here = columns(x)
-
-        def pullback(weights: FloatArray) -> FloatArray:
-            gradient = np.empty_like(x)
+    def _past_gradient(self, x: FloatArray, weights: FloatArray) -> FloatArray:
+        """Differentiate sum(weights * columns of the past) by the coefficients."""
+        total = np.zeros_like(x)
+        here = self._by_past(x)
+        if here:
+            weights = weights[:, :, -sum(block.shape[2] for block in here) :]
             for index in np.ndindex(*x.shape):
-                step = _STEP * max(1.0, abs(float(x[index])))
                 moved = x.copy()
-                moved[index] += step
-                gradient[index] = np.sum(weights * (columns(moved) - here)) / step
-            return gradient
+                moved[index] += _STEP
+                change = _weighted(self._by_past(moved), weights) - _weighted(here, weights)
+                total[index] = change.sum() / _STEP
+        return total
 
-        return EffectColumns(here, pullback)
+    def _by_state(self, motion: Motion) -> list[FloatArray]:
+        """Return the columns of what depends on the state alone: of the body and of effects."""
+        arm, target = self.problem.arm, self.problem.settings.target
+        if target == 'effects':
+            body = np.zeros((*motion.q.shape, len(arm.robot.rigid_parameters)))
+        else:
+            still = target == 'gravity' or arm.quasi_static
+            body = regressor(arm.body, motion.at_rest() if still else motion)
+        return [body, *(arm.columns_of(e, motion) for e in arm.effects if e.instantaneous)]
+
+    def _by_past(self, x: FloatArray) -> list[FloatArray]:
+        """Return the columns of effects that depend on the motion's past as well."""
+        problem = self.problem
+        effects = [effect for effect in problem.arm.effects if not effect.instantaneous]
+        path = FourierTrajectory.of(problem.limits.joints, problem.settings.period, x)
+        motion = path.with_margins(len(self.t))
+        return [problem.arm.columns_of(effect, motion)[MARGIN:-MARGIN] for effect in effects]
+
+    @cached_property
+    def _order(self) -> npt.NDArray[np.intp]:
+        """Where each standard parameter is among the columns: those of the past are last."""
+        arm = self.problem.arm
+        past = [np.zeros(len(arm.robot.rigid_parameters), dtype=bool)]
+        for effect in arm.effects:
+            past.append(np.full(len(effect.parameters(arm.robot)), not effect.instantaneous))
+        return np.argsort(np.argsort(np.concatenate(past), kind='stable'))
 
 
-def _rigid_columns(rows: Sequence[int], motion: Motion, rigid: RigidRegressor) -> EffectColumns:
-    """Return the columns of what adds to rigid parameters: those of the parameters."""
-    pick = list(rows)
-
-    def pullback(weights: FloatArray) -> Gradient:
-        spread = np.zeros((*motion.q.shape, 10 * motion.n_joints))
-        spread[:, :, pick] = weights
-        return rigid.pullback(spread)
-
-    return EffectColumns(rigid.matrix()[:, :, pick], pullback)
-
-
-def _columns_by_state(effect: Effect, motion: Motion, arm: ArmModel) -> EffectColumns:
-    """Return columns that depend on nothing but the state, with finite differences behind them."""
-    n = motion.n_joints
-    state = np.array([motion.q, motion.dq, motion.ddq])
-    joints = np.arange(n)
-
-    def along(argument: int, step: float, weights: FloatArray) -> FloatArray:
-        """Return the weighted sum of the columns with each joint moved alone, (N, n)."""
-        moved = np.repeat(
-            state[:, np.newaxis], n, axis=1
-        )  # [argument, moved joint, sample, joint]
-        moved[argument, joints, :, joints] += step
-        q, dq, ddq = moved.reshape(3, -1, n)
-        samples = replace(motion, t=np.tile(motion.t, n), q=q, dq=dq, ddq=ddq)
-        columns = arm.columns_of(effect, samples).reshape(n, *weights.shape)
-        return np.asarray(np.einsum('jkrp,krp->kj', columns, weights))
-
-    def pullback(weights: FloatArray) -> Gradient:
-        by_q, by_dq, by_ddq = (
-            (along(argument, _STEP, weights) - along(argument, -_STEP, weights)) / (2.0 * _STEP)
-            for argument in range(3)
-        )
-        return by_q, by_dq, by_ddq
-
-    return EffectColumns(arm.columns_of(effect, motion), pullback)
+def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
+    """Return sum(weights * columns) of each sample, blocks of (k N, n, P) to (k, N)."""
+    total, start = 0.0, 0
+    for block in blocks:
+        stop = start + block.shape[2]
+        part = block.reshape(-1, *weights.shape[:2], block.shape[2])
+        total = total + np.einsum('jkrp,krp->jk', part, weights[:, :, start:stop])
+        start = stop
+    return np.asarray(total)

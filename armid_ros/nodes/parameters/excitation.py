@@ -29,9 +29,6 @@ from armid_ros.nodes.parameters.table import NodeParameter, Values
 from armid_ros.robots import CollisionModel, load_arms, load_robot
 import numpy as np
 
-#: Samples of a period that a design looks at, and how many a harmonic needs.
-_SAMPLES, _PER_HARMONIC = 100, 8
-
 SIMULATION = NodeParameter(
     'simulation',
     False,
@@ -53,7 +50,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'file',
         '',
-        'Excitation to use (.yaml or .csv); empty: design one. Set on the running node it is what '
+        'Excitation to use (.yaml); empty: design one. Set on the running node it is what '
         '~/start runs next.',
         read_only=False,
     ),
@@ -83,8 +80,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'environment',
         '',
-        'YAML with what stands around the arm, or a planning scene of MoveIt (.scene, or as ros2 '
-        'topic echo prints it); empty: nothing.',
+        'YAML with what stands around the arm, or a planning scene of MoveIt, as ros2 topic '
+        'echo prints it; empty: nothing.',
     ),
     NodeParameter(
         'design_time', 20.0, 'What the search may take at most.', 's', lower=1.0, upper=86400.0
@@ -303,7 +300,6 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
     settings = DesignSettings(
         period=whole_period(value('duration'), periods, run_in, rate),
         harmonics=value('harmonics'),
-        samples=max(_SAMPLES, _PER_HARMONIC * value('harmonics')),
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
@@ -311,7 +307,6 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),
-        processes=1,  # a signal to the node must not leave others behind
     )
     rng = np.random.default_rng(value('seed'))
     return design(arm, settings, rng, collision=surroundings.bodies).excitation

@@ -177,7 +177,6 @@ def reproduce(
         iterations=60,
         noise=TABLES[0].noise,
         target='gravity',
-        processes=1,
     )
     run = design(ArmModel(nominal), settings, rng, collision=collision).excitation
     limits = Limits.of(nominal, speed='slow')
