@@ -254,16 +254,16 @@ class _Reader:
             raise RobotError(f'{self.source}: the <inertial> of {where} has no <{missing}>')
         xyz, rpy = self.origin(element, where)
         inertial = Inertial(
-            mass=self.finite(mass, 'value', where),
+            mass=self.number(mass, 'value', where),
             xyz=xyz,
             rpy=rpy,
             inertia=(
-                self.finite(inertia, 'ixx', where),
-                self.finite(inertia, 'ixy', where, 0.0),
-                self.finite(inertia, 'ixz', where, 0.0),
-                self.finite(inertia, 'iyy', where),
-                self.finite(inertia, 'iyz', where, 0.0),
-                self.finite(inertia, 'izz', where),
+                self.number(inertia, 'ixx', where),
+                self.number(inertia, 'ixy', where, 0.0),
+                self.number(inertia, 'ixz', where, 0.0),
+                self.number(inertia, 'iyy', where),
+                self.number(inertia, 'iyz', where, 0.0),
+                self.number(inertia, 'izz', where),
             ),
         )
         if inertial.mass < 0.0:
@@ -292,7 +292,7 @@ class _Reader:
         lower, upper, velocity, effort = self.limits(element, kind, where)
         dynamics = element.find('dynamics')
         damping, friction, armature = (
-            0.0 if dynamics is None else self.finite(dynamics, key, where, 0.0)
+            0.0 if dynamics is None else self.number(dynamics, key, where, 0.0)
             for key in ('damping', 'friction', 'armature')
         )
         return Joint(
@@ -325,15 +325,15 @@ class _Reader:
             return -math.inf, math.inf, math.inf, math.inf
         rates = []
         for name in ('velocity', 'effort'):
-            rate = abs(self.number(limit, name, where, math.inf))
+            rate = abs(self.number(limit, name, where, math.inf, endless=True))
             if rate == 0.0:  # noqa: RUF069 - as described
                 self.notes.append(f'{where}: {name} limit 0; taken as not given')
                 rate = math.inf
             rates.append(rate)
         if kind == 'continuous':
             return -math.inf, math.inf, rates[0], rates[1]
-        lower = self.number(limit, 'lower', where, 0.0)
-        upper = self.number(limit, 'upper', where, 0.0)
+        lower = self.number(limit, 'lower', where, 0.0, endless=True)
+        upper = self.number(limit, 'upper', where, 0.0, endless=True)
         if lower > upper:
             raise RobotError(
                 f'{self.source}: {where} has its lower limit {lower:g} above the upper {upper:g}'
@@ -349,8 +349,8 @@ class _Reader:
             return None
         return Mimic(
             joint=mimic.get('joint', ''),
-            multiplier=self.finite(mimic, 'multiplier', where, 1.0),
-            offset=self.finite(mimic, 'offset', where, 0.0),
+            multiplier=self.number(mimic, 'multiplier', where, 1.0),
+            offset=self.number(mimic, 'offset', where, 0.0),
         )
 
     def link(self, element: ElementTree.Element, role: str, where: str) -> str:
@@ -377,47 +377,39 @@ class _Reader:
         return self.vector(origin, 'xyz', where), self.vector(origin, 'rpy', where)
 
     def vector(self, element: ElementTree.Element, name: str, where: str) -> Vector:
+        """Return three numbers that arithmetic bears, zero where there are none."""
         text = element.get(name, '0 0 0')
+        said = f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is"
         try:
             x, y, z = (float(number) for number in text.split())
         except ValueError:
             x = y = z = math.nan
         if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-            raise RobotError(
-                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is not three finite "
-                'numbers'
-            )
+            raise RobotError(f'{said} not three finite numbers')
         if max(abs(x), abs(y), abs(z)) > LARGEST:
-            raise RobotError(
-                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is beyond {LARGEST:g}"
-            )
+            raise RobotError(f'{said} beyond {LARGEST:g}')
         return x, y, z
 
-    def finite(
-        self, element: ElementTree.Element, name: str, where: str, default: float | None = None
+    def number(
+        self,
+        element: ElementTree.Element,
+        name: str,
+        where: str,
+        default: float | None = None,
+        *,
+        endless: bool = False,
     ) -> float:
         """Return a number that arithmetic bears; only limits may be infinite."""
-        number = self.number(element, name, where, default)
-        if abs(number) > LARGEST:
-            wrong = 'not finite' if math.isinf(number) else f'beyond {LARGEST:g}'
-            text = element.get(name)
-            raise RobotError(
-                f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is {wrong}"
-            )
-        return number
-
-    def number(
-        self, element: ElementTree.Element, name: str, where: str, default: float | None = None
-    ) -> float:
-        text = element.get(name)
-        if text is None and default is not None:
-            return default
+        text = element.get(name, '' if default is None else repr(default))
+        said = f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is"
         try:
-            number = float(text or '')
+            number = float(text)
         except ValueError:
             number = math.nan
         if math.isnan(number):
+            raise RobotError(f'{said} no number')
+        if not endless and abs(number) > LARGEST:
             raise RobotError(
-                f"{self.source}: {where}: {name}='{text or ''}' of <{element.tag}> is no number"
+                f'{said} {"not finite" if math.isinf(number) else f"beyond {LARGEST:g}"}'
             )
         return number
