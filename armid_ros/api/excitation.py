@@ -143,8 +143,7 @@ class ExcitationResult(Shown):
     @cached_property
     def fitness(self) -> Fitness:
         """Return what was checked of the run."""
-        scene = self.scene
-        return fitness(self.run, self.core.limits, scene.collision, scene.floor, scene.obstacles)
+        return fitness(self.run, self.core.limits, self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what excitation.json holds."""
@@ -280,7 +279,7 @@ def design_excitation(
     rng : int or Generator
         Seed, or source of randomness.
     time_budget : float, optional
-        Of each search process [s]: by default 120, and above 20 joints 25 and one search.
+        Processor time [s]: by default 120, and above 20 joints 25 and one search.
     floor : str or float, optional
         Height of the floor above the origin of the base [m], or 'none'; by default the base plane
         of an arm that stands, or what is shipped with the robot.

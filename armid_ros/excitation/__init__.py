@@ -13,7 +13,7 @@ from armid_ros.excitation.design import Design, design, DesignProgress, evaluate
 from armid_ros.excitation.ending import Ending
 from armid_ros.excitation.feasibility import excitation_faults, Faults, trajectory_faults
 from armid_ros.excitation.files import load_excitation, save_excitation
-from armid_ros.excitation.fitness import Fitness, fitness, not_checked
+from armid_ros.excitation.fitness import Fitness, fitness
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.gate import MotionGate
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
@@ -83,7 +83,6 @@ __all__ = [
     'jump_fault',
     'load_environment',
     'load_excitation',
-    'not_checked',
     'obstacles_alone',
     'plan_run',
     'random_feasible',

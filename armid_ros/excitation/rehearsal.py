@@ -4,15 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
 from armid_ros.excitation.supervision import Path
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import FloatArray
 import numpy as np
 
-#: Samples that are kept; of a longer run every second one is left out, again and again.
-_MOST = 4000
+#: Samples of the path at which the torque is foreseen.
+_SAMPLES = 4000
 #: A torque is as foreseen within this factor of its largest foreseen value: a description knows no
 #: friction, and friction is most of what a slow arm takes.
 _SURPRISING = 3.0
@@ -74,7 +74,6 @@ class RehearsalReport:
         return '; '.join((text, *self.surprises))
 
 
-@dataclass
 class Rehearsal:
     """
     What came of an arm while it rehearsed.
@@ -88,11 +87,10 @@ class Rehearsal:
 
     """
 
-    path: Path
-    arm: ArmModel
-    _rows: list[tuple[float, FloatArray, FloatArray]] = field(default_factory=list)
-    _stride: int = 1
-    _count: int = 0
+    def __init__(self, path: Path, arm: ArmModel) -> None:
+        self._path, self._arm = path, arm
+        self._tracking, self._torque = np.full((2, arm.robot.n_joints), np.nan)
+        self._count, self._until = 0, 0.0
 
     def add(self, phase: float, q: FloatArray, tau: FloatArray) -> None:
         """
@@ -106,33 +104,17 @@ class Rehearsal:
             Measured position and torque; NaN where there is none.
 
         """
-        self._count += 1
-        if self._count % self._stride:
-            return
-        self._rows.append((phase, np.array(q), np.array(tau)))
-        if len(self._rows) >= _MOST:
-            self._rows, self._stride = self._rows[::2], 2 * self._stride
+        distance = np.abs(q - self._path.at([phase]).q[0])
+        self._tracking = np.fmax(self._tracking, distance)
+        self._torque = np.fmax(self._torque, np.abs(tau))
+        self._count, self._until = self._count + 1, max(self._until, phase)
 
     def report(self) -> RehearsalReport:
         """Return how it went so far."""
-        robot = self.arm.robot
-        n = robot.n_joints
-        if not self._rows:
-            nothing = np.full(n, np.nan)
-            return RehearsalReport(robot.joints, nothing, nothing, nothing, robot.torque_limit, 0)
-        phase = np.array([row[0] for row in self._rows])
-        q, tau = (np.array([row[k] for row in self._rows]) for k in (1, 2))
-        wanted = self.path.at(phase)
-        motion = Motion(robot.joints, wanted.t, wanted.q, wanted.dq, wanted.ddq)
-        measured = np.abs(tau)
-        known = ~np.isnan(measured).all(axis=0)
-        torque = np.full(n, np.nan)
-        torque[known] = np.nanmax(measured[:, known], axis=0)
+        robot = self._arm.robot
+        wanted = self._path.at(np.linspace(0.0, self._until, _SAMPLES))
+        foreseen = np.abs(self._arm.joint_torque(wanted)).max(axis=0)
+        limit = robot.torque_limit
         return RehearsalReport(
-            robot.joints,
-            np.abs(q - wanted.q).max(axis=0),
-            torque,
-            np.abs(self.arm.joint_torque(motion)).max(axis=0),
-            robot.torque_limit,
-            len(self._rows),
+            robot.joints, self._tracking, self._torque, foreseen, limit, self._count
         )

@@ -67,7 +67,7 @@ class DesignSettings:
         fewer in proportion.
     starts : int
         Number of them, the best ones, that are improved; of these the better half goes on after
-        every round.
+        every second round.
     iterations : int
         Iterations of each of them. This, not the time, decides between results.
     time_budget : float

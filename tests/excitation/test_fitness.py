@@ -5,7 +5,7 @@
 from dataclasses import replace
 import re
 
-from armid_ros.excitation import fitness, Floor, Limits, not_checked, Obstacle
+from armid_ros.excitation import CollisionScene, fitness, Floor, Limits, Obstacle
 from armid_ros.excitation.fitness import FIT, PARTLY, UNFIT
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, robot_from_urdf
@@ -25,7 +25,7 @@ PLANE = (Obstacle('floor', 'plane'),)
 def unchecked(text=None, floor=GROUND, obstacles=PLANE, **limits):
     robot = robot_from_urdf(text or urdf(*JOINTS))
     bound = replace(Limits.of(robot), **limits)
-    return not_checked(bound, collision_model(robot), floor, obstacles)
+    return CollisionScene(collision_model(robot), floor, obstacles, 0.01).not_checked(bound)
 
 
 def without(tag):
@@ -82,8 +82,8 @@ def test_what_is_missing_is_named_and_is_in_the_verdict(case):
     bound = {k: v for k, v in options.items() if k not in ('floor', 'obstacles', 'text')}
     rest = np.zeros((2, 2))
     motion = Motion(robot.joints, np.arange(2.0), rest, rest, rest)
-    surroundings = (collision_model(robot), options['floor'], options['obstacles'])
-    result = fitness(motion, replace(Limits.of(robot), **bound), *surroundings)
+    scene = CollisionScene(collision_model(robot), options['floor'], options['obstacles'], 0.01)
+    result = fitness(motion, replace(Limits.of(robot), **bound), scene)
     assert result.word == PARTLY and FIT not in str(result)
     assert re.search(f'^{PARTLY}: .*lowest point.*not checked.*{words}', str(result))
 
@@ -93,7 +93,8 @@ def swung(angle):
     robot = robot_from_urdf(urdf(*JOINTS))
     q = np.column_stack([np.linspace(0.0, angle, 50), np.zeros(50)])
     motion = Motion(robot.joints, np.linspace(0.0, 1.0, 50), q, 0.0 * q, 0.0 * q)
-    return fitness(motion, Limits.of(robot), collision_model(robot), GROUND, PLANE)
+    scene = CollisionScene(collision_model(robot), GROUND, PLANE, 0.01)
+    return fitness(motion, Limits.of(robot), scene)
 
 
 def test_a_verdict_without_reserve_has_the_lowest_point_above_the_floor():

@@ -235,32 +235,11 @@ class TestSources:
         with pytest.raises(RobotError, match='cannot be read as text'):
             load_robot(path)
 
-    def test_xacro_with_arguments_and_an_include(self, tmp_path: Path) -> None:
-        (tmp_path / 'forearm.xacro').write_text(robot(FOREARM))
-        heavy = ARM.replace('"1.5"', '"${2 * mass}"')
-        xacro = (
-            '<robot name="made_by_hand" xmlns:xacro="http://www.ros.org/wiki/xacro">'
-            '<xacro:arg name="mass" default="1"/><xacro:property name="mass" value="$(arg mass)"/>'
-            f'{heavy}<xacro:include filename="forearm.xacro"/></robot>'
-        )
-        path = tmp_path / 'arm.urdf.xacro'
-        path.write_text(xacro)
-        assert load_robot(path).model.inertias[1].mass == pytest.approx(2.0)
-        arm = load_robot(path, xacro_arguments={'mass': '4'})
-        assert arm.model.inertias[1].mass == pytest.approx(8.0)
-        assert 'xacro:' not in arm.urdf
-
     def test_xacro_that_does_not_expand(self, tmp_path: Path) -> None:
         path = tmp_path / 'arm.xacro'
         path.write_text(robot(ARM).replace('"1.5"', '"${mass}"'))
         with pytest.raises(RobotError, match=r'arm.xacro: xacro: .*mass'):
             load_robot(path)
-
-    def test_arguments_for_a_file_that_takes_none(self, tmp_path: Path) -> None:
-        path = tmp_path / 'arm.urdf'
-        path.write_text(TWO_LINKS)
-        with pytest.raises(RobotError, match='not a xacro file'):
-            load_robot(path, xacro_arguments={'mass': '4'})
 
 
 class TestGravity:
@@ -361,9 +340,11 @@ def test_two_arms_are_said_to_be_two() -> None:
     assert not any('arms are driven' in text for text in robot_from_urdf(TWO_LINKS).notes)
 
 
-def test_xacro_arguments_are_written_behind_the_path(tmp_path: Path) -> None:
+def test_xacro_arguments_reach_the_file_and_what_it_includes(tmp_path: Path) -> None:
     path = tmp_path / 'arm.xacro'
-    text = TWO_LINKS.replace('<robot ', '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    (tmp_path / 'forearm.xacro').write_text(robot(FOREARM).replace('1.5', '$(arg mass)'))
+    text = robot(ARM, '<xacro:include filename="forearm.xacro"/>')
+    text = text.replace('<robot ', '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
     text = text.replace('value="1.5"', 'value="$(arg mass)"')
     path.write_text(text.replace('>', '><xacro:arg name="mass" default="1.5"/>', 1))
     heavy = load_robot(f'{path} mass:=4.0')
@@ -371,6 +352,9 @@ def test_xacro_arguments_are_written_behind_the_path(tmp_path: Path) -> None:
     np.testing.assert_allclose(load_robot(path).rigid_parameters[::10], 1.5)
     with pytest.raises(RobotError, match="'mass=4' is no argument; write name:=value"):
         load_robot(f'{path} other:=1 mass=4')
+    (tmp_path / 'arm.urdf').write_text(TWO_LINKS)
+    with pytest.raises(RobotError, match='not a xacro file'):
+        load_robot(f'{tmp_path}/arm.urdf mass:=4.0')
 
 
 def test_an_unknown_joint_is_answered_with_those_that_exist() -> None:
@@ -420,36 +404,11 @@ class TestSizes:
 @pytest.mark.parametrize(
     ('old', 'new', 'message'),
     [
-        (
-            '<mass value="1"/>',
-            '<mass value="inf"/>',
-            "link 'l0': value='inf' of <mass> is not fin",
-        ),
-        ('ixx="1"', 'ixx="-inf"', "link 'l0': ixx='-inf' of <inertia> is not finite"),
-        ('<mass value="1"/>', '<origin xyz="0 0 inf"/><mass value="1"/>', 'not three finite'),
-        (
-            '<child',
-            '<axis xyz="nan 0 1"/><child',
-            "joint 'j1': xyz='nan 0 1' of <axis> is not three",
-        ),
-        (
-            '<child',
-            '<axis xyz="1.7e308 1.7e308 0"/><child',
-            "'j1': xyz='1.7e308 1.7e308 0' of <axis>",
-        ),
+        ('<mass value="1"/>', '<mass value="inf"/>', "'l0': value='inf' of <mass> is not finite"),
+        ('<child', '<axis xyz="nan 0 1"/><child', "xyz='nan 0 1' of <axis> is not three"),
         ('ixx="1"', 'ixx="1e101"', "link 'l0': ixx='1e101' of <inertia> is beyond 1e+100"),
-        (
-            '<child',
-            '<origin rpy="0 0 nan"/><child',
-            "joint 'j1': rpy='0 0 nan' of <origin> is not",
-        ),
-        ('<child', '<origin xyz="0 1e999 0"/><child', "joint 'j1': xyz='0 1e999 0' of <origin>"),
+        ('<child', '<origin xyz="0 1e200 0"/><child', "xyz='0 1e200 0' of <origin> is beyond"),
         ('<child', '<dynamics damping="inf"/><child', "damping='inf' of <dynamics> is not finite"),
-        (
-            '<mass value="1"/>',
-            '<origin xyz="1e200 0 0"/><mass value="1e200"/>',
-            "xyz='1e200 0 0' of <origin> is beyond 1e+100",
-        ),
     ],
 )
 def test_a_number_that_is_not_finite_is_refused_by_name(old: str, new: str, message: str) -> None:

@@ -174,13 +174,13 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
     help='A bag recorded already: add most to what it tells. May be given several times.',
 )
 @click.option(
-    '--starts', type=click.IntRange(min=1), help='Random restarts; 4, above 20 joints 1.'
+    '--starts', type=click.IntRange(min=1), help='Searches to begin; 4, above 20 joints 1.'
 )
 @click.option('--iterations', default=150, show_default=True, help='Of each search.')
 @click.option(
     '--time-budget',
     type=click.FloatRange(min=0.0),
-    help='At most so much processor time in each search process [s]; 120, above 20 joints 25.',
+    help='At most so much processor time for a search [s]; 120, above 20 joints 25.',
 )
 @parameters.gravity
 @parameters.joints

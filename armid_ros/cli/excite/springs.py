@@ -11,7 +11,7 @@ from armid_ros.api.excitation import BAG, SCHEMA
 from armid_ros.cli import options
 from armid_ros.cli.terminal import say
 from armid_ros.errors import RecordingError
-from armid_ros.excitation import ClearanceModel, CollisionScene, Limits, not_checked
+from armid_ros.excitation import ClearanceModel, CollisionScene, Limits
 from armid_ros.files.own import is_plan
 from armid_ros.motion import FloatArray
 from armid_ros.recording import write_joint_trajectory
@@ -73,5 +73,5 @@ def write_course(
         for joint, q, unit in zip(robot.joints, course.q[0], robot.position_units, strict=True)
     )
     say(f'starts at rest in the middle of the ranges, {first}: bring the arm there first')
-    for missing in not_checked(Limits.of(robot), space.collision, space.floor, space.obstacles):
+    for missing in space.not_checked(Limits.of(robot)):
         say(f'not checked: {missing}', 'yellow')

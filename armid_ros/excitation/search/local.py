@@ -3,8 +3,8 @@
 """
 The search: from the best of random trajectories to local optima inside every limit.
 
-Several searches begin. After each round the worse half of them ends, so that most of the work is
-spent on the best. The solver is SLSQP of SciPy, sequential quadratic programming;
+Several searches begin. After every second round the worse half of them ends, so that most of the
+work is spent on the best. The solver is SLSQP of SciPy, sequential quadratic programming;
 docs/excitation.md compares it with others. It works on samples; after each round the result is
 examined between them, and where something is wrong there the time is added to those that the next
 round looks at.
@@ -38,7 +38,10 @@ INTERRUPTED, OUT_OF_TIME = 'interrupted', 'time budget'
 _SHARPNESS = (60.0, 300.0)
 
 #: Iterations of a round, and the gain of one below which the search has settled.
-_ROUND, _SETTLED = 25, 0.01
+_ROUND, _SETTLED = 25, 0.005
+
+#: Rounds after which the worse half of the searches ends.
+_ROUNDS = 2
 
 #: Half width of the box a round may not leave, in units of the coefficients' scale.
 _BOX = 0.5
@@ -110,7 +113,8 @@ class Search:
         settings = problem.settings
         share = min(1.0, _CANDIDATE_JOINTS / problem.arm.robot.n_joints)
         self._candidates = max(math.ceil(share * settings.candidates), settings.starts)
-        self._work = self._candidates + settings.iterations + 2 * _ROUND * (settings.starts - 1)
+        others = 2 * _ROUNDS * _ROUND * (settings.starts - 1)
+        self._work = self._candidates + settings.iterations + others
 
     def run(self) -> str:
         """
@@ -174,7 +178,8 @@ class Search:
         branches = [_Branch(self, objective, watched, start) for start in starts]
         while branches:
             for branch in branches:
-                branch.advance()
+                for _ in range(_ROUNDS):
+                    branch.advance()
             branches = sorted(branches, key=lambda branch: branch.cost)[: -(-len(branches) // 2)]
             branches = [branch for branch in branches if branch.left > 0]
 
@@ -206,6 +211,8 @@ class _Branch:
 
     def advance(self) -> None:
         """Run the solver for a round, within a box about the last feasible trajectory."""
+        if self.left <= 0:
+            return
         problem, clearance = self.search.problem, self.search.clearance
         settings = problem.settings
         constraints = Constraints.of(

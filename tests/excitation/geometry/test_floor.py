@@ -14,6 +14,7 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.geometry.heights import link_heights, lowest_point, vertical
+from armid_ros.model import LinkFrames
 from armid_ros.motion import Motion
 from armid_ros.robots import collision_model, load_robot, robot_from_urdf, shipped_robots
 import numpy as np
@@ -106,8 +107,9 @@ def test_the_floor_is_where_its_height_and_normal_say(seed):
     q = rng.uniform(-2.0, 2.0, (20, 2))
     lowest = np.min([low for _, low, _ in link_heights(collision, up, q)], axis=0)
     np.testing.assert_allclose(model.smallest(q), lowest + 3.0, atol=1e-6)
-    assert np.all(model._bound(q).min(axis=1) <= lowest + 3.0 + 1e-9)
-    assert np.all(np.isfinite(model._bound(q)))
+    bound = model._bound(LinkFrames.of(collision.robot, q))
+    assert np.all(bound.min(axis=1) <= lowest + 3.0 + 1e-9)
+    assert np.all(np.isfinite(bound))
 
 
 def collision_without_pairs(collision):
