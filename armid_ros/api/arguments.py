@@ -16,7 +16,6 @@ from armid_ros.recording import ReadSettings, Recording, Topic
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.reader import bag_contents
-from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.settings import DEFAULT
 from armid_ros.recording.tables import (
     ColumnSettings,
@@ -185,8 +184,8 @@ def read_recording(
 
 
 def topics_of(path: Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, ...]:
-    """Return the topics of a bag of ROS 2; of other recordings none."""
-    return () if is_table(path) or is_ros1(path) else bag_contents(path, settings)
+    """Return the topics of a bag; of a table none."""
+    return () if is_table(path) else bag_contents(path, settings)
 
 
 def read_all_joints(
@@ -232,10 +231,6 @@ def read_all_joints(
             show(settled)
         return measured(settled)
     if joints is None:
-        if is_ros1(path):
-            raise RecordingError(
-                f'{path}: of a bag of ROS 1 say which joints: --robot or --joints'
-            )
         there = [one for one in topics if one.joints]
         if topic is not None:
             there = [one for one in there if one.name.lstrip('/') == topic.lstrip('/')]

@@ -95,30 +95,25 @@ def _table(
 
 def _bag(path: Path, out: Path | None) -> None:
     from armid_ros.cli import options
-    from armid_ros.recording.ros1 import convert_ros1, copy_renamed, is_ros1
-    from armid_ros.recording.tables import refuse_columns, refuse_units
+    from armid_ros.recording.bag import is_ros1
+    from armid_ros.recording.copying import copy_bag
+    from armid_ros.recording.tables import refuse_columns
 
     said = columns.settings()
-    refuse_columns(path, said)
-    refuse_units(path, said)
-    rename = said.rename
+    refuse_columns(path, said, copied=True)
     if out is None:
         raise RecordingError(f'{path}: --dry-run is for tables; armid inspect shows a bag')
-    if not is_ros1(path) and not rename:
+    if not is_ros1(path) and not said.rename:
         raise RecordingError(
             f'{path}: nothing to do: a bag of ROS 2 stays as it is without --rename'
         )
-    copied = (
-        convert_ros1(path, out, rename)
-        if is_ros1(path)
-        else copy_renamed(path, out, rename, options.read_settings())
-    )
-    for topic, kind, count in copied.topics:
-        say(f'  {topic} ({kind}): {count} messages')
+    copied = copy_bag(path, out, said.rename, options.read_settings())
+    for topic in copied.topics:
+        say(f'  {topic.name} ({topic.type_name}): {topic.count} messages')
     for text in copied.left_out:
         say(f'  left out: {text}')
     if copied.damage:
         say(f'  {copied.damage}')
     if copied.renamed:
         say('  renamed: ' + ', '.join(f'{old} to {new}' for old, new in copied.renamed))
-    say(f'{out}: {sum(count for _, _, count in copied.topics)} messages')
+    say(f'{out}: {sum(topic.count for topic in copied.topics)} messages')

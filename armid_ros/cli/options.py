@@ -19,7 +19,6 @@ from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import read_anything
-from armid_ros.recording.ros1 import is_ros1
 from armid_ros.recording.tables import is_table, TablePlan
 from armid_ros.robots import (
     driven_in_words,
@@ -116,8 +115,7 @@ def _loaded(
     if source != '-':
         return load_robot(source, gravity=gravity, joints=chosen)
     for path in bags:
-        bag = not (is_table(path) or is_ros1(path))
-        text = read_robot_description(path, read_settings()) if bag else None
+        text = None if is_table(path) else read_robot_description(path, read_settings())
         if text is not None:
             return robot_from_urdf(text, gravity=gravity, joints=chosen, source=str(path))
     raise RobotError(

@@ -21,7 +21,7 @@ from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.signals import Conditioning, conditioning, SignalSettings
 from armid_ros.model import BaseParameters
 from armid_ros.recording import ReadSettings, Recording
-from armid_ros.recording.pieces import read_pieces
+from armid_ros.recording.reader import read_pieces
 
 SCHEMA = 'armid/fleet/1'
 #: Bags that the filters are chosen by, of as many arms where there are.

@@ -10,14 +10,15 @@ the nodes; none of it needs ROS.
 """
 
 from armid_ros.recording.bag import Bag, topics
+from armid_ros.recording.copying import Copied, copy_bag, recover
 from armid_ros.recording.joint_state.encoder import (
     joint_state_cdr,
     write_joint_states,
     write_recording,
 )
-from armid_ros.recording.mcap.recover import recover, RecoveryReport
+from armid_ros.recording.message_types import string_cdr
 from armid_ros.recording.qos import LATCHED
-from armid_ros.recording.reader import read_recording
+from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
     given_twice,
     PartnerMotion,
@@ -30,7 +31,6 @@ from armid_ros.recording.recording import (
 )
 from armid_ros.recording.settings import ReadSettings
 from armid_ros.recording.source import RawMessage, Topic
-from armid_ros.recording.string_message import read_robot_description, string_cdr
 from armid_ros.recording.trajectory import (
     joint_trajectory_cdr,
     read_waypoints,
@@ -57,7 +57,8 @@ __all__ = [
     'write_joint_trajectory',
     'read_waypoints',
     'recover',
-    'RecoveryReport',
+    'copy_bag',
+    'Copied',
     'write_joint_states',
     'joint_state_cdr',
     'string_cdr',

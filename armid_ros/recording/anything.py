@@ -7,12 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-import tempfile
 
-from armid_ros.errors import RecordingError
 from armid_ros.recording.reader import read_recording
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.ros1 import convert_ros1, is_ros1
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.tables import (
     ColumnSettings,
@@ -78,25 +75,9 @@ def read_anything(
         return measured(settled)
     refuse_columns(path, columns)
     called = [name_in_file(joint, columns.rename) for joint in joints]
-    recording = (
-        _read_ros1(path, called, topic)
-        if is_ros1(path)
-        else read_recording(path, joints=called, topic=topic, settings=settings)
-    )
+    recording = read_recording(path, joints=called, topic=topic, settings=settings)
     others = tuple(
         replace(other, joint=renamed(other.joint, columns.rename)) for other in recording.others
     )
     named = replace(recording, joints=tuple(joints), others=others)
     return in_si(named, columns, slides)
-
-
-def _read_ros1(path: Path, joints: Sequence[str], topic: str | None) -> Recording:
-    """Read a bag of ROS 1 as what it becomes in ROS 2."""
-    with tempfile.TemporaryDirectory(prefix='armid-') as folder:
-        copy = Path(folder, 'bag')
-        convert_ros1(path, copy)
-        try:
-            recording = read_recording(copy, joints=joints, topic=topic)
-        except RecordingError as error:
-            raise RecordingError(str(error).replace(str(copy), str(path))) from error
-    return replace(recording, source=str(path))

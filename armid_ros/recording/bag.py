@@ -29,6 +29,13 @@ from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Source, Topic
 from armid_ros.recording.sqlite_source import SqliteSource
 
+
+def _ros1(path: Path, settings: ReadSettings) -> Source:
+    from armid_ros.recording.ros1_source import Ros1Source  # takes as long as to read a bag
+
+    return Ros1Source(path, settings)
+
+
 _STORAGES: dict[str, Callable[[Path, ReadSettings], Source]] = {
     '.mcap': McapSource,
     '.db3': SqliteSource,
@@ -60,7 +67,7 @@ class Bag:
         Parameters
         ----------
         path : str or Path
-            A rosbag2 directory, or a file .mcap, .db3, .mcap.zstd or .db3.zstd.
+            A rosbag2 directory, a file .mcap, .db3, .mcap.zstd or .db3.zstd, or a .bag of ROS 1.
         settings : ReadSettings
             What to check, and how much memory to take.
 
@@ -118,6 +125,32 @@ class Bag:
                 self._damage.add(f'{FILE_NAME} counts {count} messages of {name}, there are none')
         return tuple(merged.values())
 
+    def topic_of(self, type_name: str, wanted: str | None = None) -> Topic:
+        """
+        Return the only topic of a type, or the one of it that is wanted.
+
+        Raises
+        ------
+        RecordingError
+            There is none, or there are several.
+
+        """
+        name = None if wanted is None else '/' + wanted.lstrip('/')
+        topics = self.topics()
+        found = [
+            topic
+            for topic in topics
+            if topic.type_name == type_name and name in (None, '/' + topic.name.lstrip('/'))
+        ]
+        if len(found) == 1:
+            return found[0]
+        listed = ', '.join(f'{topic.name} ({topic.type_name})' for topic in topics) or 'none'
+        problem = 'several topics' if found else 'no topic'
+        asked = f' called {wanted}' if wanted else ''
+        raise RecordingError(
+            f'{self.path}: {problem} of {type_name}{asked}; the topics are {listed}'
+        )
+
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
         count = 0
@@ -149,7 +182,7 @@ class Bag:
 
     def _open(self, file: Path) -> Source:
         """Open one file."""
-        storage = _STORAGES[_storage_suffix(file)]
+        storage = _STORAGES.get(_storage_suffix(file), _ros1)
         with reading(file, RecordingError):
             plain = self._unpacked(file) if file.suffix in _COMPRESSED else file
             source: Source = storage(plain, self._settings)
@@ -181,6 +214,11 @@ class Bag:
         return MessageBlock.joined(messages, block.log_time, block.publish_time)
 
 
+def is_ros1(path: Path) -> bool:
+    """Whether a path is a bag of ROS 1 by its name."""
+    return path.suffix.lower() == '.bag'
+
+
 def _storage_suffix(file: Path) -> str:
     """Return '.mcap', '.db3', or what else a file is called."""
     return Path(file.stem).suffix if file.suffix in _COMPRESSED else file.suffix
@@ -191,7 +229,7 @@ def _files_of(path: Path) -> BagMetadata:
     if not os.path.lexists(path):
         raise RecordingError(f'{path}: there is no such bag')
     if not path.is_dir():
-        if _storage_suffix(path) not in _STORAGES:
+        if _storage_suffix(path) not in _STORAGES and not is_ros1(path):
             raise RecordingError(
                 f'{path}: not a bag; give a rosbag2 directory, or a file .mcap or .db3'
             )

@@ -13,11 +13,10 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import write_joint_states
-from armid_ros.recording.message_types import BYTE_ORDERS, STRING
+from armid_ros.recording.message_types import BYTE_ORDERS, STRING, string_cdr
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray
-from armid_ros.recording.string_message import string_cdr
 from armid_ros.recording.writer import BagWriter, whole_bag
 from armid_ros.robots import Robot
 import numpy as np
@@ -125,13 +124,7 @@ def read_accelerations(
 
     """
     with Bag(path, settings) as bag:
-        found = {t.name: t.type_name for t in bag.topics()}
-        if found.get(topic) != IMU:
-            listed = ', '.join(name for name, kind in found.items() if kind == IMU)
-            raise RecordingError(
-                f'{path}: there is no topic {topic} of {IMU}; of that type there are: '
-                f'{listed or "none"}'
-            )
+        bag.topic_of(IMU, topic)
         messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
     if not messages:
         raise RecordingError(f'{path}: {topic} has no messages')

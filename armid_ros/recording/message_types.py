@@ -139,3 +139,9 @@ def header_stamp(data: bytes) -> int:
     """Return the stamp of a serialised message that begins with a header [ns]; 0 if unset."""
     seconds, nanoseconds = (_LITTLE if data[1] & 1 else _BIG)(data, 4)
     return int(seconds) * 10**9 + int(nanoseconds)
+
+
+def string_cdr(text: str) -> bytes:
+    """Serialise a std_msgs/String."""
+    content = text.encode() + b'\0'
+    return b'\x00\x01\x00\x00' + struct.pack('<I', len(content)) + content

@@ -5,33 +5,23 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+import struct
 
 from armid_ros.errors import nearest, RecordingError
 from armid_ros.files import reading
-from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
-from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
-from armid_ros.recording.series import (
-    choose_clock,
-    clock_problem,
-    gather,
-    MAX_NOT_FINITE,
-    merged,
-    not_finite,
-    ordered,
-    recorded,
-)
+from armid_ros.recording.series import assemble
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 import numpy as np
 
-_QUANTITIES = ('position', 'velocity', 'effort')
 #: This many messages tell which joints a topic names.
 _PEEK_MESSAGES = 1000
 
@@ -92,72 +82,117 @@ def read_recording(
                         settings.require(size, f'{where}: the recording')
                         pieces.append(piece)
         damage = bag.damage
-    check_joints(where, decoder, joints)
-    with reading(where, RecordingError):
-        return assemble(str(path), name, joints, pieces, decoder, damage)
+    return assembled(path, name, joints, pieces, decoder, damage)
 
 
-def assemble(
-    path: str,
+def assembled(
+    path: str | Path,
     topic: str,
     joints: tuple[str, ...],
     pieces: list[JointSamples],
     decoder: JointStateDecoder,
     damage: str,
 ) -> Recording:
-    """Make one recording of all messages."""
+    """Make one recording of the messages of a topic; those decoded are let go."""
     where = f'{path}: {topic}'
-    counts: Counter[str] = Counter()
-    gathered = gather(pieces)
-    pieces.clear()
-    clock, note = choose_clock(gathered)
-    for states in gathered if clock == 'receive' else ():
-        assert states.receive is not None
-        problem = clock_problem(states.receive, states.values[0])
-        if problem:
-            raise RecordingError(
-                f'{where} has no usable time: {note}, and receive times {problem}'
-            )
-    series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
-    quantities, absent = _measured_quantities(where, series)
-    bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))
-    dropped = int(bad.sum())
-    if dropped > MAX_NOT_FINITE * len(series):
-        raise RecordingError(
-            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
-        )
-    counts['nan'] += dropped
-    samples = JointSamples(joints, series.stamps, quantities)
-    samples = samples.select(~bad) if dropped else samples
-    stamps = samples.stamps
-    if len(stamps) < 2:
-        lost = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
-        raise RecordingError(
-            f'{where}: {len(stamps)} samples are left of {decoder.messages} messages '
-            f'({", ".join(lost) or "the bag is too short"})'
-        )
+    check_joints(where, decoder, joints)
     if damage:
-        length = (stamps[-1] - stamps[0]) * 1e-9
-        read = f'{decoder.messages} messages over {length:.4g} s could be read'
-        damage = f'of a damaged bag {read}: {damage}'
-    met = {
-        **counts,
-        'messages': decoder.messages,
-        'malformed': decoder.malformed,
-        'not_finite': culprits,
-        'absent': absent,
-        'clock_note': note,
-        'damage': damage,
-    }
-    return recorded(
-        samples,
-        met,
-        start_ns=int(stamps[0]),
-        source=path,
-        topic=topic,
-        clock=clock,
-        others=tuple(PositionRange(name, *ends) for name, ends in decoder.others.items()),
-    )
+        damage = f'of a damaged bag {decoder.messages} messages could be read: {damage}'
+    with reading(where, RecordingError):
+        return assemble(
+            where,
+            joints,
+            pieces,
+            Counter(),
+            {
+                'messages': decoder.messages,
+                'malformed': decoder.malformed,
+                'damage': damage,
+            },
+            source=str(path),
+            topic=topic,
+            others=tuple(PositionRange(name, *ends) for name, ends in decoder.others.items()),
+        )
+
+
+def read_pieces(
+    path: str | Path,
+    *,
+    joints: Sequence[str],
+    topic: str | None = None,
+    samples: int,
+    keep: Callable[[Recording], int],
+    settings: ReadSettings = DEFAULT,
+) -> Iterator[tuple[Recording, bool]]:
+    """
+    Yield the measurements of some joints piece by piece, in the order of storage.
+
+    Parameters
+    ----------
+    path, joints, topic, settings
+        As of ``read_recording``.
+    samples : int
+        Messages that a piece reads at most, besides those carried over from the one before.
+    keep : callable
+        Asked of every piece but the last; what lies before the stamp it returns [ns] is let go.
+
+    Yields
+    ------
+    piece : Recording
+        With times from its own first sample on.
+    last : bool
+        Whether it is the last one.
+
+    Raises
+    ------
+    RecordingError
+        As ``read_recording``.
+
+    """
+    joints = tuple(joints)
+    with Bag(path, settings) as bag:
+        chosen, *others = choose_topics(bag, joints, topic)
+        if others:
+            raise RecordingError(
+                f'{path}: joints are spread over {chosen.name} and {others[0].name}, which cannot '
+                'be read piece by piece: merge them with joint_state_merger'
+            )
+        decoder = JointStateDecoder(joints)
+        held: list[JointSamples] = []
+        new = 0
+
+        def made(damage: str = '') -> Recording:
+            return assembled(path, chosen.name, joints, list(held), decoder, damage)
+
+        for part in _parts(bag, chosen, decoder, samples):
+            if new and new + len(part) > samples:
+                piece = made()
+                yield piece, False
+                held, new = list(_from(held, keep(piece), piece.clock)), 0
+            held.append(part)
+            new += len(part)
+        yield made(bag.damage), True
+
+
+def _parts(
+    bag: Bag, topic: Topic, decoder: JointStateDecoder, most: int
+) -> Iterator[JointSamples]:
+    """Yield the messages of a topic, so many at a time at most."""
+    with reading(bag.path, RecordingError):
+        for block in joint_state_blocks(bag, topic):
+            for states in decoder.decode(block):
+                for start in range(0, len(states), most):
+                    yield states.select(slice(start, start + most))
+
+
+def _from(held: Sequence[JointSamples], stamp: int, clock: str) -> Iterator[JointSamples]:
+    """Yield what messages have from a stamp on."""
+    for states in held:
+        stamps = states.stamps if clock == 'header' else states.receive
+        assert stamps is not None
+        late = stamps >= stamp
+        if late.any():
+            yield states.select(np.flatnonzero(late))
 
 
 def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[Topic, ...]:
@@ -259,23 +294,46 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
     )
 
 
-def _measured_quantities(
-    where: str, series: JointSamples
-) -> tuple[tuple[FloatArray | None, ...], tuple[str, ...]]:
-    """Tell quantities that were measured from those never filled in."""
-    absent: list[str] = []
-    kept: list[FloatArray | None] = []
-    for name, values in zip(_QUANTITIES, series.values, strict=True):
-        if values is None:
-            lacking = list(series.joints)
-        else:
-            # NaN in the first sample of a joint is a matter of its column, and rare.
-            suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
-            lacking = [series.joints[j] for j in suspect if np.isnan(values[:, j]).all()]
-        if lacking:
-            everyone = len(lacking) == len(series.joints)
-            absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
-        kept.append(None if lacking else values)
-    if kept[0] is None:
-        raise RecordingError(f'{where} has no {absent[0]}')
-    return tuple(kept), tuple(absent)
+def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -> str | None:
+    """
+    Return the robot description a bag holds.
+
+    Parameters
+    ----------
+    path : str or Path
+        A rosbag2 directory, or a bare file.
+    settings : ReadSettings
+        Whether checksums are compared, and how much memory to take.
+
+    Returns
+    -------
+    str or None
+        The last one published on a std_msgs/String topic whose name ends in 'robot_description';
+        None when there is none.
+
+    Raises
+    ------
+    RecordingError
+        The bag cannot be read, or holds several descriptions on topics of several robots.
+
+    """
+    with Bag(path, settings) as bag:
+        texts: dict[str, str] = {}
+        for topic in bag.topics():
+            if topic.type_name != STRING or not topic.name.endswith('robot_description'):
+                continue
+            for block in bag.blocks(topic.name):
+                cdr = block.message(len(block) - 1)
+                order = BYTE_ORDERS.get(cdr[:2])
+                if order is None or len(cdr) < 8:
+                    continue
+                (length,) = struct.unpack_from(order + 'I', cdr, 4)
+                text = cdr[8 : 8 + length].rstrip(b'\0').decode('utf-8', 'replace')
+                if text and length <= len(cdr) - 8:
+                    texts[topic.name] = text
+    if len(set(texts.values())) > 1:
+        raise RecordingError(
+            f'{path}: holds the descriptions of several robots ({", ".join(texts)}); '
+            'save the one meant as a URDF file'
+        )
+    return next(iter(texts.values()), None)

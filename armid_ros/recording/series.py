@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.recording import Clock, ReadReport, Recording, TimeGap
@@ -27,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
+_QUANTITIES = ('position', 'velocity', 'effort')
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
@@ -115,24 +117,18 @@ def clock_problem(
     return ''
 
 
-def ordered(samples: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
-    """Return messages in order of time, counting what had to be done for it."""
-    if clock == 'receive':
-        assert samples.receive is not None
-        samples = replace(samples, stamps=samples.receive)
-    stamped = samples.stamps != 0
-    if not stamped.all():
-        counts['unstamped'] += int((~stamped).sum())
-        samples = samples.select(stamped)
-    return longest_in_order(samples, counts)
-
-
-def longest_in_order(series: JointSamples, counts: Counter[str]) -> JointSamples:
+def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSamples:
     """Return the longest stretch between restarts of the clock, in order of time."""
-    steps = np.abs(np.diff(series.stamps))
-    if len(series) >= _AROUND and (steps > RESTART_NS).any():
-        around = median_filter(series.stamps, _AROUND, mode='mirror')
-        stray = np.abs(series.stamps - around) > RESTART_NS + 2 * np.median(steps)
+    if clock == 'receive':
+        assert series.receive is not None
+        series = replace(series, stamps=series.receive)
+    stray = series.stamps == 0
+    steps = np.abs(np.diff(series.stamps[~stray]))
+    if len(steps) >= _AROUND - 1 and (steps > RESTART_NS).any():
+        stamps = series.stamps[~stray]
+        around = median_filter(stamps, _AROUND, mode='mirror')
+        stray[~stray] = np.abs(stamps - around) > RESTART_NS + 2 * np.median(steps)
+    if stray.any():
         counts['unstamped'] += int(stray.sum())
         series = series.select(~stray)
     run = longest_run(series.stamps)
@@ -335,34 +331,114 @@ def _resampled(
     return JointSamples(series.joints, stamps, values), valid, equal
 
 
-def recorded(samples: JointSamples, met: Mapping[str, Any], **about: Any) -> Recording:
+def assemble(
+    where: str,
+    joints: tuple[str, ...],
+    pieces: list[JointSamples],
+    counts: Counter[str],
+    met: Mapping[str, Any],
+    **about: Any,
+) -> Recording:
     """
-    Make a recording of samples in order of time, positions continuous over whole turns.
+    Make one recording of samples that may be late, repeated, spread or not finite.
 
     Parameters
     ----------
-    samples : JointSamples
-        Two or more; nobody else has their arrays.
+    where : str
+        File and topic or column, for messages.
+    joints : tuple of str
+        In the order of the recording.
+    pieces : list of JointSamples
+        In the order of storage; the list is emptied, so that memory is let go.
+    counts : Counter
+        What was counted so far, by attribute of the report.
     met : mapping of str to value
-        What was met so far, by attribute of the report.
+        What else was met, by attribute of the report; its messages among it.
     **about
         Other attributes of the recording.
 
+    Raises
+    ------
+    RecordingError
+        There is no usable time, or too little is left.
+
     """
+    gathered = gather(pieces)
+    pieces.clear()
+    clock, note = choose_clock(gathered)
+    for states in gathered if clock == 'receive' else ():
+        if states.receive is None:
+            raise RecordingError(f'{where}: {note}; name another with --time, or give --rate')
+        problem = clock_problem(states.receive, states.values[0])
+        if problem:
+            raise RecordingError(
+                f'{where} has no usable time: {note}, and receive times {problem}'
+            )
+    series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
+    quantities, absent = _measured_quantities(where, series)
+    bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))
+    dropped = int(bad.sum())
+    if dropped > MAX_NOT_FINITE * len(series):
+        raise RecordingError(
+            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
+        )
+    counts['nan'] += dropped
+    samples = JointSamples(joints, series.stamps, quantities)
+    samples = samples.select(~bad) if dropped else samples
+    stamps = samples.stamps
+    if len(stamps) < 2:
+        lost = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
+        raise RecordingError(
+            f'{where}: {len(stamps)} samples are left of {met["messages"]} messages '
+            f'({", ".join(lost) or "the recording is too short"})'
+        )
     q, dq, tau = samples.values
     assert q is not None
     q, wrapped = unwrapped(q)
-    t = (samples.stamps - samples.stamps[0]) * 1e-9
+    t = (stamps - stamps[0]) * 1e-9
     for array in (t, q, dq, tau):
         if array is not None:
             array.setflags(write=False)  # so that it need not be copied
+    found = {'not_finite': culprits, 'absent': absent, 'clock_note': note, **counts, **met}
     report = ReadReport(
-        **met,
+        **found,
         samples=len(samples),
         gaps=gaps(t),
-        unwrapped=tuple(samples.joints[k] for k in wrapped),
+        unwrapped=tuple(joints[k] for k in wrapped),
     )
-    return Recording(joints=samples.joints, t=t, q=q, dq=dq, tau=tau, report=report, **about)
+    return Recording(
+        joints=joints,
+        t=t,
+        q=q,
+        dq=dq,
+        tau=tau,
+        start_ns=int(stamps[0]),
+        clock=clock,
+        report=report,
+        **about,
+    )
+
+
+def _measured_quantities(
+    where: str, series: JointSamples
+) -> tuple[tuple[FloatArray | None, ...], tuple[str, ...]]:
+    """Tell quantities that were measured from those never filled in."""
+    absent: list[str] = []
+    kept: list[FloatArray | None] = []
+    for name, values in zip(_QUANTITIES, series.values, strict=True):
+        if values is None:
+            lacking = list(series.joints)
+        else:
+            # NaN in the first sample of a joint is a matter of its column, and rare.
+            suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
+            lacking = [series.joints[j] for j in suspect if np.isnan(values[:, j]).all()]
+        if lacking:
+            everyone = len(lacking) == len(series.joints)
+            absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
+        kept.append(None if lacking else values)
+    if kept[0] is None:
+        raise RecordingError(f'{where} has no {absent[0]}')
+    return tuple(kept), tuple(absent)
 
 
 def gaps(t: FloatArray) -> tuple[TimeGap, ...]:

@@ -14,11 +14,9 @@ from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import Measured
-from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING
+from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING, string_cdr
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Topic
-from armid_ros.recording.string_message import string_cdr
 from armid_ros.recording.writer import whole_bag
 import numpy as np
 from rosbags.serde import SerdeError
@@ -155,7 +153,7 @@ def read_waypoints(
 
     """
     with Bag(path, settings) as bag:
-        chosen = _choose_topic(bag, topic)
+        chosen = bag.topic_of(JOINT_TRAJECTORY, topic)
         cdr = b''
         for block in bag.blocks(chosen.name):
             cdr = block.message(len(block) - 1)
@@ -203,19 +201,3 @@ def _waypoints(where: str, message: Any, joints: tuple[str, ...]) -> ReadWaypoin
         raise RecordingError(f'{where}: the points have no positions')
     rates = quantity('velocities'), quantity('accelerations')
     return ReadWaypoints(joints, t, q, *rates, quantity('effort'))
-
-
-def _choose_topic(bag: Bag, wanted: str | None) -> Topic:
-    """Return the topic to read."""
-    candidates = [topic for topic in bag.topics() if topic.type_name == JOINT_TRAJECTORY]
-    if wanted is not None:
-        name = '/' + wanted.lstrip('/')
-        candidates = [topic for topic in candidates if '/' + topic.name.lstrip('/') == name]
-    if len(candidates) == 1:
-        return candidates[0]
-    listed = ', '.join(f'{topic.name} ({topic.type_name})' for topic in bag.topics()) or 'none'
-    problem = 'several topics' if candidates else 'no topic'
-    asked = f' called {wanted}' if wanted else ''
-    raise RecordingError(
-        f'{bag.path}: {problem} of {JOINT_TRAJECTORY}{asked}; the topics are {listed}'
-    )

@@ -338,6 +338,8 @@ class BagWriter:
         """
         Write all topics and messages of a source, with types, QoS and times as they are.
 
+        Topics whose messages are those of ROS 1 are left out.
+
         Parameters
         ----------
         source : Source
@@ -346,7 +348,7 @@ class BagWriter:
             Returns what is written in place of a message, given its topic and CDR.
 
         """
-        topics = {topic.name: topic for topic in source.topics()}
+        topics = {one.name: one for one in source.topics() if one.encoding != 'ros1'}
         for topic in topics.values():
             kept = topic.message_type
             add = partial(
@@ -358,6 +360,8 @@ class BagWriter:
             except RecordingError:
                 add(definition=text, type_hash=digest)
         for message in source.messages():
+            if message.topic not in topics:
+                continue
             cdr = message.cdr if change is None else change(topics[message.topic], message.cdr)
             self.write(message.topic, cdr, message.log_time_ns, message.publish_time_ns)
 

@@ -11,6 +11,7 @@ from armid_ros.files import read_text
 from armid_ros.identification.parameters_file import read_parameters
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.recording import Bag, read_recording, recover
+from armid_ros.recording.tables import open_table
 from armid_ros.robots import load_robot
 import pytest
 
@@ -28,6 +29,8 @@ READERS = {
     'bag.db3.zstd': lambda path: read_recording(path, joints=['a']),
     'cut.mcap': lambda path: recover(path, path.parent / 'out'),
     'metadata.yaml': lambda path: Bag(path.parent),
+    'bag.bag': Bag,
+    **{f'table.{end}': open_table for end in ('csv', 'csv.gz', 'npz', 'mat', 'h5', 'parquet')},
 }
 
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged bags: what is read of them is what was recorded, or it is said."""
 
-from pathlib import Path
 import sqlite3
 import struct
 import zlib
@@ -255,50 +254,45 @@ def edit_database(path, edits):
     database.close()
 
 
-@given(edits=st.lists(SQL_EDIT, min_size=1, max_size=3))
-def test_sqlite_cells(folder, edits):
-    path = folder / 'work' / 'cells'
+def database_bag(folder):
+    """Return a bag of a database that is as it was."""
+    path = folder / 'work' / 'database'
     path.mkdir(exist_ok=True)
     text = (folder / 'none' / 'metadata.yaml').read_text()
     (path / 'metadata.yaml').write_text(text.replace('none_0.mcap', 'bag.db3'))
     (path / 'bag.db3').write_bytes((folder / 'bag.db3').read_bytes())
+    return path
+
+
+@given(edits=st.lists(SQL_EDIT, min_size=1, max_size=3))
+def test_sqlite_cells(folder, edits):
+    path = database_bag(folder)
     edit_database(path / 'bag.db3', edits)
     judge('SQLite, cells', read, path, swing(), fewer_are_said)
 
 
 @given(edits=st.lists(BYTE_EDIT, min_size=1, max_size=4), head=st.booleans())
 def test_sqlite_bytes(folder, edits, head):
-    path = folder / 'work' / 'pages'
-    path.mkdir(exist_ok=True)
-    text = (folder / 'none' / 'metadata.yaml').read_text()
-    (path / 'metadata.yaml').write_text(text.replace('none_0.mcap', 'bag.db3'))
-    content = (folder / 'bag.db3').read_bytes()
+    path = database_bag(folder)
+    content = (path / 'bag.db3').read_bytes()
     size = 4096 * 6 if head else len(content)
     mutant = edited_bytes(content[:size], edits) + content[size:]
     (path / 'bag.db3').write_bytes(mutant)
     judge('SQLite, bytes', read, path, swing(), fewer_are_said)
 
 
-@given(edits=st.lists(TEXT_EDIT, min_size=1, max_size=3))
-def test_metadata_text(folder, edits):
-    bag = metadata_bag(folder)
-    text = (folder / 'zstd' / 'metadata.yaml').read_text()
-    (bag / 'metadata.yaml').write_text(edited_text(text, edits), errors='surrogatepass')
-    judge('metadata.yaml, text', read, bag, swing(), agrees)
-
-
-@given(edits=st.lists(TREE_EDIT, min_size=1, max_size=3))
-def test_metadata_tree(folder, edits):
-    bag = metadata_bag(folder)
-    tree = yaml.safe_load((folder / 'zstd' / 'metadata.yaml').read_text())
-    (bag / 'metadata.yaml').write_text(to_yaml(edited_tree(tree, edits)))
-    judge('metadata.yaml, tree', read, bag, swing(), agrees)
-
-
-def metadata_bag(folder):
+@given(
+    edits=st.one_of(
+        st.lists(TEXT_EDIT, min_size=1, max_size=3).map(lambda e: (edited_text, e)),
+        st.lists(TREE_EDIT, min_size=1, max_size=3).map(lambda e: (edited_tree, e)),
+    )
+)
+def test_metadata(folder, edits):
     bag = folder / 'work' / 'described'
-    if not bag.exists():
-        bag.mkdir()
-        content = (folder / 'zstd' / 'zstd_0.mcap').read_bytes()
-        Path(bag / 'zstd_0.mcap').write_bytes(content)
-    return bag
+    bag.mkdir(exist_ok=True)
+    (bag / 'zstd_0.mcap').write_bytes((folder / 'zstd' / 'zstd_0.mcap').read_bytes())
+    text = (folder / 'zstd' / 'metadata.yaml').read_text()
+    edit, what = edits
+    mutant = edit(text, what) if edit is edited_text else to_yaml(edit(yaml.safe_load(text), what))
+    (bag / 'metadata.yaml').write_text(mutant, errors='surrogatepass')
+    judge('metadata.yaml', read, bag, swing(), agrees)

@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What holds a JointState in another form is read by its schema, or refused; all of it or said."""
 
-import json
-
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording
+from armid_ros.recording.copying import copy_bag
 from armid_ros.recording.joint_state.encoder import joint_state_cdr
 from armid_ros.recording.message_types import JOINT_STATE, message_type
 from armid_ros.recording.reader import bag_contents
-from armid_ros.recording.ros1 import copy_renamed
 from mcap.writer import Writer as McapFileWriter
 import numpy as np
 import pytest
@@ -68,29 +66,6 @@ def one_more_field(path, recording, stamps):
     return by_schema(path, recording, stamps, lines, mode='position control')
 
 
-def ros1(path, recording, stamps):
-    store = get_typestore(Stores.ROS1_NOETIC)
-    types, messages = store.types, []
-    for k, ((sec, nanosec), q, dq, tau) in enumerate(fields_of(recording, stamps)):
-        stamp = types['builtin_interfaces/msg/Time'](sec, nanosec)
-        header = types['std_msgs/msg/Header'](k, stamp, 'base')
-        message = types[JOINT_STATE](header, list(JOINTS), q, dq, tau)
-        messages.append(bytes(store.serialize_ros1(message, JOINT_STATE)))
-    return write(path, 'sensor_msgs/JointState', 'ros1msg', '', 'ros1', messages, stamps)
-
-
-def in_json(path, recording, stamps):
-    messages = [
-        json.dumps({
-            'header': {'stamp': {'sec': sec, 'nanosec': nanosec}}, 'name': list(JOINTS),
-            'position': q.tolist(), 'velocity': dq.tolist(), 'effort': tau.tolist(),
-        }).encode()
-        for (sec, nanosec), q, dq, tau in fields_of(recording, stamps)
-    ]  # fmt: skip
-    kind = 'sensor_msgs/msg/JointState'
-    return write(path, kind, 'jsonschema', '{}', 'json', messages, stamps)
-
-
 def inside_another_type(path, recording, stamps):
     name = 'franka_msgs/msg/FrankaRobotState'
     own = 'sensor_msgs/JointState desired_joint_state\nsensor_msgs/JointState measured_joint_state'
@@ -127,7 +102,7 @@ def file_packed_by_zstd(path, recording, stamps):
 @pytest.mark.parametrize(
     'made',
     [
-        exchanged_fields, one_more_field, ros1, in_json, inside_another_type,
+        exchanged_fields, one_more_field, inside_another_type,
         messages_packed_by_zstd, file_packed_by_zstd,
     ],
 )  # fmt: skip
@@ -139,11 +114,10 @@ def test_what_holds_a_joint_state_is_read(made, swinging, stamps, tmp_path, asse
     assert any(topic.joints == JOINTS for topic in bag_contents(path))
 
 
-@pytest.mark.parametrize('made', [exchanged_fields, ros1])
-def test_joints_of_another_schema_are_not_renamed(made, swinging, stamps, tmp_path):
-    path = made(tmp_path / 'bag.mcap', swinging, stamps)
+def test_joints_of_another_schema_are_not_renamed(swinging, stamps, tmp_path):
+    path = exchanged_fields(tmp_path / 'bag.mcap', swinging, stamps)
     with pytest.raises(RecordingError, match='/joint_states is no'):
-        copy_renamed(path, tmp_path / 'out', [('elbow', 'knee')])
+        copy_bag(path, tmp_path / 'out', [('elbow', 'knee')])
     assert not (tmp_path / 'out').exists()
 
 

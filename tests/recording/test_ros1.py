@@ -5,8 +5,8 @@
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording, topics, write_recording
 from armid_ros.recording.anything import read_anything
+from armid_ros.recording.copying import copy_bag
 from armid_ros.recording.recording import Recording
-from armid_ros.recording.ros1 import convert_ros1, copy_renamed
 from armid_ros.recording.tables import ColumnSettings
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def bag(tmp_path, motion):
 
 
 def test_what_ros_2_has_a_type_for_is_kept_and_the_rest_is_named(bag, motion, tmp_path):
-    copied = convert_ros1(bag, tmp_path / 'out')
+    copied = copy_bag(bag, tmp_path / 'out')
     assert {topic.name: topic.count for topic in topics(tmp_path / 'out')} == {
         '/joint_states': 300,
         '/robot_description': 1,
@@ -93,7 +93,7 @@ def test_a_copy_of_a_bag_differs_in_the_names_alone(motion, tmp_path):
     t, q, tau = motion
     recording = Recording(joints=JOINTS, t=t, q=q, tau=tau, start_ns=T0 * 10**9)
     write_recording(tmp_path / 'bag', recording, robot_description='<robot name="r"/>')
-    copied = copy_renamed(tmp_path / 'bag', tmp_path / 'out', (('fer_', ''),))
+    copied = copy_bag(tmp_path / 'bag', tmp_path / 'out', (('fer_', ''),))
     assert copied.renamed == (('fer_joint1', 'joint1'), ('fer_joint2', 'joint2'))
     again = read_recording(tmp_path / 'out', joints=('joint1', 'joint2'))
     np.testing.assert_array_equal(again.tau, tau)
@@ -108,5 +108,5 @@ def test_what_is_no_bag_is_refused_and_leaves_nothing(tmp_path):
     path = tmp_path / 'run.bag'
     path.write_text('no bag at all')
     with pytest.raises(RecordingError, match=r'run\.bag: cannot be read as a bag of ROS 1'):
-        convert_ros1(path, tmp_path / 'out')
+        copy_bag(path, tmp_path / 'out')
     assert not (tmp_path / 'out').exists()

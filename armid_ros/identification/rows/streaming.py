@@ -25,7 +25,7 @@ from armid_ros.identification.rows.signals import (
     SignalSettings,
 )
 from armid_ros.recording import ReadSettings, Recording
-from armid_ros.recording.pieces import read_pieces
+from armid_ros.recording.reader import read_pieces
 import numpy as np
 import numpy.typing as npt
 

@@ -3,8 +3,8 @@
 """
 Messages that hold a JointState, in the CDR of sensor_msgs/JointState.
 
-Of ROS 1 and JSON, of a schema with other fields, or of a type with a JointState inside, as
-franka_msgs/FrankaRobotState: they are read by the schema that the bag has of them.
+Those of a schema with other fields, or of a type with a JointState inside, as
+franka_msgs/FrankaRobotState, are read by the schema that the bag has of them.
 
 """
 
@@ -12,9 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import cache
-import json
 import re
-from types import SimpleNamespace
 from typing import Any
 
 from armid_ros.errors import RecordingError
@@ -22,8 +20,7 @@ from armid_ros.recording.bag import Bag
 from armid_ros.recording.message_types import JOINT_STATE, MessageType, store_for
 from armid_ros.recording.source import MessageBlock, Topic
 import numpy as np
-from rosbags.typesys import get_types_from_msg, get_typestore, Stores
-from rosbags.typesys.store import Typestore
+from rosbags.typesys import get_typestore, Stores
 
 _INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
 _FIELDS = ('position', 'velocity', 'effort')
@@ -48,7 +45,7 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
     Raises
     ------
     RecordingError
-        The bag's schema of them has no names or positions, or nobody reads their encoding.
+        The bag's schema of them has no names or positions, or they are not in CDR.
 
     """
     where = f'{bag.path}: {topic.name}'
@@ -61,18 +58,14 @@ def _converter(where: str, topic: Topic) -> Convert | None:
     """Return what makes an object with the fields of a JointState; None where CDR is one."""
     described = topic.message_type
     path = [] if described.name == JOINT_STATE else [_inside(described)]
-    if topic.encoding == 'json':
-        return lambda data: _part(
-            json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields)), path
-        )
-    if topic.encoding not in ('cdr', 'ros1'):
+    if topic.encoding != 'cdr':
         raise RecordingError(
-            f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2, ROS 1 and JSON can be "
-            'read: record it with ros2 bag record'
+            f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
+            'with ros2 bag record'
         )
     if is_plain(topic):
         return None
-    store = store_for(described) if topic.encoding == 'cdr' else _ros1_store(described)
+    store = store_for(described)
     fields = {name for name, _ in store.fielddefs[JOINT_STATE][1]}
     lacking = {'header', 'name', 'position'} - fields
     if lacking:
@@ -80,8 +73,7 @@ def _converter(where: str, topic: Topic) -> Convert | None:
             f'{where}: its schema of {JOINT_STATE} has {", ".join(sorted(fields))}, and no '
             f'{", ".join(sorted(lacking))}; record the type of sensor_msgs'
         )
-    read = store.deserialize_cdr if topic.encoding == 'cdr' else store.deserialize_ros1
-    return lambda data: _part(read(data, described.name), path)
+    return lambda data: _part(store.deserialize_cdr(data, described.name), path)
 
 
 def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
@@ -92,13 +84,11 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
         try:
             found = convert(block.message(at))
             stamp = found.header.stamp
-            sec = getattr(stamp, 'sec', getattr(stamp, 'secs', 0))
-            nanosec = getattr(stamp, 'nanosec', getattr(stamp, 'nsec', getattr(stamp, 'nsecs', 0)))
             header = types['std_msgs/msg/Header'](
-                types['builtin_interfaces/msg/Time'](int(sec), int(nanosec)), ''
+                types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
             )
             values = [np.array(getattr(found, name, []), np.float64) for name in _FIELDS]
-            state = types[JOINT_STATE](header, [str(name) for name in found.name], *values)
+            state = types[JOINT_STATE](header, list(found.name), *values)
             messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
         except Exception:  # the decoder counts it as malformed
             messages.append(bytes(4))
@@ -125,13 +115,3 @@ def _standard(described: MessageType) -> bool:
         return True
     standard, store = get_typestore(Stores.ROS2_JAZZY), store_for(described)
     return store.hash_rihs01(JOINT_STATE) == standard.hash_rihs01(JOINT_STATE)
-
-
-def _ros1_store(described: MessageType) -> Typestore:
-    """Return what reads messages of ROS 1 as the bag describes them."""
-    store = get_typestore(Stores.ROS1_NOETIC)
-    if described.definition and described.name not in store.fielddefs:
-        known = store.fielddefs
-        types = get_types_from_msg(described.definition, described.name)
-        store.register({name: of for name, of in types.items() if name not in known})
-    return store

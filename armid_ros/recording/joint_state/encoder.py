@@ -12,10 +12,9 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
-from armid_ros.recording.message_types import JOINT_STATE, STRING
+from armid_ros.recording.message_types import JOINT_STATE, STRING, string_cdr
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.source import IntArray
-from armid_ros.recording.string_message import string_cdr
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
 import numpy.typing as npt

@@ -147,48 +147,46 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
     if data[: len(MAGIC)] != MAGIC:
         raise RecordingError(f'{path}: not an MCAP file, or its beginning is damaged')
     found = FileMap(data)
-    outside = _walk(found)
-    definitions = outside.definitions
+    definitions, data_end, footer, position = _walk(found)
     if not found.finished:
         found.damage.add(
             'the file ends without its index, as after a crash: readable up to byte '
-            f'{outside.position} of {len(data)}'
+            f'{position} of {len(data)}'
         )
-    if check and outside.footer is not None:
-        definitions = _believed(found, definitions, outside.footer)
+    if check and footer is not None:
+        definitions = _believed(found, definitions, footer)
     for opcode, begin, end in definitions:
         add_definition(found, opcode, data[begin:end])
-    if check and outside.data_end is not None and found.loose:
-        _check_data(found, outside.data_end)
+    if (
+        check
+        and data_end is not None
+        and found.loose
+        and data_end + RECORD_HEADER + 4 <= len(data)
+    ):
+        (crc,) = struct.unpack_from('<I', data, data_end + RECORD_HEADER)
+        if crc and zlib.crc32(memoryview(data)[:data_end]) != crc:
+            found.damage.add('the checksum of the file is wrong: any of its messages may be')
     return found
 
 
-@dataclass
-class _Outside:
+def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
     """
-    What stands outside of chunks.
+    Note chunks, indexes and loose messages.
 
-    Attributes
-    ----------
+    Returns
+    -------
     definitions : list of (int, int, int)
-        Opcode, beginning and end of schemas, channels and statistics.
+        Opcode, beginning and end of schemas, channels and statistics outside of chunks.
     data_end, footer : int or None
         Where those records are.
     position : int
         How far the records go.
 
     """
-
-    definitions: list[tuple[int, int, int]] = field(default_factory=list)
-    data_end: int | None = None
-    footer: int | None = None
-    position: int = len(MAGIC)
-
-
-def _walk(found: FileMap) -> _Outside:
-    """Note chunks, indexes and loose messages; return what else there is."""
-    data, outside = found.data, _Outside()
-    size, position = len(data), outside.position
+    data = found.data
+    definitions: list[tuple[int, int, int]] = []
+    data_end = footer = None
+    size, position = len(data), len(MAGIC)
     while position + RECORD_HEADER <= size:
         opcode, length = struct.unpack_from('<BQ', data, position)
         begin, end = position + RECORD_HEADER, position + RECORD_HEADER + length
@@ -201,22 +199,21 @@ def _walk(found: FileMap) -> _Outside:
         if opcode in _NOTED:
             _NOTED[opcode](found, begin, end)
         elif opcode in _DEFINITIONS:
-            outside.definitions.append((opcode, begin, end))
+            definitions.append((opcode, begin, end))
         elif opcode == Opcode.DATA_END:
-            outside.data_end = position
+            data_end = position
         position = end
         if opcode == Opcode.FOOTER:
             found.finished = data[end : end + len(MAGIC)] == MAGIC
-            outside.footer = begin if length == _FOOTER.size else None
+            footer = begin if length == _FOOTER.size else None
             break
-    outside.position = position
     behind = size - position - len(MAGIC)
     if found.finished and behind > 0:
         found.damage.add(
             f'{behind} bytes follow the end of the file, as of another file that was appended: '
             f'only what is before byte {position + len(MAGIC)} is read; cut the file there'
         )
-    return outside
+    return definitions, data_end, footer, position
 
 
 def add_definition(found: FileMap, opcode: int, content: bytes) -> None:
@@ -298,12 +295,3 @@ def _believed(
     found.finished = False
     found.damage.add('the checksum of the index at the end is wrong; it is not used')
     return [entry for entry in definitions if entry[1] < start]
-
-
-def _check_data(found: FileMap, data_end: int) -> None:
-    """Compare the checksum of all messages outside chunks, where the writer made one."""
-    if data_end + RECORD_HEADER + 4 > len(found.data):
-        return
-    (crc,) = struct.unpack_from('<I', found.data, data_end + RECORD_HEADER)
-    if crc and zlib.crc32(memoryview(found.data)[:data_end]) != crc:
-        found.damage.add('the checksum of the file is wrong: any of its messages may be')

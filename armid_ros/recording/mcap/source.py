@@ -17,7 +17,7 @@ from pathlib import Path
 
 from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
-from armid_ros.recording.mcap.chunks import Content, Contents
+from armid_ros.recording.mcap.chunks import Content, contents
 from armid_ros.recording.mcap.content import (
     BLOCK_MESSAGES,
     Gathered,
@@ -68,7 +68,6 @@ class McapSource:
         self._settings = settings
         self._found = map_file(_map(path), path, check=settings.check_crc)
         self._counts: dict[int, int] | None = None
-        self._contents = Contents(self._found, settings)
 
     @property
     def damage(self) -> str:
@@ -78,7 +77,6 @@ class McapSource:
     def close(self) -> None:
         """Let go of the file."""
         self._found = FileMap(b'')
-        self._contents = Contents(self._found, self._settings)
 
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics, in order of appearance."""
@@ -139,7 +137,7 @@ class McapSource:
     ) -> Iterator[tuple[int, bytes | mmap.mmap, IntArray]]:
         """Yield first log time, content, and where in it messages of some channels begin."""
         data = self._found.data
-        for chunk, unpacked in self._contents.of(chunks):
+        for chunk, unpacked in contents(self._found, chunks, self._settings):
             content, offsets, rows = self._messages_in(chunk, unpacked)
             yield chunk.start_time, content, self._possible(offsets, rows, channels)
         loose = np.array(self._found.loose, np.int64)
@@ -159,7 +157,10 @@ class McapSource:
             self._counts = dict(summary.channel_message_counts)
             return self._counts
         counts: dict[int, int] = {}
-        inside = (self._channels_in(unpacked) for _, unpacked in self._contents.of(found.chunks))
+        inside = (
+            self._channels_in(unpacked)
+            for _, unpacked in contents(found, found.chunks, self._settings)
+        )
         loose = heads(found.data, np.array(found.loose, np.int64))['channel']
         for rows in (loose, *inside):
             for channel, count in zip(*np.unique(rows, return_counts=True), strict=True):

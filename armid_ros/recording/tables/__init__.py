@@ -8,12 +8,12 @@ Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets.
 
 """
 
-from armid_ros.recording.tables.files import is_table, open_table, side_by_side
+from armid_ros.recording.tables.files import is_table, open_table
 from armid_ros.recording.tables.measured import measured
-from armid_ros.recording.tables.of_bags import in_si, refuse_columns, refuse_units
 from armid_ros.recording.tables.plan import plan, TablePlan
 from armid_ros.recording.tables.settings import ColumnSettings, name_in_file, numbers, renamed
-from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.tables.table import side_by_side, Table, TableColumn
+from armid_ros.recording.tables.units import in_si, refuse_columns
 
 __all__ = [
     'TableColumn',
@@ -28,7 +28,6 @@ __all__ = [
     'open_table',
     'plan',
     'refuse_columns',
-    'refuse_units',
     'renamed',
     'side_by_side',
 ]

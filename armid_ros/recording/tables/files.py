@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
@@ -12,7 +12,7 @@ from armid_ros.files import open_regular
 from armid_ros.recording.tables.arrays import read_hdf5, read_matlab, read_numpy
 from armid_ros.recording.tables.messages import settled
 from armid_ros.recording.tables.parquet import INFO, read_lerobot, read_parquet
-from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.tables.table import Table
 from armid_ros.recording.tables.text import read_text
 
 _READERS: dict[str, Callable[[Path], Table]] = {
@@ -70,49 +70,6 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
         raise RecordingError(
             f'{path}: cannot be read, it may be damaged: {type(problem).__name__}: {said}'
         ) from problem
-
-
-def side_by_side(tables: Sequence[Table]) -> Table:
-    """
-    Join tables of the same samples, column by column.
-
-    Names that several have are preceded by the file's: 'currents:Joint_1'.
-
-    Raises
-    ------
-    RecordingError
-        They differ in length.
-
-    """
-    if len(tables) == 1:
-        return tables[0]
-    lengths = [len(table) for table in tables]
-    if len(set(lengths)) > 1:
-        counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
-        raise RecordingError(f'{counted}; files side by side hold the same samples')
-    names = [name for table in tables for name in dict.fromkeys(table.names)]
-    columns = [
-        TableColumn(
-            name if names.count(name) == 1 else f'{_stem(table)}:{name}',
-            column.values,
-            column.array and f'{_stem(table)}:{column.array}',
-            column.unit,
-        )
-        for table in tables
-        for name, column in zip(table.names, table.columns, strict=True)
-    ]
-    return Table(
-        ' + '.join(table.source for table in tables),
-        tuple(columns),
-        tables[0].described,
-        tables[0].first_line,
-        next((table.rate_hz for table in tables if table.rate_hz), None),
-        tuple(note for table in tables for note in table.notes),
-    )
-
-
-def _stem(table: Table) -> str:
-    return Path(table.source).name.split('.')[0]
 
 
 def _suffix(path: Path) -> str:

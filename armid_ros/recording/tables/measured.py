@@ -5,21 +5,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.recording import PositionRange, Recording
-from armid_ros.recording.series import longest_in_order, MAX_NOT_FINITE, not_finite, recorded
-from armid_ros.recording.tables.of_bags import in_si
-from armid_ros.recording.tables.patterns import not_chosen
+from armid_ros.recording.series import assemble, MAX_NOT_FINITE
 from armid_ros.recording.tables.plan import TablePlan
-from armid_ros.recording.tables.settings import TIME_UNITS
-from armid_ros.recording.tables.words import QuantityName
+from armid_ros.recording.tables.settings import renamed, TIME_UNITS
+from armid_ros.recording.tables.units import in_si
 import numpy as np
-import numpy.typing as npt
 
 #: Times later than this count from 1970 [s].
 _EPOCH = 1e8
@@ -39,46 +36,56 @@ def measured(plan: TablePlan) -> Recording:
     """
     table = plan.table
     t, start = _times(plan)
-    values = {source.quantity: source.values() for source in plan.sources}
     stamped = np.isfinite(t)
-    kept, culprits = _finite(plan, stamped, values)
-    rows = np.flatnonzero(kept & stamped)
-    quantities = (values.get(name) for name in ('position', 'velocity', 'effort'))
-    read = tuple(None if array is None else array[rows] for array in quantities)
-    counts: Counter[str] = Counter()
-    stamps = np.round(t[rows] * 1e9).astype(np.int64)
-    series = longest_in_order(JointSamples(plan.joints, stamps, read), counts)
-    found = len(series) + counts['duplicates']
-    if counts['duplicates'] > 0.5 * found:
+    for source in plan.sources:
+        for column in source.chosen.columns:
+            empty = np.flatnonzero(~np.isfinite(column.values))
+            if len(empty) > MAX_NOT_FINITE * len(table):
+                raise RecordingError(
+                    f'{table.source}: column {column.name} has no number in {len(empty)} of '
+                    f'{len(table)} rows, first in {table.where(int(empty[0]))}; leave '
+                    f'{source.quantity} out with --{source.quantity} none, or mend the file'
+                )
+    if np.mean(~stamped) > MAX_NOT_FINITE:
         raise RecordingError(
-            f'{table.source}: column {plan.time.name if plan.time else "time"} stands still in '
-            f'{counts["duplicates"]} of {found} rows; name another with --time, or give --rate'
+            f'{table.source}: {np.sum(~stamped)} of {len(table)} rows have a time that is no '
+            'number'
         )
-    if len(series) < 2:
-        raise RecordingError(f'{table.source}: {len(series)} rows with numbers are left')
-    counts['nan'] = int((~kept & stamped).sum())
-    counts['unstamped'] += int((~stamped).sum())
-    met = {
-        **counts,
-        'messages': len(table),
-        'not_finite': culprits,
-        'absent': plan.absent,
-        'damage': '; '.join(note for note in table.notes if 'cut off' in note),
-    }
+    read = {source.quantity: source.values()[stamped] for source in plan.sources}
+    samples = JointSamples(
+        plan.joints,
+        start + np.round(t[stamped] * 1e9).astype(np.int64),
+        (read['position'], read.get('velocity'), read.get('effort')),
+    )
     topic = 'the table'
     if plan.source('effort') is None and plan.unread:
         topic += f' (--effort names columns of it; not read are {plan.unread})'
-    about = {'start_ns': start, 'source': table.source, 'topic': topic}
-    recording = recorded(series, met, others=tuple(_others(plan)), **about)
+    where = table.source
+    if plan.time is not None:
+        where += f': column {plan.time.name}'
+    recording = assemble(
+        where,
+        plan.joints,
+        [samples],
+        Counter(unstamped=int(np.sum(~stamped))),
+        {
+            'messages': len(table),
+            'absent': plan.absent,
+            'damage': '; '.join(note for note in table.notes if 'cut off' in note),
+        },
+        source=table.source,
+        topic=topic,
+        others=tuple(_others(plan)),
+    )
     sides = replace(plan.settings, degrees=False, position_scale=(), effort_scale=())
     return in_si(recording, sides)  # units are those of the plan
 
 
 def _times(plan: TablePlan) -> tuple[FloatArray, int]:
-    """Return times [s], and the stamp of the first row [ns]; zero where it is not known."""
+    """Return times [s] since a stamp, and that stamp [ns]; 1 s where none is known."""
     if plan.time is None:
         assert plan.rate_hz is not None
-        return np.arange(len(plan.table)) / plan.rate_hz, 0
+        return np.arange(len(plan.table)) / plan.rate_hz, 10**9
     scale = TIME_UNITS[plan.time_unit]
     values = np.where(np.abs(plan.time.values * scale) < _LATEST, plan.time.values, np.nan)
     stamped = np.flatnonzero(np.isfinite(values) & (values != 0.0))  # noqa: RUF069 - as it is written
@@ -90,41 +97,16 @@ def _times(plan: TablePlan) -> tuple[FloatArray, int]:
     origin = float(there[0])
     epoch = origin * scale > _EPOCH
     # Differences first: counted from 1970, nanoseconds do not fit into a float.
-    return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 0
-
-
-def _finite(
-    plan: TablePlan,
-    stamped: npt.NDArray[np.bool_],
-    values: Mapping[QuantityName, FloatArray],
-) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
-    """Return where everything is a number, and whose values are not; refuse when many are not."""
-    bad, culprits = not_finite(plan.joints, values.items(), len(stamped))
-    lost = int((bad | ~stamped).sum())
-    if lost > MAX_NOT_FINITE * len(stamped):
-        for source in plan.sources:
-            for column in source.chosen.columns:
-                empty = np.flatnonzero(~np.isfinite(column.values))
-                if len(empty) > MAX_NOT_FINITE * len(stamped):
-                    where = plan.table.where(int(empty[0]))
-                    raise RecordingError(
-                        f'{plan.table.source}: column {column.name} has no number in '
-                        f'{len(empty)} of {len(stamped)} rows, first in {where}; leave '
-                        f'{source.quantity} out with --{source.quantity} none, or mend the file'
-                    )
-        raise RecordingError(
-            f'{plan.table.source}: {lost} of {len(stamped)} rows have a value, or a time, that is '
-            f'no number ({"; ".join(culprits) or "time"})'
-        )
-    return ~bad, culprits
+    return (values - origin) * scale, int(origin * scale * 1e9) if epoch else 10**9
 
 
 def _others(plan: TablePlan) -> Iterator[PositionRange]:
     """Yield where joints are that were not asked for, as far as their unit is known."""
-    source, settings = plan.source('position'), plan.settings
-    if source is None or settings.gear or settings.zero or len(set(source.factor)) != 1:
+    source, settings = plan.sources[0], plan.settings
+    if settings.gear or settings.zero or len(set(source.factor)) != 1:
         return
-    for joint, column in not_chosen(plan.table, source.chosen, settings.rename).items():
-        values = column.values[np.isfinite(column.values)] * source.factor[0]
+    for label, column in source.chosen.rest.items():
+        values = column.finite * source.factor[0]
         if len(values):
+            joint = renamed(label, settings.rename)
             yield PositionRange(joint, float(values.min()), float(values.max()))

@@ -9,12 +9,12 @@ What exports of messages write into cells: names of joints, stamps in two column
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 import re
 
-from armid_ros.motion import FloatArray
 from armid_ros.recording.tables.table import Table, TableColumn
 from armid_ros.recording.tables.words import TIMES, words_of
 import numpy as np
@@ -44,46 +44,35 @@ def _with_names(table: Table) -> Table:
             match = _NUMBERED.fullmatch(column.name)
             if match and match[1].startswith(prefix) and match[2] in named:
                 values.setdefault(match[1], {})[match[2]] = column
-        whole = {key: columns for key, columns in values.items() if columns.keys() == named.keys()}
-        if not whole:
-            continue
-        first = [str(cells[0]) for cells in named.values()]
-        every = np.unique(np.concatenate(list(named.values()))).tolist()
-        joints = [joint for joint in dict.fromkeys([*first, *every]) if joint]
-        apart = [
-            TableColumn(f'{key}[{joint}]', _of_joint(joint, named, columns), key)
-            for key, columns in whole.items()
-            for joint in joints
-        ]
-        taken = {column for columns in whole.values() for column in columns.values()}
+        said = np.array(list(named.values()))
+        joints = [joint for joint in dict.fromkeys([*said[:, 0], *np.unique(said)]) if joint]
+        apart: list[TableColumn] = []
+        taken: list[TableColumn] = []
+        for key, columns in values.items():
+            if columns.keys() != named.keys():
+                continue
+            taken += columns.values()
+            numbers = np.array([columns[number].values for number in named])
+            for joint in joints:
+                own = said == joint
+                of_joint = np.where(own, numbers, 0.0).sum(axis=0)
+                of_joint[~own.any(axis=0)] = np.nan
+                apart.append(TableColumn(f'{key}[{joint}]', of_joint, key))
         rest = [column for column in table.columns if column not in taken]
         table = replace(table, columns=(*rest, *apart))
     return table
 
 
-def _of_joint(
-    joint: str, named: Mapping[str, npt.NDArray[np.str_]], columns: Mapping[str, TableColumn]
-) -> FloatArray:
-    values = np.full(len(next(iter(named.values()))), np.nan)
-    for number, cells in named.items():
-        values = np.where(cells == joint, columns[number].values, values)
-    return values
-
-
 def _with_dates(table: Table) -> Table:
     """Read columns of dates as seconds since 1970."""
-    dates = []
+    dates: dict[str, TableColumn] = {}
     for name, cells in table.words.items():
-        try:
-            if not len(cells) or not cells[0][:4].isdigit():
-                continue
-            seconds = [datetime.fromisoformat(cell).timestamp() for cell in cells]
-        except ValueError:
-            continue
-        dates.append(TableColumn(name, np.array(seconds), unit='s'))
-    read = {column.name for column in dates}
-    words = {name: cells for name, cells in table.words.items() if name not in read}
-    return replace(table, columns=(*table.columns, *dates), words=words)
+        if len(cells) and cells[0][:4].isdigit():
+            with suppress(ValueError):
+                seconds = [datetime.fromisoformat(cell).timestamp() for cell in cells]
+                dates[name] = TableColumn(name, np.array(seconds), unit='s')
+    words = {name: cells for name, cells in table.words.items() if name not in dates}
+    return replace(table, columns=(*table.columns, *dates.values()), words=words)
 
 
 def _with_stamps(table: Table) -> Table:

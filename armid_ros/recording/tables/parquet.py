@@ -49,10 +49,8 @@ def read_lerobot(path: Path, episode: int | None = None) -> Table:
         rate = finite(info['fps'], 'fps') if 'fps' in info else None
         if rate is not None and rate <= 0.0:
             raise RecordingError(f'fps is {rate:g}, and has to be positive')
-    chosen = 0 if episode is None else episode
+    chosen = episode or 0
     files = sorted((path / 'data').glob('**/*.parquet'))
-    if not files:
-        raise RecordingError(f'{path}: there is no data/**/*.parquet')
     own = [file for file in files if file.name == f'episode_{chosen:06d}.parquet']
     for file in own or [file for file in files if not file.name.startswith('episode_')]:
         columns, _ = _columns(file, names)
@@ -90,8 +88,8 @@ def _columns(
             values = column.cast('int64').to_numpy(zero_copy_only=False)
             columns.append(TableColumn(field.name, values.astype(float), unit=field.type.unit))
         elif types.is_integer(field.type) or types.is_floating(field.type):
-            values = column.to_numpy(zero_copy_only=False).astype(float)
-            columns.append(TableColumn(field.name, values))
+            values = column.to_numpy(zero_copy_only=False)
+            columns.append(TableColumn(field.name, values.astype(float)))
         elif types.is_string(field.type) or types.is_large_string(field.type):
             words[field.name] = [one or '' for one in column.to_pylist()]
         elif types.is_list(field.type) or types.is_fixed_size_list(field.type):
@@ -100,24 +98,24 @@ def _columns(
                 if any(isinstance(cell, str) for cell in cells):
                     words[name] = [str(cell or '') for cell in cells]
                 else:
-                    numbers = np.array(cells, dtype=float)
-                    columns.append(TableColumn(name, numbers, field.name))
+                    columns.append(TableColumn(name, np.array(cells, dtype=float), field.name))
     return tuple(columns), words
 
 
 def _elements(
-    path: Path, name: str, rows: Sequence[Sequence[Any] | None], labels: Sequence[str]
+    path: Path, name: str, cells: Sequence[Sequence[Any] | None], labels: Sequence[str]
 ) -> Iterator[tuple[str, list[Any]]]:
     """Yield name and cells of each element of lists of equal length; None where a row has none."""
-    width = max((len(row) for row in rows if row is not None), default=0)
+    rows = [one or () for one in cells]
+    width = max(map(len, rows), default=0)
     if any(isinstance(row[0], (list, dict)) for row in rows if row):
         return
-    short = next((k for k, row in enumerate(rows) if row is not None and len(row) != width), None)
-    if short is not None:
+    odd = next((k for k, row in enumerate(rows) if row and len(row) != width), None)
+    if odd is not None:
         raise RecordingError(
-            f'{path}: row {short}, column {name}: a list of {len(rows[short] or ())}, the others '
-            f'have {width}'
+            f'{path}: row {odd}, column {name}: a list of {len(rows[odd])}, the others have '
+            f'{width}'
         )
     for k in range(width):
-        label = labels[k] if len(labels) == width else str(k)
-        yield f'{name}[{label}]', [None if row is None else row[k] for row in rows]
+        label = labels[k] if len(labels) == width else k
+        yield f'{name}[{label}]', [row[k] if row else None for row in rows]

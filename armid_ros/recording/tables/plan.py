@@ -4,30 +4,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import textwrap
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.series import LARGEST
-from armid_ros.recording.tables.guess import guess, guess_time, Incomplete, incomplete, named_time
-from armid_ros.recording.tables.patterns import choose, ChosenColumns
+from armid_ros.recording.tables.families import choose, Family, guess, guess_time, incomplete
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint, TIME_UNITS
 from armid_ros.recording.tables.table import Table, TableColumn
-from armid_ros.recording.tables.words import CURRENTS, is_quantity, QuantityName, words_of
+from armid_ros.recording.tables.words import CURRENTS, QuantityName, words_of
 import numpy as np
 import numpy.typing as npt
 
 _OTHERS: tuple[QuantityName, ...] = ('velocity', 'effort')
+_SI = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}
 #: What a unit is in SI.
 _FACTORS = {'deg': np.pi / 180, 'deg/s': np.pi / 180, 'mN m': 1e-3, 'N mm': 1e-3, 'mA': 1e-3}
 _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s': 1e-3}
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
 #: Sampling periods that are recognised from the numbers alone [s].
 _STEP = (2e-5, 0.5)
-#: Positions further from zero are hardly in rad or m.
-_FAR = 4.5 * np.pi
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class QuantitySource:
     ----------
     quantity : str
         'position', 'velocity' or 'effort'.
-    chosen : ChosenColumns
+    chosen : Family
         Columns.
     unit : str
         Of the file.
@@ -53,7 +50,7 @@ class QuantitySource:
     """
 
     quantity: QuantityName
-    chosen: ChosenColumns
+    chosen: Family
     unit: str
     factor: FloatArray
     guessed: bool
@@ -79,8 +76,6 @@ class TablePlan:
         None for even steps of a known rate.
     time_unit : str
         Of that column.
-    time_guessed : bool
-        Whether nobody named it.
     rate_hz : float or None
         Where there is no column of time.
     sources : tuple of QuantitySource
@@ -89,8 +84,8 @@ class TablePlan:
         What was said.
     notes : tuple of str
         What a person should look at.
-    incomplete : tuple of Incomplete
-        What has columns for some of the joints only, and is not read.
+    missing : dict
+        By quantity that is not read: pattern of columns for some joints, and those it lacks.
 
     """
 
@@ -98,12 +93,16 @@ class TablePlan:
     joints: tuple[str, ...]
     time: TableColumn | None
     time_unit: str
-    time_guessed: bool
     rate_hz: float | None
     sources: tuple[QuantitySource, ...]
     settings: ColumnSettings
-    notes: tuple[str, ...] = ()
-    incomplete: tuple[Incomplete, ...] = ()
+    notes: tuple[str, ...]
+    missing: dict[QuantityName, tuple[str, tuple[str, ...]]]
+
+    @property
+    def time_guessed(self) -> bool:
+        """Whether nobody named the column of time."""
+        return self.settings.time is None and self.time is not None
 
     @property
     def guessed(self) -> bool:
@@ -117,15 +116,17 @@ class TablePlan:
     @property
     def absent(self) -> tuple[str, ...]:
         """Return what is not read, in words: 'effort of wrist'."""
-        of = {one.quantity: f' of {", ".join(one.lacking)}' for one in self.incomplete}
-        return tuple(name + of.get(name, '') for name in _OTHERS if self.source(name) is None)
+        return tuple(
+            f'{quantity} of {", ".join(lacking)}' if pattern else quantity
+            for quantity, (pattern, lacking) in self.missing.items()
+        )
 
     @property
     def unread(self) -> str:
         """Return the names of the columns that are not read, in words."""
-        taken = [column for source in self.sources for column in source.chosen.columns]
-        rest = [one for one in self.table.columns if one is not self.time and one not in taken]
-        return replace(self.table, columns=tuple(rest)).listed() if rest else ''
+        taken = [self.time, *(one for source in self.sources for one in source.chosen.columns)]
+        rest = tuple(one for one in self.table.columns if one not in taken)
+        return replace(self.table, columns=rest).listed() if rest else ''
 
     def lines(self) -> list[str]:
         """Return the plan for a person, in lines."""
@@ -134,23 +135,18 @@ class TablePlan:
         if self.time is None:
             lines.append(f'  time      none; {self.rate_hz:g} samples a second')
         else:
-            lines.append(
-                f'  time      {self.time.name}, in {self.time_unit}'
-                f'{" (guessed)" if self.time_guessed else ""}'
-            )
+            guessed = ' (guessed)' if self.time_guessed else ''
+            lines.append(f'  time      {self.time.name}, in {self.time_unit}{guessed}')
         for source in self.sources:
             names = [column.name for column in source.chosen.columns]
             shown = ', '.join(names) if len(names) <= 3 else f'{names[0]}, .., {names[-1]}'
-            lines.append(
-                f'  {source.quantity:9s} {shown}, in {source.unit}'
-                f'{" (guessed)" if source.guessed else ""}'
-            )
+            guessed = ' (guessed)' if source.guessed else ''
+            lines.append(f'  {source.quantity:9s} {shown}, in {source.unit}{guessed}')
             if source.rivals:
                 lines.append(f'            also fits: {", ".join(source.rivals)}')
-        for quantity in _OTHERS:
-            if self.source(quantity) is None:
-                why = [f': {one}' for one in self.incomplete if one.quantity == quantity]
-                lines.append(f'  {quantity:9s} none{"".join(why)}')
+        for quantity, (pattern, lacking) in self.missing.items():
+            why = f": '{pattern}' has no column of numbers for {', '.join(lacking)}"
+            lines.append(f'  {quantity:9s} none{why if pattern else ""}')
         lines.append(f'  joints    {", ".join(self.joints)}')
         if self.unread:
             lines.append(f'  not read  {self.unread}')
@@ -189,58 +185,45 @@ def plan(
     """
     position = _source(table, 'position', settings, joints)
     if position is None:
-        raise RecordingError(_without_positions(table, settings, joints))
+        pattern, lacking = incomplete(table, 'position', joints or (), settings.rename)
+        if pattern and settings.position is None:
+            raise RecordingError(
+                f"{table.source}: of positions '{pattern}' has no column of numbers for "
+                f'{", ".join(lacking)}; name their columns with --position or --rename, or leave '
+                f'joints out with --joints. Its columns are {table.listed()}'
+            )
+        of_joints = f' of {", ".join(joints)}' if joints else ''
+        raise RecordingError(
+            f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
+            f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
+        )
     names = tuple(joints) if joints else position.chosen.joints(settings.rename)
     sliding = np.zeros(len(names), np.bool_) if slides is None else np.asarray(slides, np.bool_)
-    sources, lacking = [position], []
+    sources = [position]
+    missing: dict[QuantityName, tuple[str, tuple[str, ...]]] = {}
     for quantity in _OTHERS:
+        asked = getattr(settings, quantity) is not None
         found = _source(table, quantity, settings, names)
-        if found is None and joints is None and getattr(settings, quantity) is None:
+        if found is None and joints is None and not asked:
             # its joints are called otherwise, or not at all: their number decides
             numbers = [str(k) for k in range(len(position.chosen.columns))]
             found = _source(table, quantity, settings, numbers)
         if found is not None:
             sources.append(found)
-        elif getattr(settings, quantity) is None:
-            lacking.append(incomplete(table, quantity, names, settings.rename))
-    time, unit, rate = _time(table, settings)
-    return TablePlan(
-        table,
-        names,
-        time,
-        unit,
-        settings.time is None and time is not None,
-        rate,
-        tuple(_scaled(source, settings, names, sliding) for source in sources),
-        settings,
-        tuple(_doubts(sources, settings, sliding)),
-        tuple(one for one in lacking if one is not None),
-    )
-
-
-def _without_positions(
-    table: Table, settings: ColumnSettings, joints: Sequence[str] | None
-) -> str:
-    """Say that there are no positions, or of which joints there are none."""
-    known = incomplete(table, 'position', joints or (), settings.rename)
-    if known is not None and settings.position is None:
-        return (
-            f'{table.source}: of positions {known}; name their columns with --position or '
-            f'--rename, or leave joints out with --joints. Its columns are {table.listed()}'
-        )
-    of_joints = f' of {", ".join(joints)}' if joints else ''
-    for name, cells in table.words.items():
-        series = set(cells)
-        if 2 <= len(series) <= len(cells) // 10 and any(map(is_quantity, words_of(min(series)))):
-            return (
-                f'{table.source}: the table is in long form, one value a row: column {name} says '
-                f'of which series ({", ".join(sorted(series)[:3])}, ...); export one column a '
-                'series, or pivot it: one row a stamp'
+        else:
+            none = ('', ())
+            missing[quantity] = (
+                none if asked else incomplete(table, quantity, names, settings.rename)
             )
-    return (
-        f'{table.source}: no columns seem to be positions{of_joints}; name them, as in '
-        f"--position 'q{{}}' or --position a,b,c. Its columns are {table.listed()}"
-    )
+    time, unit, rate = _time(table, settings)
+    effort = next((one for one in sources if one.quantity == 'effort'), None)
+    notes = []
+    if effort is not None and not settings.effort_scale:
+        name = effort.chosen.pattern
+        if effort.unit in ('A', 'mA') or 'load' in name.lower():
+            notes.append(f"efforts '{name}' seem to be currents; --current-gain makes them N m")
+    scaled = tuple(_scaled(source, settings, names, sliding) for source in sources)
+    return TablePlan(table, names, time, unit, rate, scaled, settings, tuple(notes), missing)
 
 
 def _source(
@@ -249,6 +232,7 @@ def _source(
     settings: ColumnSettings,
     joints: Sequence[str] | None,
 ) -> QuantitySource | None:
+    """Return where a quantity comes from, as asked or as guessed; None where it does not."""
     asked = getattr(settings, quantity)
     if asked is not None and asked.lower() == 'none':
         return None
@@ -259,24 +243,22 @@ def _source(
         guesses = guess(table, quantity, joints, settings.rename)
         if not guesses:
             return None
-        chosen = guesses[0]
+        chosen, *others = guesses
         for column in chosen.columns:
             table.column(column.bare_name)  # which has to be one
-        taken = {id(column) for column in chosen.columns}
         rivals = tuple(
             dict.fromkeys(
                 one.pattern
-                for one in guesses[1:]
-                if not taken & {id(column) for column in one.columns}
+                for one in others
+                if set(chosen.columns).isdisjoint(one.columns)
                 and len(one.columns) == len(chosen.columns)
             )
         )[:4]
     unit = next((column.unit for column in chosen.columns if column.unit), '')
     if not unit and set(words_of(chosen.pattern)) & set(CURRENTS):
         unit = 'A'
-    plain = {'position': 'rad', 'velocity': 'rad/s', 'effort': 'N m'}[quantity]
     factor = np.full(len(chosen.columns), _FACTORS.get(unit, 1.0))
-    return QuantitySource(quantity, chosen, unit or plain, factor, asked is None, rivals)
+    return QuantitySource(quantity, chosen, unit or _SI[quantity], factor, asked is None, rivals)
 
 
 def _scaled(
@@ -287,12 +269,12 @@ def _scaled(
 ) -> QuantitySource:
     """Apply what a person says of units; degrees are those of joints that turn."""
     if source.quantity == 'effort':
-        if settings.effort_scale:
-            given = per_joint(settings.effort_scale, joints, 'the scale of efforts')
-            unit = 'units of the file' if source.unit == 'N m' else source.unit
-            factor = given * (1e-3 if source.unit == 'mA' else 1.0)
-            return replace(source, factor=factor, unit=f'{unit} times {_short(given)}')
-        return source
+        if not settings.effort_scale:
+            return source
+        given = per_joint(settings.effort_scale, joints, 'the scale of efforts')
+        unit = 'units of the file' if source.unit == 'N m' else source.unit
+        factor = given * (1e-3 if source.unit == 'mA' else 1.0)
+        return replace(source, factor=factor, unit=f'{unit} times {_short(given)}')
     if settings.position_scale:
         given = per_joint(settings.position_scale, joints, 'the scale of positions')
         return replace(source, factor=given, unit=f'units of the file times {_short(given)}')
@@ -310,49 +292,13 @@ def _scaled(
 
 
 def _short(values: FloatArray) -> str:
-    texts = [f'{value:.6g}' for value in values]
-    return texts[0] if len(set(texts)) == 1 else ', '.join(texts)
-
-
-def _doubts(
-    sources: Sequence[QuantitySource], settings: ColumnSettings, slides: npt.NDArray[np.bool_]
-) -> list[str]:
-    doubts = []
-    for source in sources:
-        amps = source.unit in ('A', 'mA') or 'load' in source.chosen.pattern.lower()
-        if source.quantity == 'effort' and amps and not settings.effort_scale:
-            doubts.append(
-                f"efforts '{source.chosen.pattern}' seem to be currents; --current-gain makes "
-                'them N m'
-            )
-        if source.quantity == 'position' and source.unit == 'rad':
-            values = np.abs(source.values())
-            reach = np.fmax.reduce(np.where(values < LARGEST, values, np.nan))
-            doubts += _far(reach, settings, slides)
-    return doubts
-
-
-def _far(
-    reach: FloatArray, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
-) -> Iterator[str]:
-    """Doubt the unit of positions, given how far each joint is from zero, shape (n,)."""
-    if settings.gear or settings.position_scale:
-        return
-    far = reach > _FAR
-    if np.any(far & ~slides) and not settings.degrees:
-        largest = reach[far & ~slides].max()
-        yield f'positions reach {largest:.4g}: --degrees, or motor angles (--gear)?'
-    if np.any(far & slides):
-        turned = 'pi/180' if settings.degrees else '1'
-        scale = ','.join('0.001' if one else turned for one in slides)
-        largest = reach[far & slides].max()
-        yield f'positions that slide reach {largest:.4g} m: --position-scale {scale} if in mm?'
+    return ', '.join(dict.fromkeys(f'{value:.6g}' for value in values))
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
     """Return the column of time and its unit, or None and the rate."""
     asked = settings.time
-    column: TableColumn | None
+    column: TableColumn | None = None
     if asked is not None and asked.lower() != 'none':
         column = table.column(asked)
         if column is None:
@@ -360,29 +306,13 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
                 f"{table.source}: there is no column '{asked}' of time; its columns are "
                 f'{table.listed()}'
             )
-    elif settings.rate_hz is not None or asked is not None:
-        column = None
-    else:
+    elif settings.rate_hz is None and asked is None:
         column = guess_time(table)
     if column is not None:
         table.column(column.name)  # which has to be one
-        steps = np.diff(column.values[np.isfinite(column.values)])
-        if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would turn the motion round
-            raise RecordingError(
-                f'{table.source}: column {column.name} runs backwards, from '
-                f'{column.values[0]:.6g} to {column.values[-1]:.6g}: turn the rows round if the '
-                'last was measured first, or leave the column out with --time none --rate HZ if '
-                'they are in order'
-            )
-        return column, settings.time_unit or _time_unit(table, column), None
+        return column, _time_unit(table, column, settings.time_unit), None
     rate = settings.rate_hz or table.rate_hz
     if rate is None:
-        named = named_time(table, 0.0)
-        if named is not None and asked is None:
-            raise RecordingError(
-                f'{table.source}: column {named.name} goes up and down, as no time does; does '
-                'every name of the header stand above its own column?'
-            )
         raise RecordingError(
             f'{table.source}: no column of time; name it with --time, or give the samples per '
             f'second with --rate. Its columns are {table.listed()}'
@@ -390,23 +320,27 @@ def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, s
     return None, 's', rate
 
 
-def _time_unit(table: Table, column: TableColumn) -> str:
-    if column.unit in TIME_UNITS:
-        return column.unit
-    steps = np.diff(column.values[np.isfinite(column.values)])
+def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
+    """Return the unit of a column of time: said, in its name, or likely by its steps."""
+    where = f'{table.source}: column {column.name}'
+    steps = np.diff(column.finite)
+    if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would turn the motion round
+        raise RecordingError(
+            f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}: '
+            'turn the rows round if the last was measured first, or leave the column out with '
+            '--time none --rate HZ if they are in order'
+        )
+    if said or column.unit in TIME_UNITS:
+        return said or column.unit
     steps = steps[steps > 0.0]
     if not len(steps):
-        raise RecordingError(f'{table.source}: column {column.name} does not increase')
+        raise RecordingError(f'{where} does not increase')
     step = float(np.median(steps))
-    if step == 1.0 and np.all(steps == np.rint(steps)):  # noqa: RUF069 - a count
-        raise RecordingError(
-            f'{table.source}: column {column.name} counts 1, 2, 3; give its unit with '
-            '--time-unit s or ms, or the samples per second with --rate'
-        )
     fitting = [u for u, scale in TIME_UNITS.items() if _STEP[0] <= step * scale <= _STEP[1]]
-    if not fitting:
+    count = step == 1.0 and np.all(steps == np.rint(steps))  # noqa: RUF069 - 1, 2, 3
+    if count or not fitting:
         raise RecordingError(
-            f'{table.source}: column {column.name} goes in steps of {step:g}; say in which unit '
-            'with --time-unit'
+            f'{where} goes in steps of {step:g}; give its unit with --time-unit s or ms, or the '
+            'samples per second with --rate'
         )
     return fitting[0]

@@ -12,6 +12,8 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 import numpy as np
 
+#: Beginnings of joint names in the file, or whole names, and what to put there instead.
+Rules = Sequence[tuple[str, str]]
 #: Seconds in a unit of time.
 TIME_UNITS = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
 
@@ -75,7 +77,7 @@ class ColumnSettings:
             raise RecordingError('a coupling of motors needs their gear ratios, too')
 
 
-def renamed(name: str, rules: Sequence[tuple[str, str]]) -> str:
+def renamed(name: str, rules: Rules) -> str:
     """Return a joint's name after the first rule that fits: the whole name, or its beginning."""
     for old, new in rules:
         if name == old:
@@ -86,7 +88,7 @@ def renamed(name: str, rules: Sequence[tuple[str, str]]) -> str:
     return name
 
 
-def name_in_file(name: str, rules: Sequence[tuple[str, str]]) -> str:
+def name_in_file(name: str, rules: Rules) -> str:
     """Return what a joint is called in the file, which is what ``renamed`` makes its name of."""
     for old, new in rules:
         if name == new:

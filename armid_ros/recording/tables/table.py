@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 import re
@@ -14,24 +15,19 @@ from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
 
-_UNIT = re.compile(r'\s*[(\[]\s*([^()\[\]\d][^()\[\]]*)\s*[)\]]\s*$')
-#: Endings of names that say a unit.
-_ENDINGS = {
-    'deg_per_s': 'deg/s',
-    'rad_per_s': 'rad/s',
-    'deg': 'deg',
-    'degrees': 'deg',
-    'rad': 'rad',
-    'nm': 'N m',
-    'mnm': 'mN m',
-    'ms': 'ms',
-    'us': 'us',
-    'ns': 'ns',
-    'nsec': 'ns',
-    'sec': 's',
-    's': 's',
-    'ma': 'mA',
-}
+_BRACKETS = re.compile(r'\s*[(\[]\s*([^()\[\]\d][^()\[\]]*)\s*[)\]]\s*$')
+#: Units by what people write for them.
+_UNITS = dict.fromkeys(('nm', 'n*m', 'n.m', 'n·m', 'newton meter'), 'N m')
+_UNITS |= dict.fromkeys(('deg', 'degree', 'degrees'), 'deg')
+_UNITS |= dict.fromkeys(('deg/sec', 'dps', 'deg_per_s'), 'deg/s')
+_UNITS |= dict.fromkeys(('rad', 'radian', 'radians'), 'rad')
+_UNITS |= dict.fromkeys(('rad/sec', 'rad_per_s'), 'rad/s')
+_UNITS |= dict.fromkeys(('s', 'sec', 'seconds'), 's')
+_UNITS |= dict.fromkeys(('amp', 'amps'), 'A') | {'ma': 'mA', 'mnm': 'mN m', 'nmm': 'N mm'}
+_UNITS |= {'ms': 'ms', 'us': 'us', 'ns': 'ns', 'nsec': 'ns'}
+#: Those that names end in without brackets around them, such as 'angle_deg'.
+_ENDINGS: tuple[str, ...] = ('deg_per_s', 'rad_per_s', 'deg', 'degrees', 'rad', 'nm', 'mnm', 'ma')
+_ENDINGS += ('ms', 'us', 'ns', 'nsec', 'sec', 's')
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +62,18 @@ class TableColumn:
         with np.errstate(invalid='ignore'):  # of rubbish that is a signalling NaN
             values = np.where(np.abs(self.values) <= LARGEST, self.values, np.nan)
         object.__setattr__(self, 'values', read_only(values))
-        object.__setattr__(
-            self, 'unit', normal_unit(self.unit) or unit_of(self.array or self.name)
-        )
+        unit = _normal_unit(self.unit) or _unit_of(self.array or self.name)
+        object.__setattr__(self, 'unit', unit)
 
     @property
     def bare_name(self) -> str:
         """Return the name without a unit in brackets behind it."""
-        return self.name if self.array else _UNIT.sub('', self.name)
+        return self.name if self.array else _BRACKETS.sub('', self.name)
+
+    @property
+    def finite(self) -> FloatArray:
+        """Return the values that are numbers."""
+        return self.values[np.isfinite(self.values)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,11 +114,10 @@ class Table:
         empty = {one.name: () for one in self.columns if one not in there}
         object.__setattr__(self, 'columns', there)
         object.__setattr__(self, 'words', {**empty, **self.words})
-        lengths = {len(column.values) for column in self.columns}
-        if not lengths or lengths == {0}:
+        if not there:
             raise RecordingError(f'{self.source}: there is no column of numbers in it')
-        if len(lengths) > 1:
-            counts = ', '.join(f'{c.name} {len(c.values)}' for c in self.columns)
+        if len({len(column.values) for column in there}) > 1:
+            counts = ', '.join(f'{c.name} {len(c.values)}' for c in there)
             raise RecordingError(f'{self.source}: columns differ in length: {counts}')
 
     def __len__(self) -> int:
@@ -158,50 +157,43 @@ class Table:
 
     def listed(self) -> str:
         """Return the names of the columns, elements of arrays in short, for a message."""
-        names: dict[str, int] = {}
-        for column in self.columns:
-            key = f'{column.array.removeprefix("[]")}[..]' if column.array else column.name
-            names[key] = names.get(key, 0) + 1
-        shown = [
-            f'{key[:-4]}[0..{count - 1}]' if key.endswith('[..]') else key
-            for key, count in names.items()
-        ]
-        shown = [' '.join(name.split())[:80] for name in shown]
-        more = f' and {len(shown) - 40} more' if len(shown) > 40 else ''
-        words = [
-            f"{name[:80]} ('{said[0][:40]}')" if len(said) and said[0] else name[:80]
-            for name, said in self.words.items()
-        ]
-        empty = f'; without a number: {", ".join(words[:40])}' if words else ''
-        bare = self.first_line is not None and any(c.array == '[]' for c in self.columns)
-        header = (
-            f'; a header line with names is missing above line {self.first_line}' if bare else ''
+        arrays = Counter(column.array for column in self.columns)
+        shown = dict.fromkeys(
+            f'{c.array.removeprefix("[]")}[0..{arrays[c.array] - 1}]' if c.array else c.name
+            for c in self.columns
         )
-        return ', '.join(shown[:40]) + more + empty + header
+        names = [' '.join(name.split())[:80] for name in shown]
+        words = [
+            f"{name[:80]} ('{cells[0][:40]}')" if len(cells) and cells[0] else name[:80]
+            for name, cells in self.words.items()
+        ]
+        text = _at_most(names)
+        if words:
+            text += f'; without a number: {_at_most(words)}'
+        if self.first_line is not None and '[]' in arrays:
+            text += f'; a header line with names is missing above line {self.first_line}'
+        return text
 
 
-def normal_unit(text: str) -> str:
+def _at_most(names: Sequence[str], most: int = 40) -> str:
+    """Return names with commas, and how many more there are."""
+    more = f' and {len(names) - most} more' if len(names) > most else ''
+    return ', '.join(names[:most]) + more
+
+
+def _normal_unit(text: str) -> str:
     """Return a unit as it is written here: 'deg', 'rad/s', 'N m', 'ms'."""
     text = text.strip().strip('[]()').replace('°', 'deg').replace('\u00b5', 'u')
-    known = {
-        'nm': 'N m', 'n*m': 'N m', 'n.m': 'N m', 'n·m': 'N m', 'newton meter': 'N m',
-        'mnm': 'mN m', 'nmm': 'N mm', 'degree': 'deg', 'degrees': 'deg', 'deg/sec': 'deg/s',
-        'dps': 'deg/s', 'rad/sec': 'rad/s', 'sec': 's', 'seconds': 's', 'radian': 'rad',
-        'radians': 'rad', 'amps': 'A', 'amp': 'A',
-    }  # fmt: skip
-    return known.get(text.lower(), text)
+    return _UNITS.get(text.lower(), text)
 
 
-def unit_of(name: str) -> str:
+def _unit_of(name: str) -> str:
     """Return the unit that a name says: 'deg' of 'q1 [deg]' and of 'act_pos_deg[3]'."""
-    bracket = _UNIT.search(name)
+    bracket = _BRACKETS.search(name)
     if bracket:
-        return normal_unit(bracket[1])
+        return _normal_unit(bracket[1])
     plain = re.sub(r'\[\d+\]$', '', name).rstrip('0123456789_').lower()
-    for ending, unit in _ENDINGS.items():
-        if plain.endswith('_' + ending):
-            return unit
-    return ''
+    return next((_UNITS[end] for end in _ENDINGS if plain.endswith(f'_{end}')), '')
 
 
 def table_of_arrays(
@@ -221,33 +213,57 @@ def table_of_arrays(
 
     """
     usable = {
-        name: np.squeeze(values) if values.ndim > 2 else values
+        name: np.squeeze(values)
         for name, values in arrays.items()
         if values.dtype.kind in 'fiub' and values.size > 1
     }
-    length = _common_length(source, list(usable.values()))
+    counts = Counter(size for values in usable.values() for size in set(values.shape) if size > 1)
+    if not counts:
+        raise RecordingError(f'{source}: there is no array of numbers in it')
+    length = max(counts, key=lambda size: (counts[size] if size > 50 else 0, size))
     columns: list[TableColumn] = []
     for name, values in usable.items():
-        columns += _columns_of(name, values.astype(np.float64), length)
+        if values.ndim > 2 or length not in values.shape:
+            continue
+        numbers = values.astype(np.float64)
+        if numbers.ndim == 1:
+            columns.append(TableColumn(name or '[0]', numbers))
+        else:
+            rows = numbers if len(numbers) == length else numbers.T
+            columns += [TableColumn(f'{name}[{k}]', row, name) for k, row in enumerate(rows.T)]
     return Table(source, tuple(columns), described)
 
 
-def _common_length(source: str, arrays: Sequence[npt.NDArray[np.generic]]) -> int:
-    """Return how many samples most arrays have; of equally many, the larger number."""
-    counts: dict[int, int] = {}
-    for values in arrays:
-        for length in {size for size in values.shape if size > 1}:
-            counts[length] = counts.get(length, 0) + 1
-    if not counts:
-        raise RecordingError(f'{source}: there is no array of numbers in it')
-    return max(counts, key=lambda length: (counts[length] if length > 50 else 0, length))
+def side_by_side(tables: Sequence[Table]) -> Table:
+    """
+    Join tables of the same samples, column by column.
 
+    Names that several have are preceded by the file's: 'currents:Joint_1'.
 
-def _columns_of(name: str, values: FloatArray, length: int) -> list[TableColumn]:
-    if values.ndim == 1 or 1 in values.shape:
-        flat = values.ravel()
-        return [TableColumn(name or '[0]', flat)] if len(flat) == length else []
-    if values.ndim != 2 or length not in values.shape:
-        return []
-    rows = values if values.shape[0] == length else values.T
-    return [TableColumn(f'{name}[{k}]', rows[:, k], name) for k in range(rows.shape[1])]
+    Raises
+    ------
+    RecordingError
+        They differ in length.
+
+    """
+    if len(tables) == 1:
+        return tables[0]
+    if len({len(table) for table in tables}) > 1:
+        counted = ', '.join(f'{table.source} has {len(table)} rows' for table in tables)
+        raise RecordingError(f'{counted}; files side by side hold the same samples')
+    shared = Counter(name for table in tables for name in dict.fromkeys(table.names))
+    columns: list[TableColumn] = []
+    for table in tables:
+        stem = table.source.rpartition('/')[2].split('.')[0]
+        for one in table.columns:
+            name = one.name if shared[one.name] == 1 else f'{stem}:{one.name}'
+            array = one.array and f'{stem}:{one.array}'
+            columns.append(TableColumn(name, one.values, array, one.unit))
+    return Table(
+        ' + '.join(table.source for table in tables),
+        tuple(columns),
+        tables[0].described,
+        tables[0].first_line,
+        next((table.rate_hz for table in tables if table.rate_hz), None),
+        tuple(note for table in tables for note in table.notes),
+    )

@@ -16,16 +16,10 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording.tables.content import read_content
 from armid_ros.recording.tables.table import Table, TableColumn
 import numpy as np
+import numpy.typing as npt
 
-_SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', ' ': 'blanks'}
+_SEPARATORS = {';': 'semicolons', '\t': 'tabs', ',': 'commas', ' ': 'blanks'}
 _COMMENTS = ('#', '%')
-#: How text begins whose characters take two or four bytes.
-_WIDE = {
-    b'\xff\xfe\0\0': 'UTF-32',
-    b'\0\0\xfe\xff': 'UTF-32',
-    b'\xff\xfe': 'UTF-16',
-    b'\xfe\xff': 'UTF-16',
-}
 _EMPTY = ('', 'nan', 'na', 'n/a', 'null', 'none', '-')
 _LIST = re.compile(r'[\[(]([^\[\]()]*)[\])]\s*\)?$')
 _COMMAS = re.compile(r'[,;\s]+')
@@ -47,50 +41,49 @@ def read_text(path: Path) -> Table:
     lines = _lines(path)
     first, header, units = _heading(path, lines)
     separator = _separator(lines[first : first + 20])
-    rows = lines[first:]
     cells = _split(lines[first], separator)
-    names = _names(header, separator, len(cells), path, first)
-    unit_cells = _split(units, separator) if units else [''] * len(names)
-    unit_cells += [''] * (len(names) - len(unit_cells))
-    lists = [_elements(cell) for cell in cells]
-    widths = [None if elements is None else len(elements) for elements in lists]
-    heads = [
-        (name if width is None else f'{name}[{k}]', unit, '' if width is None else name)
-        for name, unit, width in zip(names, unit_cells, widths, strict=True)
-        for k in range(1 if width is None else width)
-    ]
-    names = [name for name, _, _ in heads]
-    values, words, notes = _numbers(path, rows, separator, names, widths, first + 1)
-    columns = tuple(
-        TableColumn(name, column, array if header else '[]', unit)
-        for (name, unit, array), column in zip(heads, values.T, strict=True)
+    names = _split(header, separator) if header else [f'[{k}]' for k in range(len(cells))]
+    if len(names) != len(cells):
+        raise RecordingError(
+            f'{path}: {len(names)} names ({", ".join(names[:6])} ...) stand above {len(cells)} '
+            f'values in line {first + 1}'
+        )
+    widths = [_width(cell) for cell in cells]
+    heads: list[tuple[str, str, str]] = []
+    said = dict(enumerate(_split(units, separator)))
+    for k, (name, width) in enumerate(zip(names, widths, strict=True)):
+        name = name or f'[{k}]'
+        if width is None:
+            heads.append((name, '' if header else '[]', said.get(k, '')))
+        else:
+            heads += [(f'{name}[{i}]', name, said.get(k, '')) for i in range(width)]
+    columns = [name for name, _, _ in heads]
+    values, words, notes = _numbers(path, lines[first:], separator, columns, widths, first + 1)
+    return Table(
+        str(path),
+        tuple(TableColumn(n, v, a, u) for (n, a, u), v in zip(heads, values.T, strict=True)),
+        f'text with {_SEPARATORS[separator]}',
+        first_line=first + 1,
+        notes=notes,
+        words=words,
     )
-    described = f'text with {_SEPARATORS[separator]}'
-    return Table(str(path), columns, described, first_line=first + 1, notes=notes, words=words)
 
 
 def _lines(path: Path) -> list[str]:
+    """Return the lines of a text in UTF-8, UTF-16 or Latin-1."""
     raw = read_content(path)
     if not raw.strip():
         raise RecordingError(f'{path}: the file is empty; record again, or name another file')
-    for start, coding in _WIDE.items():
-        if not raw.startswith(start):
-            continue
-        with suppress(UnicodeDecodeError):
-            raw.decode(coding)
-            raise RecordingError(
-                f'{path}: text in {coding}, not in UTF-8; save it as CSV in UTF-8, or: '
-                f'iconv --from-code {coding} --to-code UTF-8 {path} > utf8.csv'
-            )
-    if b'\0' in raw:
+    wide = raw.startswith((b'\xff\xfe', b'\xfe\xff'))
+    try:
+        text = raw.decode('utf-16' if wide else 'utf-8-sig')
+    except UnicodeDecodeError:
+        text = raw.decode('latin-1')
+    if '\0' in text:
         raise RecordingError(
             f'{path}: is no text, but binary; name the file with the ending of its kind '
             '(.npz, .mat, .parquet, .mcap), or save it as CSV in UTF-8'
         )
-    try:
-        text = raw.decode('utf-8-sig')
-    except UnicodeDecodeError:
-        text = raw.decode('latin-1')
     return text.rstrip().splitlines()
 
 
@@ -100,16 +93,15 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
     comment = ''
     for number, line in enumerate(lines):
         bare = line.strip()
-        if not bare:
-            continue
         if bare.startswith(_COMMENTS):
             comment = bare.lstrip('#% ')
-        elif _has_numbers(bare):
+        elif bare and _has_numbers(bare):
             if not words and _as_many(comment, bare):
                 words = [comment]
-            header = words[-2] if len(words) > 1 and _as_many(words[-2], words[-1]) else ''
-            return (number, header, words[-1]) if header else (number, (words or [''])[-1], '')
-        else:
+            if len(words) > 1 and _as_many(words[-2], words[-1]):
+                return number, words[-2], words[-1]
+            return number, (words or [''])[-1], ''
+        elif bare:
             words.append(line)
     raise RecordingError(
         f'{path}: no line of numbers in {len(lines)} lines; a table has one row a line, values '
@@ -120,56 +112,42 @@ def _heading(path: Path, lines: list[str]) -> tuple[int, str, str]:
 def _has_numbers(line: str) -> bool:
     """Whether more of a line is numbers than not."""
     cells = [cell for cell in _split(line, _separator([line])) if cell.lower() not in _EMPTY]
-    values = (_elements(cell) or [cell] for cell in cells)
-    return sum(all(map(_is_number, some)) for some in values) > len(cells) / 2
+    count = 0
+    for cell in cells:
+        with suppress(ValueError):
+            for part in _elements(cell) or [cell]:
+                _number(part, ';')
+            count += 1
+    return count > len(cells) / 2
 
 
 def _as_many(header: str, row: str) -> bool:
-    if not header:
-        return False
+    """Whether two lines have as many cells."""
     separator = _separator([row])
-    return len(_split(header, separator)) == len(_split(row, separator))
-
-
-def _is_number(cell: str) -> bool:
-    with suppress(ValueError):
-        _number(cell, ';')
-        return True
-    return False
-
-
-def _elements(cell: str) -> list[str] | None:
-    """Return the elements of a list, as '[1, 2]', '(1, 2)' and '[1 2]'; None of other cells."""
-    found = _LIST.search(cell) if cell[:1] in ('[', '(', 'a') else None
-    return (
-        None if found is None else [part.strip('\'"') for part in _COMMAS.split(found[1]) if part]
-    )
+    return bool(header) and len(_split(header, separator)) == len(_split(row, separator))
 
 
 def _separator(lines: list[str]) -> str:
     """Return what stands between values: the first kind that every line has."""
-    for separator in (';', '\t', ','):
-        if lines and all(separator in line for line in lines if line.strip()):
-            return separator
-    return ' '
+    there = [line for line in lines if line.strip()]
+    return next((s for s in _SEPARATORS if all(s in line for line in there)), ' ')
 
 
 def _split(line: str, separator: str) -> list[str]:
     if separator == ' ':
         return line.split()
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+    return [cell.strip() for row in csv.reader([line], delimiter=separator) for cell in row]
 
 
-def _names(header: str, separator: str, width: int, path: Path, first: int) -> list[str]:
-    if not header:
-        return [f'[{k}]' for k in range(width)]
-    names = _split(header, separator)
-    if len(names) != width:
-        raise RecordingError(
-            f'{path}: {len(names)} names ({", ".join(names[:6])} ...) stand above {width} values '
-            f'in line {first + 1}'
-        )
-    return [name or f'[{k}]' for k, name in enumerate(names)]
+def _elements(cell: str) -> list[str]:
+    """Return the elements of a list, as '[1, 2]', '(1, 2)' and '[1 2]'; none of other cells."""
+    found = _LIST.search(cell) if cell[:1] in ('[', '(', 'a') else None
+    return [part.strip('\'"') for part in _COMMAS.split(found[1]) if part] if found else []
+
+
+def _width(cell: str) -> int | None:
+    """Return how many elements a list has; None for a cell that is none."""
+    return len(_elements(cell)) or None
 
 
 def _number(cell: str, separator: str) -> float:
@@ -190,8 +168,8 @@ def _numbers(
     first_line: int,
 ) -> tuple[FloatArray, dict[str, Sequence[str]], tuple[str, ...]]:
     """Return the values, shape (N, columns), cells of words by column, and what was met."""
-    delimiter = None if separator == ' ' else separator
     with suppress(ValueError):  # quick where every cell is a number
+        delimiter = None if separator == ' ' else separator
         values = np.loadtxt(io.StringIO('\n'.join(rows)), delimiter=delimiter, ndmin=2)
         if values.shape[1] == len(names):
             return values, {}, ()
@@ -199,54 +177,53 @@ def _numbers(
     said: dict[int, dict[int, str]] = {}
     notes: list[str] = []
     for k, line in enumerate(rows):
+        where = f'line {first_line + k}'
         cells = _split(line, separator)
         if len(cells) != len(widths):
-            if k == len(rows) - 1:
-                notes.append(f'line {first_line + k} is cut off and left out')
-                values = values[:k]
-                break
             if not cells or line.lstrip().startswith(_COMMENTS):
                 continue
+            if k == len(rows) - 1:
+                notes.append(f'{where} is cut off and left out')
+                values = values[:k]
+                break
             raise RecordingError(
-                f'{path}: line {first_line + k} has {len(cells)} values, the others {len(widths)}'
+                f'{path}: {where} has {len(cells)} values, the others {len(widths)}'
             )
-        for j, cell in enumerate(_taken_apart(cells, widths, f'{path}: line {first_line + k}')):
+        for j, cell in enumerate(_taken_apart(cells, widths, f'{path}: {where}')):
             try:
                 values[k, j] = _number(cell, separator)
             except ValueError:
                 said.setdefault(j, {})[k] = cell
+    numeric = np.isfinite(values).mean(axis=0) >= _NUMERIC
+    words: dict[str, Sequence[str]] = {}
     for j, of in said.items():
-        if np.isfinite(values[:, j]).mean() >= _NUMERIC:
+        if numeric[j]:
             k, cell = next(iter(of.items()))
             raise RecordingError(
                 f"{path}: line {first_line + k}, column {names[j]}: '{cell}' is no number"
             )
-    words: dict[str, Sequence[str]] = {
-        names[j]: [of.get(k, '') for k in range(len(values))] for j, of in said.items()
-    }
-    return values, words, (*notes, *_gaps(values, names, first_line))
+        words[names[j]] = [of.get(k, '') for k in range(len(values))]
+    notes += _gaps(np.argwhere(np.isnan(values) & numeric), names, first_line)
+    return values, words, tuple(notes)
+
+
+def _gaps(at: npt.NDArray[np.intp], names: list[str], first_line: int) -> list[str]:
+    """Say how many cells of columns of numbers are empty, shape (k, 2), and where the first is."""
+    if not len(at):
+        return []
+    many = '1 cell is' if len(at) == 1 else f'{len(at)} cells are'
+    return [
+        f'{many} empty and read as NaN, the first in line {first_line + at[0, 0]}, '
+        f'column {names[at[0, 1]]}'
+    ]
 
 
 def _taken_apart(cells: list[str], widths: list[int | None], where: str) -> Iterator[str]:
     """Yield cells, and the elements of those that are lists."""
     for k, (cell, width) in enumerate(zip(cells, widths, strict=True)):
-        elements = [cell] if width is None else _elements(cell) or []
-        if len(elements) != (1 if width is None else width):
+        elements = [cell] if width is None else _elements(cell)
+        if width is not None and len(elements) != width:
             raise RecordingError(
                 f'{where}, column {k + 1}: a list of {len(elements)}, the first has {width}'
             )
         yield from elements
-
-
-def _gaps(values: FloatArray, names: list[str], first_line: int) -> list[str]:
-    """Say how many cells of columns of numbers are empty, and where the first is."""
-    missing = np.isnan(values) & (np.isfinite(values).mean(axis=0) >= _NUMERIC)
-    at = np.argwhere(missing)
-    if not len(at):
-        return []
-    row, column = at[0]
-    many = '1 cell is' if len(at) == 1 else f'{len(at)} cells are'
-    return [
-        f'{many} empty and read as NaN, the first in line {first_line + row}, '
-        f'column {names[column]}'
-    ]

@@ -33,6 +33,10 @@ def semicolons_and_decimal_commas(path, motion):
     path.write_text(text(motion, separator=';').replace('.', ','))
 
 
+def utf_16(path, motion):
+    path.write_text(text(motion), encoding='utf-16')
+
+
 def blanks_below_a_comment(path, motion):
     path.write_text('# recorded today\n# ' + text(motion, separator=' '))
 
@@ -135,6 +139,7 @@ WRITERS = {
     csv: 'run.csv',
     semicolons_and_decimal_commas: 'run.csv',
     blanks_below_a_comment: 'run.txt',
+    utf_16: 'run.csv',
     compressed: 'run.csv.gz',
     with_a_line_of_units: 'run.tsv',
     degrees_by_name: 'run.csv',
@@ -258,7 +263,7 @@ def counter(path, motion):
         unnamed: r'run.csv: 3 names \(time, q1, q2 ...\) stand above 7 values in line 2',
         holes: r'run.csv: column tau2 has no number in 100 of 200 rows, first in line 51',
         still_clock: r'run.csv: column time does not increase',
-        counter: r'run.csv: column time counts 1, 2, 3; give its unit with --time-unit',
+        counter: r'run.csv: column time goes in steps of 1; give its unit with --time-unit',
     }.items(),
     ids=lambda case: getattr(case, '__name__', ''),
 )

@@ -165,12 +165,3 @@ def test_abbreviations_of_efforts_are_known(tmp_path, word):
     assert any('currents' in note for note in found.notes) == (
         word in ('cur', 'current', 'i', 'load')
     )
-
-
-def test_a_table_of_one_value_a_row_is_called_so(tmp_path):
-    text = 'elapsed time,topic,value\n'
-    for k in range(100):
-        text += f'{0.01 * (k // 2)},/joint_states.position[{k % 2}],{k}\n'
-    (tmp_path / 'run.csv').write_text(text)
-    with pytest.raises(RecordingError, match=r'long form.* column topic'):
-        read_anything(tmp_path / 'run.csv', joints=JOINTS)

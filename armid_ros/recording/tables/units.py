@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.tables.settings import ColumnSettings, per_joint
 import numpy as np
@@ -34,27 +33,31 @@ _WHAT = {
 }
 
 
-def refuse_columns(path: str | Path, settings: ColumnSettings) -> None:
-    """Raise a RecordingError where a bag is told which of its columns are what, or its rate."""
-    reason = (
+def refuse_columns(path: str | Path, settings: ColumnSettings, *, copied: bool = False) -> None:
+    """
+    Raise a RecordingError where a bag is told which of its columns are what, or its rate.
+
+    Parameters
+    ----------
+    path : str or Path
+        The bag.
+    settings : ColumnSettings
+        What was said.
+    copied : bool
+        Whether it is copied as it is, which allows no other units either.
+
+    """
+    reasons = dict.fromkeys(
+        _WHERE,
         'is for tables, and this is a bag, whose messages have stamps and names; leave it out, or '
-        'make a bag of the tables with armid convert'
+        'make a bag of the tables with armid convert',
     )
-    _refuse(path, settings, _WHERE, reason)
-
-
-def refuse_units(path: str | Path, settings: ColumnSettings) -> None:
-    """Raise a RecordingError where a bag that is copied as it is gets other units."""
-    reason = 'changes no bag that is copied; give it to the command that reads the bag'
-    _refuse(path, settings, _WHAT, reason)
-
-
-def _refuse(
-    path: str | Path, settings: ColumnSettings, options: Mapping[str, str], reason: str
-) -> None:
-    for name, option in options.items():
+    if copied:
+        reason = 'changes no bag that is copied; give it to the command that reads the bag'
+        reasons |= dict.fromkeys(_WHAT, reason)
+    for name, reason in reasons.items():
         if getattr(settings, name) != getattr(ColumnSettings, name):  # its default
-            raise RecordingError(f'{path}: {option} {reason}')
+            raise RecordingError(f'{path}: {(_WHERE | _WHAT)[name]} {reason}')
 
 
 def in_si(
@@ -76,7 +79,9 @@ def in_si(
     if not any(getattr(settings, name) for name in _WHAT):
         return recording
     joints = recording.joints
-    turn = _turn(joints, settings, slides)
+    turn = per_joint(settings.position_scale or (1.0,), joints, 'the scale of positions')
+    if settings.degrees and not settings.position_scale:
+        turn = np.where(list(slides or [False] * len(joints)), 1.0, np.pi / 180.0)
     q, dq, tau = recording.q * turn, recording.dq, recording.tau
     dq = None if dq is None else dq * turn
     if tau is not None:
@@ -91,29 +96,12 @@ def in_si(
         tau = None if tau is None else tau @ gear
     if settings.zero:
         q = q + per_joint(settings.zero, joints, 'the zero of positions')
-    return replace(recording, q=q, dq=dq, tau=tau, others=_others(recording, settings, turn))
-
-
-def _turn(
-    joints: Sequence[str], settings: ColumnSettings, slides: Collection[bool] | None
-) -> FloatArray:
-    """Return what makes positions and velocities rad or m, shape (n,)."""
-    if settings.position_scale or not settings.degrees:
-        return per_joint(settings.position_scale or (1.0,), joints, 'the scale of positions')
-    return np.where(list(slides or [False] * len(joints)), 1.0, np.pi / 180.0)
-
-
-def _others(
-    recording: Recording, settings: ColumnSettings, turn: FloatArray
-) -> tuple[PositionRange, ...]:
-    """Return where other joints were, as far as their unit is known."""
-    if settings.gear or settings.zero or len(set(turn)) != 1:
-        return ()
-    return tuple(
-        replace(one, lowest=min(ends), highest=max(ends))
-        for one in recording.others
-        for ends in [(float(one.lowest * turn[0]), float(one.highest * turn[0]))]
-    )
+    others: list[PositionRange] = []
+    if not (settings.gear or settings.zero) and len(set(turn)) == 1:  # their unit is known
+        for one in recording.others:
+            ends = sorted([float(one.lowest * turn[0]), float(one.highest * turn[0])])
+            others.append(PositionRange(one.joint, *ends))
+    return replace(recording, q=q, dq=dq, tau=tau, others=tuple(others))
 
 
 def _position(joint: str, joints: Sequence[str]) -> int:

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import Reader
 
-from ..conftest import iter_raw, JOINTS
+from .conftest import iter_raw, JOINTS
 
 
 @pytest.fixture(params=['zstd', 'lz4', 'none'])

@@ -1,0 +1,176 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""Copies of bags: of ROS 1 and ROS 2, with other names of joints, or of what a kill left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+import os
+from pathlib import Path
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.files import reading
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import is_plain
+from armid_ros.recording.mcap.source import McapSource
+from armid_ros.recording.message_types import JOINT_STATE
+from armid_ros.recording.settings import DEFAULT, ReadSettings
+from armid_ros.recording.source import Topic
+from armid_ros.recording.tables.settings import renamed
+from armid_ros.recording.writer import BagWriter, whole_bag
+from rosbags.typesys import get_typestore, Stores
+
+
+@dataclass(frozen=True)
+class Copied:
+    """
+    What was copied.
+
+    Attributes
+    ----------
+    source, bag : Path
+        What was read, which is as it was, and the bag made of it.
+    topics : tuple of Topic
+        Its topics, with the number of messages.
+    damage : str
+        What is wrong with the source; empty for a whole one.
+    duration : float
+        Time from the first to the last message [s].
+    left_out : tuple of str
+        Topics that ROS 2 has no type for, with their types.
+    renamed : tuple of (str, str)
+        Joints that got another name.
+
+    """
+
+    source: Path
+    bag: Path
+    topics: tuple[Topic, ...]
+    damage: str
+    duration: float
+    left_out: tuple[str, ...] = ()
+    renamed: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def messages(self) -> int:
+        """Return the number of messages copied."""
+        return sum(topic.count for topic in self.topics)
+
+    def describe(self) -> str:
+        """Return the report as a few sentences."""
+        listed = ', '.join(f'{topic.name} ({topic.count})' for topic in self.topics)
+        return (
+            f'{self.source}: {self.damage or "the file is whole"}. {self.messages} messages over '
+            f'{self.duration:.3f} s are in {self.bag}: {listed}.'
+        )
+
+
+def recover(file: str | Path, out: str | Path, settings: ReadSettings = DEFAULT) -> Copied:
+    """
+    Copy what can be read of an MCAP file into a complete bag, with index and metadata.yaml.
+
+    Complete chunks are taken over when their checksum is right; of a chunk the file ends in, the
+    messages before the end are.
+
+    Parameters
+    ----------
+    file : str or Path
+        The file, which is not changed; a directory with a single .mcap file stands for that.
+    out : str or Path
+        The bag directory to be made; it must not exist.
+    settings : ReadSettings
+        Whether checksums are compared, and how much memory to take.
+
+    Raises
+    ------
+    RecordingError
+        It is no MCAP file, or there is no message in it, or ``out`` exists.
+
+    """
+    path = Path(file)
+    if path.is_dir():
+        files = sorted(path.glob('*.mcap'))
+        if len(files) != 1:
+            listed = ', '.join(file.name for file in files) or 'none'
+            raise RecordingError(
+                f'{path}: a directory stands for its only .mcap file, but it has {listed}; '
+                'recover files one by one'
+            )
+        path = files[0]
+    if not os.path.lexists(path):
+        raise RecordingError(f'{path}: there is no such file')
+    with reading(path, RecordingError), closing(McapSource(path, settings)) as source:
+        if next(source.messages(), None) is None:
+            raise RecordingError(
+                f'{path}: there is no message to recover; {source.damage or "the file is whole"}'
+            )
+        with whole_bag(out) as writer:
+            writer.copy(source)
+        return _copied(path, writer, source.damage)
+
+
+def copy_bag(
+    path: Path,
+    out: Path,
+    rename: Sequence[tuple[str, str]] = (),
+    settings: ReadSettings = DEFAULT,
+) -> Copied:
+    """
+    Copy a bag message by message.
+
+    Parameters
+    ----------
+    path : Path
+        A bag of ROS 2, or the .bag of ROS 1.
+    out : Path
+        The bag directory to be made; it must not exist.
+    rename : sequence of (str, str)
+        From beginnings of joint names, or whole names, to what they become.
+    settings : ReadSettings
+        How careful the bag is read.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, nothing in it has a type that ROS 2 has, or names cannot be changed.
+
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    names: dict[str, str] = {}
+
+    def change(topic: Topic, cdr: bytes) -> bytes:
+        if topic.type_name != JOINT_STATE or not rename:
+            return cdr
+        message: Any = store.deserialize_cdr(cdr, JOINT_STATE)
+        for name in message.name:
+            names.setdefault(name, renamed(name, rename))
+        message.name = [names[name] for name in message.name]
+        return bytes(store.serialize_cdr(message, JOINT_STATE))
+
+    with Bag(path, settings) as bag:
+        topics = bag.topics()
+        left_out = [f'{one.name} ({one.type_name})' for one in topics if one.encoding == 'ros1']
+        if len(left_out) == len(topics):
+            raise RecordingError(
+                f'{path}: nothing in it has a type that ROS 2 has; left out: '
+                f'{"; ".join(left_out) or "it is empty"}'
+            )
+        for topic in topics:
+            if rename and topic.type_name == JOINT_STATE and not is_plain(topic):
+                raise RecordingError(
+                    f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
+                    'changed; give --rename to the command that reads the bag'
+                )
+        with whole_bag(out) as writer:
+            writer.copy(bag, change)
+        damage = bag.damage
+    changed = tuple((old, new) for old, new in names.items() if old != new)
+    return _copied(path, writer, damage, left_out=tuple(left_out), renamed=changed)
+
+
+def _copied(path: Path, writer: BagWriter, damage: str, **more: Any) -> Copied:
+    start, end = writer.time_range
+    return Copied(path, writer.path, writer.topics, damage, (end - start) * 1e-9, **more)

@@ -1,0 +1,320 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which columns belong together, named by a person ('q{}') or guessed from what they are called.
+
+Columns that are alike but for a joint's name or number form a family; a family is judged by the
+words in its name. A guess is always shown, with what else would have fitted.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+import re
+
+from armid_ros.errors import RecordingError
+from armid_ros.files.cells import listed
+from armid_ros.recording.tables.settings import renamed, Rules
+from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.tables.words import (
+    is_quantity,
+    MEASURED,
+    OTHERWISE,
+    QuantityName,
+    TIMES,
+    WORDS,
+    words_of,
+)
+import numpy as np
+
+_RANGE = re.compile(r'([\[{])(\d+)\.\.(\d+)[\]}]')
+_NUMBER = re.compile(r'\d+')
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """
+    Columns of one quantity.
+
+    Attributes
+    ----------
+    pattern : str
+        How a person would ask for them.
+    columns : tuple of TableColumn
+        One a joint.
+    labels : tuple of str
+        What of each name stands for the joint: its name, a number, or the whole name.
+    rest : mapping of str to TableColumn
+        Columns that are called alike and are of other joints, by their label.
+
+    """
+
+    pattern: str
+    columns: tuple[TableColumn, ...]
+    labels: tuple[str, ...]
+    rest: Mapping[str, TableColumn] = field(default_factory=dict)
+
+    def joints(self, rename: Rules = ()) -> tuple[str, ...]:
+        """Return the joints' names as far as the columns have them; joint_1 and so on if not."""
+        if all(label.isdigit() for label in self.labels):
+            return tuple(f'joint_{k + 1}' for k in range(len(self.labels)))
+        return tuple(renamed(label, rename) for label in self.labels)
+
+
+def choose(
+    table: Table, pattern: str, joints: Sequence[str] | None, what: str, rename: Rules = ()
+) -> Family:
+    """
+    Return the columns that a person asks for.
+
+    Parameters
+    ----------
+    table : Table
+        Where they are.
+    pattern : str
+        See ColumnSettings.
+    joints : sequence of str or None
+        The joints, where they are known: columns are matched to them by name, else by number.
+    what : str
+        The quantity, for messages.
+    rename : sequence of (str, str)
+        From names in the file to names of the joints.
+
+    Raises
+    ------
+    RecordingError
+        Nothing fits, or not as many columns as there are joints.
+
+    """
+    found = _matching(table, pattern)
+    if not found:
+        raise RecordingError(
+            f"{table.source}: no column is '{pattern}', given for {what}; its columns are "
+            f'{table.listed()}'
+        )
+    labels = [label for label, _ in found]
+    twice = [column.name for label, column in found if labels.count(label) > 1]
+    if twice:
+        raise RecordingError(
+            f"{table.source}: for {what}, '{pattern}' fits {' and '.join(twice)} for one joint; "
+            'name the columns with commas, or give each a name of its own'
+        )
+    members = dict(found)
+    names = [renamed(label, rename) for label in labels]
+    by_name = joints is None or set(joints) <= set(names)
+    if not by_name and len(labels) == len(joints or ()) and (',' in pattern or len(labels) == 1):
+        return Family(pattern, tuple(members.values()), tuple(labels))
+    family = _family(pattern, members, joints, rename)
+    if family is not None:
+        return family
+    assert joints is not None
+    fit = ', '.join(column.name for column in members.values())
+    if all(label.isdigit() for label in labels):
+        problem = (
+            f'{len(found)} columns fit ({fit}), and there are {len(joints)} joints '
+            f'({", ".join(joints)}); name the columns in the order of the joints, with commas'
+        )
+    else:
+        lacking = ', '.join(joint for joint in joints if joint not in names)
+        problem = (
+            f'{fit} fit, and no column is that of {lacking}; columns are matched by joint name '
+            'or number: see --rename and --joints'
+        )
+    raise RecordingError(f"{table.source}: for {what}, '{pattern}': {problem}")
+
+
+def guess(
+    table: Table, quantity: QuantityName, joints: Sequence[str] | None, rename: Rules = ()
+) -> list[Family]:
+    """
+    Return the families that may be a quantity, the likeliest first.
+
+    Parameters
+    ----------
+    table : Table
+        Where they are.
+    quantity : {'position', 'velocity', 'effort'}
+        What is looked for.
+    joints : sequence of str or None
+        The joints, where they are known: a family has to have a column for each.
+    rename : sequence of (str, str)
+        From names in the file to names of the joints.
+
+    """
+    scored: list[tuple[float, Family]] = []
+    for pattern, members in _groups(table, joints, rename).items():
+        family = _family(pattern, members, joints, rename)
+        if family is not None:
+            # columns that never change were not filled
+            still = any(not np.any(np.diff(column.finite)) for column in family.columns)
+            scored.append((_score(pattern, quantity) - still, family))
+    likely = [one for one in scored if one[0] > 0.0]
+    best: dict[tuple[TableColumn, ...], Family] = {}
+    for _, one in sorted(likely, key=lambda one: (-one[0], -len(one[1].columns))):
+        best.setdefault(one.columns, one)
+    return list(best.values())
+
+
+def incomplete(
+    table: Table, quantity: QuantityName, joints: Sequence[str], rename: Rules = ()
+) -> tuple[str, tuple[str, ...]]:
+    """
+    Return the family that has the most joints by name, where none has all.
+
+    Returns
+    -------
+    pattern : str
+        Of its columns; empty where no family has a joint.
+    lacking : tuple of str
+        The joints for which there is no column with numbers.
+
+    """
+    best = '', tuple(joints)
+    for pattern, members in _groups(table, joints, rename).items():
+        names = [renamed(label, rename) for label in members]
+        lacking = tuple(joint for joint in joints if joint not in names)
+        if len(lacking) < len(best[1]) and _score(pattern, quantity) > 0.0:
+            best = pattern, lacking
+    return best
+
+
+def guess_time(table: Table) -> TableColumn | None:
+    """Return the column that is named like a time and increases, or else decreases throughout."""
+    for way in (1.0, -1.0):
+        scores = {}
+        for column in table.columns:
+            words = words_of(column.bare_name)
+            score = max((TIMES.get(word, 0.0) for word in words), default=0.0)
+            score += sum(OTHERWISE.get(word, 0.0) for word in words) - 0.1 * len(words)
+            steps = way * np.diff(column.finite)
+            if score > 0.5 and len(steps) and np.mean(steps >= 0.0) > 0.9:
+                scores[column] = score
+        if scores:
+            return max(scores, key=lambda column: scores[column])
+    return None
+
+
+def _family(
+    pattern: str, members: Mapping[str, TableColumn], joints: Sequence[str] | None, rename: Rules
+) -> Family | None:
+    """Return a family in the order of the joints: by name, else by number; None if none fits."""
+    labels = list(members)
+    numbered = all(label.isdigit() for label in labels)
+    if numbered:
+        labels.sort(key=_by_number)
+    if joints is not None:
+        of_joint = {renamed(label, rename): label for label in reversed(labels)}
+        if set(joints) <= set(of_joint):
+            labels = [of_joint[joint] for joint in joints]
+        elif not numbered or len(labels) != len(joints):
+            return None
+    rest = {label: column for label, column in members.items() if label not in labels}
+    return Family(pattern, tuple(members[label] for label in labels), tuple(labels), rest)
+
+
+def _by_number(label: str) -> tuple[int, str]:
+    """Return what sorts labels of digits by their number, of whatever length."""
+    digits = label.lstrip('0')
+    return len(digits), digits
+
+
+def _matching(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
+    """Return the columns that fit a pattern, each behind what stands for its joint."""
+    exact = table.column(pattern)
+    if exact is not None:
+        return [('1', exact)]
+    span = _RANGE.search(pattern)
+    if span:
+        numbers = [str(k) for k in range(int(span[2]), int(span[3]) + 1)]
+        middle = '[{}]' if span[1] == '[' else '{}'
+        names = [_RANGE.sub(middle.format(number), pattern, count=1) for number in numbers]
+        found = [(number, table.column(n)) for number, n in zip(numbers, names, strict=True)]
+        whole = [(number, column) for number, column in found if column is not None]
+        return whole if len(whole) == len(found) else []
+    if '{}' in pattern:
+        return _by_placeholder(table, pattern)
+    members = [column for column in table.columns if column.array and column.array == pattern]
+    if members:
+        return [(column.name[len(pattern) + 1 : -1], column) for column in members]
+    listed_columns: list[tuple[str, TableColumn]] = []
+    for part in map(str.strip, listed(pattern)) if ',' in pattern else ():
+        column = table.column(part)
+        if column is None:
+            raise RecordingError(
+                f"{table.source}: there is no column '{part}'; its columns are {table.listed()}"
+            )
+        listed_columns.append((part, column))
+    return listed_columns
+
+
+def _by_placeholder(table: Table, pattern: str) -> list[tuple[str, TableColumn]]:
+    before, _, after = pattern.partition('{}')
+    expression = re.compile(f'{re.escape(before)}(.+){re.escape(after)}')
+    found = []
+    for column in table.columns:
+        match = expression.fullmatch(column.bare_name) or expression.fullmatch(column.name)
+        if match:
+            found.append((match[1].strip('[]'), column))
+    numbered = [one for one in found if one[0].isdigit()]
+    return sorted(numbered, key=lambda one: _by_number(one[0])) or found
+
+
+def _groups(
+    table: Table, joints: Sequence[str] | None, rename: Rules
+) -> dict[str, dict[str, TableColumn]]:
+    """Return the columns by what they have in common and by what stands for a joint."""
+    groups: dict[str, dict[str, TableColumn]] = {}
+    for column in table.columns:
+        for pattern, label in _readings(column, joints, rename):
+            groups.setdefault(pattern, {})[label] = column
+    return groups
+
+
+def _readings(
+    column: TableColumn, joints: Sequence[str] | None, rename: Rules
+) -> Iterator[tuple[str, str]]:
+    """Yield the ways to read a name as a pattern and what stands for the joint."""
+    name = column.bare_name
+    if column.array and name.endswith(']'):
+        element = name[len(column.array) + 1 : -1]
+        stem, dot, kind = element.rpartition('.')
+        if dot and is_quantity(kind):
+            yield f'{column.array}[{{}}.{kind}]', stem
+        yield column.array, element
+        return
+    for joint in joints or ():
+        for called in {joint, *(old + joint[len(new) :] for old, new in rename)}:
+            if renamed(called, rename) == joint and called in name:
+                yield name.replace(called, '{}', 1), called
+    for match in _NUMBER.finditer(name):
+        yield f'{name[: match.start()]}{{}}{name[match.end() :]}', match[0]
+    if joints is None or len(joints) == 1:
+        yield name, '1'
+    if joints is None:
+        yield from _named(name)
+
+
+def _named(name: str) -> Iterator[tuple[str, str]]:
+    """Read a name as a joint's with the quantity behind or in front: 'elbow/position'."""
+    behind = re.fullmatch(r'(.*[/.])?([^/.]+)([/._ ])([A-Za-z]+)', name)
+    if behind and is_quantity(behind[4]) and not behind[2].isdigit():
+        yield f'{behind[1] or ""}{{}}{behind[3]}{behind[4]}', behind[2]
+    ahead = re.fullmatch(r'([A-Za-z]+)([/._ ])([^/.]+)', name)
+    if ahead and is_quantity(ahead[1]) and not ahead[3].isdigit():
+        yield f'{ahead[1]}{ahead[2]}{{}}', ahead[3]
+
+
+def _score(pattern: str, quantity: QuantityName) -> float:
+    """Return how likely a family is a quantity by its name; zero where it is another one."""
+    words = words_of(pattern)
+    scores = {
+        name: max((table.get(word, 0.0) for word in words), default=0.0)
+        for name, table in WORDS.items()
+    }
+    own = scores[quantity]
+    if own <= 0.0 or own < max(scores.values()):
+        return 0.0
+    said = sum(MEASURED.get(word, 0.0) + OTHERWISE.get(word, 0.0) for word in words)
+    return own + said - 0.01 * len(words)
