@@ -12,7 +12,6 @@ from armid_ros.identification.assess.dead_sensors import dead_encoders
 from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
-from armid_ros.inspection.band import standing_bands
 from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
 from armid_ros.inspection.trial import TrialFit, try_identification
@@ -137,7 +136,6 @@ def inspect(
         *_of_units(recording, joints, robot),
         *_of_motion(recording, joints, sampling),
         *_of_efforts(joints, robot, trial),
-        *_of_filters(recording),
     ]
     mixed = two_senders(recording)
     if trial is None and mixed:
@@ -317,19 +315,4 @@ def _of_efforts(
             'doubt',
             f'efforts follow the description with other factors ({named}): currents, torques '
             'before the gear, or wrong masses of the description; --current-gain scales them',
-        )
-
-
-def _of_filters(recording: Recording) -> Iterator[Remark]:
-    if recording.tau is None:
-        return
-    bands = standing_bands(recording.q, recording.tau, recording.period)
-    known = np.flatnonzero(np.isfinite(bands))
-    if len(known):
-        named = ', '.join(f'{recording.joints[k]} {bands[k]:.2g} Hz' for k in known)
-        yield Remark(
-            'note',
-            f'efforts were low-passed before they were recorded ({named}): delay up to '
-            f'{1e3 / (2.0 * np.pi * float(bands[known].min())):.0f} ms; '
-            '--effects torque_lag estimates it',
         )

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
 from functools import partial
 import math
@@ -12,7 +11,6 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.identification.samples.joint_merge import JointMerger
-from armid_ros.inspection.band import LEAST, standing_bands
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
 from armid_ros.nodes.messages.classes import message_class
@@ -31,8 +29,6 @@ _EFFORTS = (
     'control_msgs/msg/DynamicJointState',
     'std_msgs/msg/Float64MultiArray',
 )
-#: Samples that the band of the torques is estimated from.
-_KEPT = 4096
 
 
 class JointStateMergerNode(ArmidNode):
@@ -41,8 +37,7 @@ class JointStateMergerNode(ArmidNode):
 
     Positions may come on several topics, each with some of the joints; torques may be on a topic
     of their own, as efforts, or as currents that gains make torques of. All are interpolated to
-    the stamps of the first joint's position. While the arm stands still, the noise of the torques
-    tells whether a driver low-passes them, and the status says how narrowly.
+    the stamps of the first joint's position.
 
     """
 
@@ -89,7 +84,6 @@ class JointStateMergerNode(ArmidNode):
         self._published = 0
         self._lag_ns, self._epoch_ns = 0, 0
         self._efforts: MatchedSubscription | None = None
-        self._kept: deque[tuple[float, FloatArray, FloatArray]] = deque(maxlen=_KEPT)
         self._states = self.create_publisher(JointState, '~/joint_states', SAMPLES)
         self._topics = names(self, 'position_topics')
         if not self._topics:
@@ -124,24 +118,11 @@ class JointStateMergerNode(ArmidNode):
                     self, message_class(types[0]), topic, self._on_efforts
                 )
 
-    @property
-    def bands(self) -> FloatArray:
-        """Band that a driver has filtered each torque to [Hz]; NaN where none is known."""
-        if len(self._kept) < LEAST:
-            return self._found
-        t, q, tau = (np.array(column) for column in zip(*self._kept, strict=True))
-        found = standing_bands(q, tau, float(np.median(np.diff(t))))
-        self._found = np.where(np.isfinite(found), found, self._found)
-        return self._found
-
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say what comes, and how narrow the torques are."""
+        """Say what comes."""
         values: dict[str, object] = {'published': self._published}
         if not self.joints:
             return 'waiting for robot_description', values
-        for joint, band in zip(self.joints, self.bands, strict=True):
-            if math.isfinite(band):
-                values[f'low-passed to [Hz] {joint}'] = float(band)
         if self._published:
             return '', values
         n = len(self.joints)
@@ -172,8 +153,6 @@ class JointStateMergerNode(ArmidNode):
         self._effort_names = others or self.joints
         self._gains = np.broadcast_to(np.array(gains, dtype=float), (len(joints),))
         self._merger = JointMerger(2 * len(joints))  # positions, and after them torques
-        self._found = np.full(len(joints), np.nan)
-        self._kept.clear()
 
     def _on_positions(self, with_effort: bool, message: JointState) -> None:
         stamp = self._stamp(message.header.stamp)
@@ -250,7 +229,6 @@ class JointStateMergerNode(ArmidNode):
                 message.velocity = dq.tolist()
             message.header.stamp = Time(nanoseconds=self._epoch_ns + round(t * 1e9)).to_msg()
             self._states.publish(message)
-            self._kept.append((t, q, tau))
             self._published += 1
 
     def _stamp(self, stamp: Any) -> int:

@@ -111,20 +111,20 @@ def sound_robot(robot, _):
     return finite(robot.rigid_parameters, robot.gravity, robot.urdf_damping, robot.urdf_friction)
 
 
-@given(edits=XML_EDITS)
-def test_urdf_elements(folder, edits):
+EITHER_XML = st.one_of(
+    XML_EDITS.map(lambda e: (edited_xml, e)), TEXT_EDITS.map(lambda e: (edited_text, e))
+)
+EITHER_TREE = st.one_of(
+    TREE_EDITS.map(lambda e: (edited_tree, e)), TEXT_EDITS.map(lambda e: (edited_text, e))
+)
+
+
+@given(edits=EITHER_XML)
+def test_urdf(folder, edits):
     path = folder / 'robot.urdf'
-    text = shipped_path('humanoid_arm').read_text()
-    path.write_text(edited_xml(text, edits), errors='replace')
-    judge('URDF, elements', load_robot, path, None, sound_robot)
-
-
-@given(edits=TEXT_EDITS)
-def test_urdf_text(folder, edits):
-    path = folder / 'robot_text.urdf'
-    text = shipped_path('humanoid_arm').read_text()
-    path.write_text(edited_text(text, edits), errors='replace')
-    judge('URDF, text', load_robot, path, None, sound_robot)
+    edit, what = edits
+    path.write_text(edit(shipped_path('humanoid_arm').read_text(), what), errors='replace')
+    judge('URDF', load_robot, path, None, sound_robot)
 
 
 XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
@@ -156,11 +156,7 @@ def read_xacro(path):
         raise RobotError(f'{path}: {error}') from error
 
 
-@given(
-    edits=st.one_of(
-        XML_EDITS.map(lambda e: (edited_xml, e)), TEXT_EDITS.map(lambda e: (edited_text, e))
-    )
-)
+@given(edits=EITHER_XML)
 def test_xacro(folder, edits):
     path = folder / 'robot.urdf.xacro'
     edit, what = edits
@@ -168,18 +164,17 @@ def test_xacro(folder, edits):
     judge('xacro', read_xacro, path, None, sound_robot)
 
 
-@given(edits=TREE_EDITS)
-def test_model_tree(folder, robot, model, edits):
+def damaged(text, edits, load, write):
+    """Return a document with edits of its tree or of its text."""
+    edit, what = edits
+    return write(edit(load(text), what)) if edit is edited_tree else edit(text, what)
+
+
+@given(edits=EITHER_TREE)
+def test_model(folder, robot, model, edits):
     path = folder / 'model.yaml'
-    path.write_text(to_yaml(edited_tree(yaml.safe_load(model), edits)))
-    judge('model.yaml, tree', lambda p: load_model(p, robot), path, None, sound_model)
-
-
-@given(edits=TEXT_EDITS)
-def test_model_text(folder, robot, model, edits):
-    path = folder / 'model_text.yaml'
-    path.write_text(edited_text(model, edits), errors='replace')
-    judge('model.yaml, text', lambda p: load_model(p, robot), path, None, sound_model)
+    path.write_text(damaged(model, edits, yaml.safe_load, to_yaml), errors='replace')
+    judge('model.yaml', lambda p: load_model(p, robot), path, None, sound_model)
 
 
 def sound_model(arm, _):
@@ -187,18 +182,11 @@ def sound_model(arm, _):
     return finite(arm.theta, arm.robot.gravity, *(e.shape_values for e in arm.effects if e.shapes))
 
 
-@given(edits=TREE_EDITS)
-def test_excitation_tree(folder, excitation, edits):
+@given(edits=EITHER_TREE)
+def test_excitation(folder, excitation, edits):
     path = folder / 'excitation.yaml'
-    path.write_text(to_yaml(edited_tree(yaml.safe_load(excitation), edits)))
-    judge('excitation.yaml, tree', load_excitation, path, None, sound_excitation)
-
-
-@given(edits=TEXT_EDITS)
-def test_excitation_text(folder, excitation, edits):
-    path = folder / 'excitation_text.yaml'
-    path.write_text(edited_text(excitation, edits), errors='replace')
-    judge('excitation.yaml, text', load_excitation, path, None, sound_excitation)
+    path.write_text(damaged(excitation, edits, yaml.safe_load, to_yaml), errors='replace')
+    judge('excitation.yaml', load_excitation, path, None, sound_excitation)
 
 
 def sound_excitation(run, _):
@@ -209,18 +197,12 @@ def sound_excitation(run, _):
     return finite(run.trajectory.q0, run.trajectory.a, run.trajectory.b, run.duration)
 
 
-@given(edits=TREE_EDITS)
-def test_identification_tree(folder, edits):
+@given(edits=EITHER_TREE)
+def test_identification(folder, edits):
     path = folder / 'identification.json'
-    path.write_text(to_json(edited_tree(identification(), edits)))
+    text = to_json(identification())
+    path.write_text(damaged(text, edits, json.loads, to_json), errors='replace')
     judge('identification.json', compared, path, None, sound_comparison)
-
-
-@given(edits=TEXT_EDITS)
-def test_identification_text(folder, edits):
-    path = folder / 'identification_text.json'
-    path.write_text(edited_text(to_json(identification()), edits), errors='replace')
-    judge('identification.json, text', compared, path, None, sound_comparison)
 
 
 def compared(path):
