@@ -11,8 +11,8 @@ from armid_ros.identification.assess.comparison import (
     Comparison,
     GroupChange,
     ParameterChange,
+    ResidualChange,
 )
-from armid_ros.identification.assess.load_change import ResidualChange
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.report.blocks import ContentSection, FactList

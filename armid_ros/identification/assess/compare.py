@@ -11,19 +11,22 @@ A model gets something wrong of every motion, and other motions give other value
 by from recording to recording widens the deviations of each joint, where the files have it. Few
 recordings show that badly: Student's distribution holds then, and that of Fisher for groups.
 
-What a model leaves of the torque of a joint is held against what the other leaves: no parameter
-has a change that neither model describes.
-
 Where both have their covariance, the effects of each joint and the links are looked at as a whole
 too: parameters that are strongly correlated can differ together beyond doubt and none of them
-alone. A change of the links is held against that of a load on one of them.
+alone. What a model leaves of the torque of a joint is held against what the other leaves (Fisher's
+F): no parameter has a change that neither model describes.
+
+A body that is fixed to link k adds its ten parameters to those of the link, and base parameters
+change by G_k p, with the factors G_k that group the parameters of link k in them. Ten numbers p
+that explain dozens of changes, to their uncertainty, are a load; its mass is the first of them.
 
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+import re
 
 from armid_ros.changes.statistic import beyond_chance, quadratic_form, tail
 from armid_ros.errors import ModelError
@@ -31,19 +34,35 @@ from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.comparison import (
     Comparison,
     GroupChange,
+    LoadChange,
     NotCompared,
     ParameterChange,
+    ResidualChange,
 )
-from armid_ros.identification.assess.load_change import find_load, residual_changes
+from armid_ros.identification.assess.grade_limits import FREEDOM
+from armid_ros.identification.known_fit import KnownFit
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.motion import FloatArray
 import numpy as np
+from scipy import stats
+import scipy.linalg
 
 #: Probability that the list of changes has a chance find in it.
 CHANCE = 0.05
 #: Directions of a covariance below this share of the largest, all scaled, are rounding, and so
 #: are differences of a value below this share of it.
 _ROUNDING = 1e-10
+#: Share of its torque below which the residual of a joint is of filters, and not of an arm.
+_LEAST_RESIDUAL = 1e-3
+#: Parameters of a link as base parameters name them, without its number; and with it.
+_SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
+_NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
+#: Probability with which the changes of a load are taken for something else.
+_REFUSED = 0.01
+#: Below this share of the largest a direction of a load is not seen at all.
+_UNSEEN = 1e-9
+#: A mass differs from zero if it is this many standard deviations away.
+_TOLD = 1.96
 
 
 def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
@@ -65,43 +84,37 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     if not shared:
         raise ModelError(_nothing_shared(before, after))
     sides = [_Side.of(one, shared) for one in (first, second)]
-    difference = sides[1].values - sides[0].values
-    covariance = first.covariance_of(shared) + second.covariance_of(shared)
-    scatter = np.concatenate([one.scatter for one in sides])
     joint = before.covariance is not None and after.covariance is not None
-    groups = _groups(shared) if joint else []
+    groups: dict[str, list[int]] = {}
+    for position, name in enumerate(shared if joint else ()):
+        groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
+    places = [group for group in groups.values() if len(group) > 1]
     residuals = residual_changes(before.fit, after.fit)
-    chance = CHANCE / sum((True, bool(groups), bool(residuals)))
-    single = beyond_chance(_single_chances(*sides), chance)
-    freedom = sum(one.freedom for one in sides)
-    together = [
-        _group_chance(difference[g], covariance[np.ix_(g, g)], scatter[:, g], freedom)
-        for g in groups
-    ]
-    rows = np.array([sides[0].values, sides[1].values, sides[0].std, sides[1].std]).T.tolist()
+    chance = CHANCE / sum((True, bool(places), bool(residuals)))
+    wholes = [_Whole.of(sides, (first, second), shared, group) for group in places]
     changes = tuple(
-        ParameterChange(name, row[0], row[1], row[2], row[3], one)
-        for name, row, one in zip(shared, rows, single, strict=True)
+        ParameterChange(name, row[0], row[1], row[2], row[3], sure)
+        for name, row, sure in zip(
+            shared,
+            np.array([*(side.values for side in sides), *(side.std for side in sides)]).T.tolist(),
+            beyond_chance(_single_chances(*sides), chance),
+            strict=True,
+        )
     )
-    sure = beyond_chance(together, chance)
+    sure = beyond_chance([whole.chance for whole in wholes], chance)
     found = tuple(
-        GroupChange('' if own[0].rigid else own[0].joint, own, p_value, one)
-        for own, p_value, one in zip(
-            [tuple(shared[k] for k in group) for group in groups], together, sure, strict=True
+        GroupChange('' if own[0].rigid else own[0].joint, own, whole.chance, one)
+        for own, whole, one in zip(
+            [tuple(shared[k] for k in group) for group in places], wholes, sure, strict=True
         )
     )
     rigid = [k for k, name in enumerate(shared) if name.rigid]
-    moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
-    left = beyond_chance([one.p_value for one in residuals], chance)
-    without = dict.fromkeys((*before.without_std, *after.without_std))
     load = None
-    if joint and moved:
-        noise = covariance[np.ix_(rigid, rigid)]
-        load = find_load(
-            [first.terms.get(shared[k], {}) for k in rigid],
-            difference[rigid],
-            _inflation(noise, scatter[:, rigid]) * noise,
-        )
+    if any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found):
+        whole = _Whole.of(sides, (first, second), shared, rigid)
+        terms = [first.terms.get(shared[k], {}) for k in rigid]
+        load = _find_load(terms, whole.difference, whole.covariance) if joint else None
+    left = beyond_chance([one.p_value for one in residuals], chance)
     return Comparison(
         before,
         after,
@@ -111,7 +124,10 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
         found,
         load,
         tuple(replace(one, changed=sure) for one, sure in zip(residuals, left, strict=True)),
-        tuple(NotCompared(name, 'deviation') for name in without),
+        tuple(
+            NotCompared(name, 'deviation')
+            for name in dict.fromkeys((*before.without_std, *after.without_std))
+        ),
     )
 
 
@@ -163,14 +179,6 @@ def _only_in(one: ParameterFile, other: ParameterFile) -> Iterator[NotCompared]:
             yield NotCompared(name, 'deviation' if other.without_std else 'grouping')
 
 
-def _groups(names: Sequence[ParameterName]) -> list[list[int]]:
-    """Return the positions of the rigid body, and of the effects of each joint; two or more."""
-    groups: dict[str, list[int]] = {}
-    for position, name in enumerate(names):
-        groups.setdefault('' if name.rigid else f'effects of {name.joint}', []).append(position)
-    return [group for group in groups.values() if len(group) > 1]
-
-
 @dataclass(frozen=True)
 class _Side:
     """The parameters that two identifications share, in one of them."""
@@ -180,7 +188,6 @@ class _Side:
     #: vary from recording to recording.
     std: FloatArray
     scatter: FloatArray  # changes of the values without each recording, (K, p)
-    freedom: int  # recordings less one
     #: Degrees of freedom of each deviation: the mean of squares of n values with correlations R
     #: has n^2 over the sum of R^2 times those of one (Satterthwaite). Infinite for noise.
     freedoms: FloatArray
@@ -190,9 +197,8 @@ class _Side:
         """Return the values of one file."""
         values, std = np.array([known.values[name] for name in names]).T
         scatter = known.scatter_of(names)
-        freedom = max(len(scatter) - 1, 0)
         freedoms = np.full(len(names), np.inf)
-        if freedom and np.all(std > 0.0):
+        if len(scatter) > 1 and np.all(std > 0.0):
             squares = np.sum((scatter / std) ** 2, axis=0)
             alike = (known.covariance_of(names) / np.outer(std, std)) ** 2
             std = std.copy()
@@ -201,8 +207,9 @@ class _Side:
                 inflation = float(np.mean(squares[own]))
                 if inflation > 1.0:
                     std[own] *= np.sqrt(inflation)
-                    freedoms[own] = freedom * len(own) ** 2 / np.sum(alike[np.ix_(own, own)])
-        return cls(values, std, scatter, freedom, freedoms)
+                    together = len(own) ** 2 / np.sum(alike[np.ix_(own, own)])
+                    freedoms[own] = (len(scatter) - 1) * together
+        return cls(values, std, scatter, freedoms)
 
 
 def _single_chances(before: _Side, after: _Side) -> FloatArray:
@@ -216,23 +223,38 @@ def _single_chances(before: _Side, after: _Side) -> FloatArray:
     return np.where(std > 0.0, chances, same)
 
 
-def _group_chance(
-    difference: FloatArray, covariance: FloatArray, scatter: FloatArray, freedom: int
-) -> float:
-    """Return how likely differences are by chance, all together."""
-    if not np.all(np.diag(covariance) > 0.0):
-        return 1.0
-    squares, rank = _squares(difference[np.newaxis], covariance)
-    inflation = _inflation(covariance, scatter)
-    return float(tail(squares / inflation, rank, np.inf if inflation <= 1.0 else rank * freedom))
+@dataclass(frozen=True)
+class _Whole:
+    """Differences of several parameters, their covariance, and how likely they are by chance."""
 
+    difference: FloatArray  # (p,)
+    covariance: FloatArray  # of noise, times what recordings show beyond it, (p, p)
+    chance: float
 
-def _inflation(covariance: FloatArray, scatter: FloatArray) -> float:
-    """Return how many times the squares that noise makes recordings show, at least one."""
-    if not (len(scatter) and np.all(np.diag(covariance) > 0.0)):
-        return 1.0
-    squares, rank = _squares(scatter, covariance)
-    return max(1.0, squares / rank)
+    @classmethod
+    def of(
+        cls,
+        sides: Sequence[_Side],
+        files: Sequence[ParameterFile],
+        names: Sequence[ParameterName],
+        group: Sequence[int],
+    ) -> _Whole:
+        """Look at those of some positions among the shared names."""
+        own = [names[k] for k in group]
+        difference = (sides[1].values - sides[0].values)[list(group)]
+        covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
+        if not np.all(np.diag(covariance) > 0.0):
+            return cls(difference, covariance, 1.0)
+        scatter = np.concatenate([side.scatter[:, list(group)] for side in sides])
+        inflation = 1.0
+        if len(scatter):
+            squares, rank = _squares(scatter, covariance)
+            inflation = max(1.0, squares / rank)
+        squares, rank = _squares(difference[np.newaxis], covariance)
+        freedom = sum(max(len(side.scatter) - 1, 0) for side in sides)
+        known = np.inf if inflation <= 1.0 else rank * freedom
+        chance = float(tail(squares / inflation, rank, known))
+        return cls(difference, inflation * covariance, chance)
 
 
 def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
@@ -241,3 +263,82 @@ def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:
     with np.errstate(over='ignore'):
         squares, rank = quadratic_form(rows / std, covariance / np.outer(std, std), _ROUNDING)
         return float(squares.sum()), int(rank.max())
+
+
+def _find_load(
+    terms: Sequence[Mapping[str, float]], difference: FloatArray, covariance: FloatArray
+) -> LoadChange | None:
+    """Return the load on the outermost link that explains changes of base parameters."""
+    # that is where arms hold things; none if its mass does not differ from zero
+    std = np.sqrt(np.diag(covariance))
+    if not len(std) or not np.all(std > 0.0):
+        return None
+    root = np.linalg.cholesky(covariance / np.outer(std, std) + 1e-12 * np.eye(len(std)))
+    white = scipy.linalg.solve_triangular(root, difference / std, lower=True)
+    numbers = {int(found[1]) for row in terms for key in row if (found := _NUMBERED.match(key))}
+    loads = []
+    for link in sorted(numbers):
+        keys = [f'{symbol}{link}' for symbol in _SYMBOLS]
+        factors = np.array([[row.get(key, 0.0) for key in keys] for row in terms])
+        columns = scipy.linalg.solve_triangular(root, factors / std[:, np.newaxis], lower=True)
+        load = _load(link, columns, white)
+        if load is not None:
+            loads.append(load)
+    if not loads:
+        return None
+    return replace(loads[-1], rivals=tuple(load.link for load in loads[:-1]))
+
+
+def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | None:
+    """Fit the load of one link to changes of unit covariance."""
+    lengths = np.linalg.norm(columns, axis=0)
+    scale = np.where(lengths > 0.0, lengths, 1.0)
+    left, sizes, right = np.linalg.svd(columns / scale, full_matrices=False)
+    seen = sizes > _UNSEEN * sizes[0]
+    left, sizes, right = left[:, seen], sizes[seen], right[seen]
+    along = left.T @ white
+    rest = float(white @ white - along @ along)
+    freedom = len(white) - len(sizes)
+    p_value = float(tail(rest, freedom)) if freedom > 0 else 0.0
+    if p_value < _REFUSED or np.linalg.norm(right[:, 0]) < 1.0 - 1e-6:
+        return None
+    values = (right.T @ (along / sizes)) / scale
+    mass, std = float(values[0]), float(np.linalg.norm(right[:, 0] / sizes) / scale[0])
+    if abs(mass) < _TOLD * std:
+        return None
+    whole = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
+    return LoadChange(link, mass, std, values[1:4] / mass if whole else None, p_value)
+
+
+def residual_changes(
+    before: KnownFit | None, after: KnownFit | None
+) -> tuple[ResidualChange, ...]:
+    """
+    Hold against each other what two models leave of each joint.
+
+    Empty where it is not known alike: the misfit of model.yaml and the residual of
+    identification.json are of other rows. What a model gets wrong of an arm is slow, so a
+    recording has few independent values of it, however many rows.
+
+    """
+    if before is None or after is None or before.as_diagnosed != after.as_diagnosed:
+        return ()
+    freedoms = FREEDOM * after.recordings, FREEDOM * before.recordings
+    found = []
+    for joint in (one for one in before.rms if one in after.rms):
+        torques = [one.torque(joint) for one in (before, after)]
+        first, second = (
+            max(one.rms[joint], _LEAST_RESIDUAL * torque)
+            for one, torque in zip((before, after), torques, strict=True)
+        )
+        # a model leaves as many times more as there is more torque
+        growth = torques[1] / torques[0] if min(torques) > 0.0 else 1.0
+        ratio = 1.0 if first == second else second / first if first > 0.0 else np.inf
+        ratio = float(ratio / np.clip(ratio, min(growth, 1.0), max(growth, 1.0)))
+        with np.errstate(over='ignore'):
+            square = np.square(ratio)
+        p_value = 2.0 * min(stats.f.sf(square, *freedoms), stats.f.cdf(square, *freedoms))
+        errors = before.errors.get(joint), after.errors.get(joint)
+        left = before.rms[joint], after.rms[joint]
+        found.append(ResidualChange(joint, *left, *errors, ratio, min(float(p_value), 1.0)))
+    return tuple(found)

@@ -6,33 +6,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import Any, Literal
 
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.load_change import LoadChange, ResidualChange
 from armid_ros.identification.parameters_file import ParameterFile
 from armid_ros.identification.rows.checks import NEAR
+from armid_ros.motion import FloatArray
 import numpy as np
 
 SCHEMA = 'armid/comparison/1'
+#: Deviations from zero of a value that a ratio is taken of, how many there have to be, and the
+#: share of them that has to agree.
+_CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
 
 
 @dataclass(frozen=True)
 class ParameterChange:
     """
-    One parameter in both.
+    One parameter in both: values, standard deviations, and whether they differ beyond chance.
 
     Attributes
     ----------
     parameter : ParameterName
-        Which.
-    before, after : float
-        Values.
-    before_std, after_std : float
-        Standard deviations.
+    before, after, before_std, after_std : float
     changed : bool
-        Whether it differs by more than chance.
 
     """
 
@@ -64,18 +63,15 @@ class ParameterChange:
 @dataclass(frozen=True)
 class GroupChange:
     """
-    Parameters that are looked at as a whole.
+    Two or more parameters as a whole, and the probability that chance makes them differ as much.
 
     Attributes
     ----------
     joint : str
         Whose effects; empty for the rigid body.
     parameters : tuple of ParameterName
-        What is in it, two or more.
     p_value : float
-        Probability that chance alone makes them differ as much.
     changed : bool
-        Whether they differ by more than chance.
 
     """
 
@@ -85,37 +81,96 @@ class GroupChange:
     changed: bool
 
 
-#: 'deviation': a file has no standard deviation of it, or of what it groups. 'motion': the other
-#: motion does not show it. 'effect': the other model has no such effect there. 'grouping': the
-#: other data group the parameters of links differently.
-Why = Literal['deviation', 'motion', 'effect', 'grouping']
+@dataclass(frozen=True)
+class LoadChange:
+    """
+    A load on one link.
+
+    Attributes
+    ----------
+    link : int
+        Number of the link, 1 next to the base.
+    mass, mass_std : float
+        Mass that was added, negative if taken away, and its standard deviation [kg].
+    center : ndarray, shape (3,), or None
+        Its centre of mass in the joint frame of the link [m]; None where it is not determined.
+    p_value : float
+        Probability of what it leaves unexplained, by chance.
+    rivals : tuple of int
+        Numbers of links on which a load would explain the changes as well.
+
+    """
+
+    link: int
+    mass: float
+    mass_std: float
+    center: FloatArray | None
+    p_value: float
+    rivals: tuple[int, ...] = ()
+
+    def document(self) -> dict[str, Any]:
+        """Return the load for programs to read."""
+        center = None if self.center is None else self.center.tolist()
+        return {**asdict(self), 'center': center, 'rivals': list(self.rivals)}
+
+
+@dataclass(frozen=True)
+class ResidualChange:
+    """
+    What two models leave of one joint.
+
+    Attributes
+    ----------
+    joint : str
+        Which.
+    before, after : float
+        Root mean square residual, as the file has it [N m].
+    before_error, after_error : float or None
+        The same over the torque of the joint [%].
+    ratio : float
+        Of the second to the first, divided by how much more torque there was.
+    p_value : float
+        Probability that motions alone make them differ as much.
+    changed : bool
+        Whether they differ by more than chance.
+
+    """
+
+    joint: str
+    before: float
+    after: float
+    before_error: float | None
+    after_error: float | None
+    ratio: float
+    p_value: float
+    changed: bool = False
+
+    def document(self) -> dict[str, Any]:
+        """Return it for programs to read."""
+        return asdict(self) | {'ratio': self.ratio if isfinite(self.ratio) else None}
 
 
 @dataclass(frozen=True)
 class NotCompared:
     """
-    A parameter that is not compared.
+    A parameter that is not compared, and why.
 
     Attributes
     ----------
     parameter : ParameterName
-        Which.
     why : {'deviation', 'motion', 'effect', 'grouping'}
-        What stands against it.
+        A file has no standard deviation of it, or of what it groups; the other motion does not
+        show it; the other model has no such effect there; or the other data group the parameters
+        of links differently.
 
     """
 
     parameter: ParameterName
-    why: Why
+    why: Literal['deviation', 'motion', 'effect', 'grouping']
 
     def document(self) -> dict[str, str]:
         """Return it for programs to read."""
         return {'name': self.parameter.name, 'joint': self.parameter.joint, 'why': self.why}
-
-
-#: Deviations from zero of a value that a ratio is taken of, how many there have to be, and the
-#: share of them that has to agree.
-_CLEAR, _FEWEST, _MOST = 5.0, 4, 0.8
 
 
 @dataclass(frozen=True)
@@ -129,12 +184,14 @@ class Comparison:
         What was compared.
     changes : tuple of ParameterChange
         Every parameter that both have, in the order of the first.
-    only_before, only_after : tuple of NotCompared
-        What the other does not have.
+    only_before, only_after, left_out : tuple of NotCompared
+        What the other does not have, and what has no standard deviation.
     groups : tuple of GroupChange
         Effects of every joint and the rigid body as a whole; empty without covariances.
     load : LoadChange or None
         The load on one link that explains all changes of the rigid body.
+    residuals : tuple of ResidualChange
+        What both models leave of each joint, where both files have it alike.
 
     """
 
@@ -188,29 +245,18 @@ class Comparison:
 
     def document(self) -> dict[str, Any]:
         """Return the comparison for programs to read (schema armid/comparison/1)."""
+        parameters = []
+        for change in self.changes:
+            row = asdict(change)
+            parameters.append(row.pop('parameter') | row)
         return {
             'schema': SCHEMA,
             'before': self.before.source,
             'after': self.after.source,
-            'parameters': [
-                {
-                    **asdict(c.parameter),
-                    'before': c.before,
-                    'before_std': c.before_std,
-                    'after': c.after,
-                    'after_std': c.after_std,
-                    'changed': c.changed,
-                }
-                for c in self.changes
-            ],
+            'parameters': parameters,
             'groups': [
-                {
-                    'joint': g.joint,
-                    'parameters': [p.name for p in g.parameters],
-                    'p_value': g.p_value,
-                    'changed': g.changed,
-                }
-                for g in self.groups
+                asdict(group) | {'parameters': [one.name for one in group.parameters]}
+                for group in self.groups
             ],
             'load': None if self.load is None else self.load.document(),
             'factors': self.factors,
@@ -221,9 +267,10 @@ class Comparison:
                 if one.fit is not None
             ],
             'not_compared': len(self.not_compared),
-            'left_out': [one.document() for one in self.left_out],
-            'only_before': [one.document() for one in self.only_before],
-            'only_after': [one.document() for one in self.only_after],
+            **{
+                name: [one.document() for one in getattr(self, name)]
+                for name in ('left_out', 'only_before', 'only_after')
+            },
         }
 
 

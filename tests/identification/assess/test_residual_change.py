@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a model leaves of a joint: more of it than chance is a change, and so is less."""
 
-from armid_ros.identification.assess.load_change import FREEDOM, residual_changes
+from armid_ros.identification.assess.compare import residual_changes
+from armid_ros.identification.assess.grade_limits import FREEDOM
 from armid_ros.identification.known_fit import KnownFit
 import numpy as np
 import pytest
