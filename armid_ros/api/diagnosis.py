@@ -223,7 +223,7 @@ class DiagnosisResult(ShownModel):
         if not self.held_out or self.core.gap is None:
             return self
 
-        def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...], str]:
+        def simulated() -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
             used = conditioning(list(self.recordings), self.settings.signals)
             return simulate_held_out(
                 self.description, self.arm, used, self.held_out,
@@ -231,7 +231,7 @@ class DiagnosisResult(ShownModel):
             )  # fmt: skip
 
         found, why = _tried('simulation', simulated)
-        forward, left_out, _ = found or ((), (), '')
+        forward, left_out = found or ((), ())
         extras = replace(self.extras, forward=forward)
         return replace(self, extras=extras)._with_notes(*left_out, *why)
 

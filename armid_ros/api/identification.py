@@ -236,8 +236,6 @@ class IdentificationResult(ShownModel):
 
         core, estimate, joints = self.core, self.estimate, self.arm.robot.joints
         others = self.graded.reasons[1:]
-        if self.verification is not None and self.verification.unfit:
-            others = (f'The model cannot be simulated: {self.verification.unfit}.', *others)
         shown = [fit for fits in self.validation.values() for fit in fits] or core.training
         known = int(np.sum(excludes_zero(estimate.values, estimate.std)))
         count = f'{known} of {counted(len(estimate.parameters), "parameter")} differ from zero'

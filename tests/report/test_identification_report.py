@@ -7,13 +7,11 @@ from dataclasses import fields, replace
 from html.parser import HTMLParser
 import re
 
-from armid_ros.api.identification import IdentificationResult
 from armid_ros.identification import (
     Fit,
     IdentificationSettings,
     identify,
     PhysicalSettings,
-    Verification,
     verify,
 )
 from armid_ros.identification.assess.consistency import NoiseCheck
@@ -402,14 +400,3 @@ def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
         'document.querySelector("#data-quality button.tool").click()'
     )
     assert browser.run('window.copied').startswith('"Recording","Used for"')
-
-
-def test_the_terminal_has_that_the_model_cannot_be_simulated(case):
-    failed = Verification(None, (), ('a.mcap: not simulated: no body',), 'no body')
-    unasked = Verification(None, (), ('not simulated: no recording was held out',))
-    said = 'The model cannot be simulated: no body.'
-    for verification, expected in ((failed, True), (unasked, False)):
-        found = IdentificationResult(
-            case.result, case.description, case.recordings[:1], (), {}, verification
-        )
-        assert (said in found.summary().full_text()) == expected

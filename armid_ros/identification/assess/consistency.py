@@ -22,7 +22,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
 from armid_ros.identification.fitting.instruments import by_instruments, linear_problem, smoothed
 from armid_ros.identification.fitting.least_squares import solve
@@ -96,20 +95,14 @@ class NoiseCheck:
         """Whether no parameter is biased by a share of its deviation that matters."""
         return bool(np.max(np.abs(self.relative_bias), initial=0.0) < BIAS_LIMIT)
 
-    def findings(self) -> tuple[tuple[str, bool], ...]:
-        """Say in words what was found, each with whether it is as it should be."""
-        test, bias = self.sentences()
-        return (test, self.consistent), (bias, self.harmless)
-
-    def sentences(self) -> tuple[str, str]:
+    def findings(self) -> tuple[tuple[str, bool], tuple[str, bool]]:
         """
-        Say in words what was found.
+        Say in words what was found, each with whether it is as it should be.
 
         Where the test fires and the noise makes no bias that matters, something else sets the
         two fits apart: what the model lacks, whose share of each is not the same.
 
         """
-        low, high = self.position_noise.min(), self.position_noise.max()
         found = 'no sign' if self.consistent else 'a sign'
         found += ' that encoder noise biases the parameters'
         if self.harmless and not self.consistent:
@@ -121,13 +114,19 @@ class NoiseCheck:
         name = self.instrumental.parameters[worst]
         leader = name.name.split(' ')[0]
         where = f'{leader} of {name.joint}' if name.joint else leader
-        size = float(abs(self.relative_bias[worst]))
+        low, high = self.position_noise.min(), self.position_noise.max()
         verdict = 'negligible' if self.harmless else 'the intervals are off by the bias'
         return (
-            f'Durbin-Wu-Hausman test: {found} (statistic {self.statistic:.1f}, '
-            f'{self.freedom:.1f} degrees of freedom, p = {self.p_value:.2g})',
-            f'position noise {low:.2g} to {high:.2g} rad (or m): {verdict} (bias at most '
-            f'{size:.2g} standard deviations, in {where})',
+            (
+                f'Durbin-Wu-Hausman test: {found} (statistic {self.statistic:.1f}, '
+                f'{self.freedom:.1f} degrees of freedom, p = {self.p_value:.2g})',
+                self.consistent,
+            ),
+            (
+                f'position noise {low:.2g} to {high:.2g} rad (or m): {verdict} (bias at most '
+                f'{abs(self.relative_bias[worst]):.2g} standard deviations, in {where})',
+                self.harmless,
+            ),
         )
 
 
@@ -137,7 +136,7 @@ def check_noise(
     *,
     rng: np.random.Generator,
     repeats: int = 6,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> NoiseCheck:
     """
     Test an identification for the effect of encoder noise and estimate its bias.
@@ -155,29 +154,16 @@ def check_noise(
     progress : callable, optional
         Told the share that is done, 0 to 1.
 
-    Returns
-    -------
-    NoiseCheck
-        Test and bias.
-
-    Raises
-    ------
-    IdentificationError
-        If there are fewer than 2 repeats.
-
     """
-    if repeats < 2:
-        raise IdentificationError(f'{repeats} simulations do not tell a mean from chance: take 2')
-    report = progress or (lambda share: None)
     about = partial(
         linear_problem, result.arm, result.base, used=result.used, linear=result.passes == 1
     )
     problem = about(recordings)
-    report(1.0 / (repeats + 2))
+    progress(1.0 / (repeats + 2))
     weights = solve(problem, result.settings.least_squares).weights
     calm = smoothed(recordings, result.used)
     exact = about(calm)
-    report(2.0 / (repeats + 2))
+    progress(2.0 / (repeats + 2))
     found = by_instruments(problem, [part.columns for part in exact], weights)
     unit = 1.0 / np.sqrt(np.diag(found.covariance))
     sizes, axes = np.linalg.eigh(found.spread * np.outer(unit, unit))
@@ -198,7 +184,7 @@ def check_noise(
         both = np.column_stack([w, torque - _torque(noisy, weights, values)])
         gain = np.linalg.lstsq(weighted_rows(noisy, weights)[0] * scale, both, rcond=None)[0]
         biases.append(np.linalg.solve(gain[:, :-1], gain[:, -1]))
-        report((k + 3.0) / (repeats + 2))
+        progress((k + 3.0) / (repeats + 2))
     return NoiseCheck(
         statistic=statistic,
         freedom=freedom,

@@ -6,49 +6,47 @@ What an identification is put to beside its torque error, and what came of it.
 Encoder noise is tested for on the training data; on held-out data the description and the
 identified arm are simulated in closed loop. What cannot be done is said, with the reason.
 
-In a forward validation a model is driven by recorded torques, and its positions are looked at. A
-torque error says how well inverse dynamics fit; what a torque does to the motion is another
-question, and the one that a simulation has to answer. The model is given the recorded torque and,
-since errors of an integrated torque grow without bounds, a feedback that holds it to the
-recorded motion: tau = tau_recorded + M (omega^2 e + 2 omega de). A joint that would need a torque
-error d more than it gets is off by about d / (M omega^2). The feedback has one inertia matrix for
-every model, so that their errors compare.
+In a forward validation a model is driven by recorded torques, and its positions are looked at. The
+model is given the recorded torque and, since errors of an integrated torque grow without bounds, a
+feedback that holds it to the recorded motion: tau = tau_recorded + M (omega^2 e + 2 omega de). A
+joint that would need a torque error d more than it gets is off by about d / (M omega^2). The
+feedback has one inertia matrix for every model, so that their errors compare.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError, IdentificationError, ModelError
+from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.identification.assess.consistency import check_noise, NoiseCheck
 from armid_ros.identification.fitting.instruments import unlimited
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
-from armid_ros.robots import Robot
-from armid_ros.simulation import Controller, Plant, simulate
+from armid_ros.simulation import ComputedTorque, Plant, simulate
 from armid_ros.simulation.controller import Desired
 import numpy as np
 import pinocchio as pin
 
-#: Motion that is simulated, shared by the held-out recordings; it takes a tenth of that [s].
-SIMULATED = 60.0
-#: At most this much of one recording [s].
-LONGEST = 30.0
-#: Samples that tell the bias of encoder noise well enough, all simulations together.
-_ENOUGH = 300_000
-_MOST_REPEATS = 6
+#: Motion that is simulated, shared by the held-out recordings, which takes a tenth of that; and at
+#: most this much of one recording [s].
+_SIMULATED, _LONGEST = 60.0, 30.0
+#: Samples that tell the bias of encoder noise well enough, all simulations together; and fewest
+#: and most simulations.
+_ENOUGH, _REPEATS = 300_000, (2, 6)
 #: A joint is worse where its error grows by this share, and by this share of the largest error of
 #: joints of its kind; reversals of friction vary by less from one model to the next.
 _WORSE = 0.05
 #: Natural frequency of the feedback [rad/s]: 8 Hz, as of arms. A softer one would leave a light
 #: joint to its friction, whose sign at a reversal no model has to the millisecond.
-BANDWIDTH = 50.0
+_BANDWIDTH = 50.0
+
+Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -92,33 +90,38 @@ class ForwardScore:
             f'{1e3 * self.position_error[joint]:.3g} m{self.units[joint]} ({self.joints[joint]})'
         )
 
+    def document(self) -> dict[str, dict[str, float]]:
+        """Return the errors of every joint for programs to read."""
+        named = {
+            'position_rms': self.position_error,
+            'torque_rms': self.torque_error,
+            'feedback_torque_rms': self.feedback_torque,
+        }
+        return {
+            name: dict(zip(self.joints, values.tolist(), strict=True))
+            for name, values in named.items()
+        }
 
-@dataclass(frozen=True, eq=False)
-class _RecordedTorque(Controller):
-    """The recorded torque, and a feedback of an inertia that holds the arm to its motion."""
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _RecordedTorque(ComputedTorque):
+    """The recorded torque, and a feedback of the inertia of an arm that holds it to its motion."""
 
     motion: Motion
-    robot: Robot
-    inertia: FloatArray
-    _data: pin.Data = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Make scratch memory."""
-        object.__setattr__(self, '_data', self.robot.model.createData())
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return the recorded torque at the times of a reference, shape (N, n) [N m]."""
         assert self.motion.tau is not None
-        t = self.motion.t - self.motion.t[0]
+        t = self.motion.t
         return np.column_stack([np.interp(desired.t, t, column) for column in self.motion.tau.T])
 
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
     ) -> FloatArray:
         """Return the recorded torque and the feedback, shape (n,)."""
-        pull = BANDWIDTH**2 * (desired[0] - q) + 2.0 * BANDWIDTH * (desired[1] - dq)
-        mass = pin.crba(self.robot.model, self._data, q)
-        return np.asarray(feedforward + mass @ pull + self.inertia * pull)
+        pull = self.bandwidth**2 * (desired[0] - q) + 2.0 * self.bandwidth * (desired[1] - dq)
+        tau = feedforward + pin.crba(self._robot.model, self._data, q) @ pull
+        return np.asarray(tau if self._inertia is None else tau + self._inertia @ pull)
 
 
 def forward_validation(
@@ -127,7 +130,7 @@ def forward_validation(
     used: Conditioning,
     *,
     nominal: ArmModel | None = None,
-    duration: float = 30.0,
+    duration: float = _LONGEST,
 ) -> ForwardScore:
     """
     Simulate an arm in closed loop along a recording, driven by the recorded torques.
@@ -164,10 +167,7 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    nominal = nominal or arm
-    added = nominal.action().inertia
-    rotors = np.zeros(motion.n_joints) if added is None else np.diag(added)
-    controller = _RecordedTorque(reference, nominal.body, rotors)
+    controller = _RecordedTorque(arm=nominal or arm, bandwidth=_BANDWIDTH, motion=reference)
     plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
     run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
     t = run.truth.t
@@ -224,25 +224,16 @@ class ForwardValidation:
         return tuple(name for name, more in zip(self.after.joints, grown, strict=True) if more)
 
     def comment(self) -> str:
-        """Say where it got worse, or that the largest error did not get better; '' otherwise."""
-        if self.before is None:
-            return ''
-        if self.worse:
-            return f'it is worse than before in {", ".join(self.worse)}'
-        before, after = self.before.position_error, self.after.position_error
-        first = int(np.argmax(after))
-        changed = bool(np.any(after < (1.0 - _WORSE) * before))
-        if changed and after[first] > (1.0 - _WORSE) * before[first]:
-            return f'it is no better than before in {self.after.joints[first]}'
-        return ''
+        """Say where it is worse than before; '' where it is not."""
+        return f'it is worse than before in {", ".join(self.worse)}' if self.worse else ''
 
     def document(self) -> dict[str, Any]:
         """Return the errors for programs to read."""
         return {
             'bag': self.after.source,
             'seconds': float(np.ptp(self.after.motion.t)),
-            'before': None if self.before is None else _errors(self.before),
-            'after': _errors(self.after),
+            'before': None if self.before is None else self.before.document(),
+            'after': self.after.document(),
         }
 
 
@@ -259,20 +250,17 @@ class Verification:
         Simulations along held-out recordings.
     left_out : tuple of str
         What was not done, and why.
-    unfit : str
-        Why the identified model cannot be simulated; empty if it can, or was not tried.
 
     """
 
     noise: NoiseCheck | None
     forward: tuple[ForwardValidation, ...]
     left_out: tuple[str, ...]
-    unfit: str = ''
 
     def sentences(self) -> tuple[str, ...]:
         """Say in words what was found; ``left_out`` says what was not done."""
-        said = [] if self.noise is None else [*self.noise.sentences()]
-        return (*said, *(pair.sentence() for pair in self.forward))
+        found = () if self.noise is None else self.noise.findings()
+        return (*(text for text, _ in found), *(pair.sentence() for pair in self.forward))
 
 
 def verify(
@@ -282,7 +270,7 @@ def verify(
     held_out: Sequence[Recording],
     *,
     rng: np.random.Generator,
-    progress: Callable[[float, str], None] = lambda share, what: None,
+    progress: Progress = lambda share, what: None,
 ) -> Verification:
     """
     Test an identification for encoder noise, and simulate it along held-out recordings.
@@ -293,10 +281,8 @@ def verify(
         The identification.
     description : ArmModel
         The model before it.
-    recordings : sequence of Recording
-        What it was fitted to.
-    held_out : sequence of Recording
-        What it was not.
+    recordings, held_out : sequence of Recording
+        What it was fitted to, and what it was not.
     rng : numpy.random.Generator
         Draws the noise of the simulations.
     progress : callable, optional
@@ -306,21 +292,20 @@ def verify(
     left_out = []
     noise = None
     repeats = _ENOUGH // max(1, sum(len(recording) for recording in recordings))
-    repeats = int(np.clip(repeats, 2, _MOST_REPEATS))
     try:
         noise = check_noise(
             result,
             recordings,
             rng=rng,
-            repeats=repeats,
+            repeats=int(np.clip(repeats, *_REPEATS)),
             progress=lambda share: progress(share, 'testing for encoder noise'),
         )
     except (ArmidError, np.linalg.LinAlgError) as error:
         left_out.append(f'not tested for encoder noise: {error}')
-    forward, missing, unfit = simulate_held_out(
+    forward, missing = simulate_held_out(
         description, result.arm, result.used, held_out, progress=progress
     )
-    return Verification(noise, forward, (*left_out, *missing), unfit)
+    return Verification(noise, forward, (*left_out, *missing))
 
 
 def simulate_held_out(
@@ -329,8 +314,8 @@ def simulate_held_out(
     used: Conditioning,
     held_out: Sequence[Recording],
     *,
-    progress: Callable[[float, str], None] = lambda share, what: None,
-) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...], str]:
+    progress: Progress = lambda share, what: None,
+) -> tuple[tuple[ForwardValidation, ...], tuple[str, ...]]:
     """
     Simulate two models in closed loop along held-out recordings.
 
@@ -351,41 +336,28 @@ def simulate_held_out(
         One a recording that could be simulated.
     left_out : tuple of str
         What was not done, and why.
-    unfit : str
-        Why the second model cannot be simulated; empty if it can, or was not tried.
 
     """
     if not held_out:
-        return (), ('not simulated: no recording was held out',), ''
+        return (), ('not simulated: no recording was held out',)
     if after.quasi_static:
-        return (), ('not simulated: a quasi-static model has no inertia',), ''
+        return (), ('not simulated: a quasi-static model has no inertia',)
     pairs: list[ForwardValidation] = []
     left_out: list[str] = []
-    unfit = ''
-    duration = min(LONGEST, SIMULATED / len(held_out))
+    duration = min(_LONGEST, _SIMULATED / len(held_out))
     for index, recording in enumerate(held_out):
         progress(index / len(held_out), 'simulating held-out recordings')
-        try:
-            patched = forward_validation(after, recording, used, nominal=after, duration=duration)
-        except ArmidError as error:
-            left_out.append(f'{recording.source}: not simulated: {error}')
-            unfit = unfit or (str(error) if isinstance(error, ModelError) else '')
-            continue
-        plain = None
-        try:
-            plain = forward_validation(before, recording, used, nominal=after, duration=duration)
-        except ArmidError as error:
-            left_out.append(f'{recording.source}: the description is not simulated: {error}')
-        pairs.append(ForwardValidation(plain, patched))
-    return tuple(pairs), tuple(left_out), unfit
-
-
-def _errors(score: ForwardScore) -> dict[str, dict[str, float]]:
-    return {
-        name: dict(zip(score.joints, values.tolist(), strict=True))
-        for name, values in (
-            ('position_rms', score.position_error),
-            ('torque_rms', score.torque_error),
-            ('feedback_torque_rms', score.feedback_torque),
-        )
-    }
+        scores: list[ForwardScore | None] = []
+        for arm, what in ((after, ''), (before, 'the description is ')):
+            try:
+                score = forward_validation(arm, recording, used, nominal=after, duration=duration)
+            except ArmidError as error:
+                left_out.append(f'{recording.source}: {what}not simulated: {error}')
+                score = None
+            scores.append(score)
+            if scores[0] is None:
+                break
+        else:
+            assert scores[0] is not None
+            pairs.append(ForwardValidation(scores[1], scores[0]))
+    return tuple(pairs), tuple(left_out)
