@@ -34,12 +34,8 @@ class Agreement:
 
     Attributes
     ----------
-    parameters : int
-        How many.
-    within : int
-        Of them within two standard deviations of the truth.
-    expected : float
-        How many of them should be, on average.
+    parameters, within : int
+        How many, and how many of them are within two standard deviations of the truth.
     distance : float
         e' C^-1 e, of the errors e and their covariance C (Mahalanobis 1936).
     lower, upper : float
@@ -49,7 +45,6 @@ class Agreement:
 
     parameters: int
     within: int
-    expected: float
     distance: float
     lower: float
     upper: float
@@ -59,29 +54,21 @@ class Agreement:
         """
         Compare an estimate of P parameters with the truth, shape (P,).
 
-        Parameters
-        ----------
-        estimate : Estimate
-            Values with covariance.
-        truth : ndarray, shape (P,)
-            What they should be.
-        freedom : float
-            Independent values that the covariance is estimated from; many if it is known.
+        The covariance is estimated from `freedom` independent values: many if it is known.
 
         """
         scaled = (estimate.values - truth) / estimate.std
         correlation = estimate.covariance / np.outer(estimate.std, estimate.std)
-        count = len(scaled)
-        tail = 0.5 * (1.0 - _COVERED)
+        count, tail = len(scaled), 0.5 * (1.0 - _COVERED)
         lower, upper = count * scipy.stats.f.ppf((tail, 1.0 - tail), count, freedom)
-        return Agreement(
-            parameters=count,
-            within=int(np.sum(np.abs(scaled) < WIDTH)),
-            expected=float(count * (2.0 * scipy.stats.norm.cdf(WIDTH) - 1.0)),
-            distance=float(scaled @ np.linalg.solve(correlation, scaled)),
-            lower=float(lower),
-            upper=float(upper),
-        )
+        distance = float(scaled @ np.linalg.solve(correlation, scaled))
+        within = int(np.sum(np.abs(scaled) < WIDTH))
+        return Agreement(count, within, distance, float(lower), float(upper))
+
+    @property
+    def expected(self) -> float:
+        """Return how many should be within two standard deviations, on average."""
+        return float(self.parameters * (2.0 * scipy.stats.norm.cdf(WIDTH) - 1.0))
 
     @property
     def holds(self) -> bool:
