@@ -121,9 +121,8 @@ class NoiseLevel:
         size = robust_scale(errors, SHARE)
         self._remember(size, share_of_noise(errors, size))
         self.see_steps(moves)
-        loudest = np.argmax(self._sizes, axis=0)[np.newaxis]
-        size, noisy = (np.take_along_axis(x, loudest, 0)[0] for x in (self._sizes, self._shares))
-        self.usual = Usual(period, np.maximum(size, self._least(period)), noisy)
+        usual = _loudest(period, self._sizes, self._shares)
+        self.usual = replace(usual, size=np.maximum(usual.size, self._least(period)))
 
     def _remember(self, size: FloatArray, noisy: FloatArray) -> None:
         place = self._seen % _REMEMBERED
@@ -132,9 +131,7 @@ class NoiseLevel:
 
     def see_steps(self, moves: FloatArray) -> None:
         """Learn the resolution from moves of shape (k, m)."""
-        steps = np.abs(moves)
-        steps = np.concatenate([self._steps, np.where(steps > 0.0, steps, np.inf)])
-        self._steps = np.partition(steps, SEEN - 1, axis=0)[:SEEN]
+        self._steps = _smallest(np.concatenate([self._steps, np.abs(moves)]))
 
     def _least(self, period: float) -> FloatArray:
         """Return the smallest step of every signal, at least the finest and that of an onset."""
@@ -157,23 +154,18 @@ class LineErrors:
         How far off each sample is, when a smooth signal bends on; 0 for the first of a stretch.
     bent : ndarray, shape (N, m)
         How far off the straight line it is, over a period.
-    noise, bend : ndarray, shape (N, 1)
-        How much more noise, and an acceleration, make a prediction over this time miss than one
-        over a period.
+    limit : ndarray, shape (N, m)
+        How far off is too far.
     usual : Usual
         What is usual of the loudest part of the whole.
-    quantile : float
-        Standard deviations that a prediction may miss by.
 
     """
 
     stretch: npt.NDArray[np.intp]
     error: FloatArray
     bent: FloatArray
-    noise: FloatArray
-    bend: FloatArray
+    limit: FloatArray
     usual: Usual
-    quantile: float
 
     def off(self, floor: FloatArray) -> FloatArray:
         """
@@ -189,9 +181,8 @@ class LineErrors:
         ndarray, shape (N, m)
 
         """
-        limit = self.usual.limits(self.quantile, self.noise, self.bend)
-        limit = np.maximum(limit, floor)
-        return np.asarray(np.abs(self.error) / np.maximum(limit, np.finfo(float).tiny))
+        limit = np.maximum(np.maximum(self.limit, floor), np.finfo(float).tiny)
+        return np.asarray(np.abs(self.error) / limit)
 
 
 def line_errors(
@@ -224,52 +215,35 @@ def line_errors(
     gap = dt > max_gap * period
     first = np.where(np.concatenate([[True], gap]), np.arange(len(t)), 0)
     ratio = dt[1:] / dt[:-1]
-    noise = np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)
-    bend = 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2
-    error = moves[1:] - ratio[:, np.newaxis] * moves[:-1]
-    error[gap[1:] | gap[:-1]] = 0.0
-    usual = _usual(period, error / np.maximum(noise, bend)[:, np.newaxis])
-    smallest = np.minimum(_smallest_steps(np.abs(moves)), np.abs(error).max(axis=0))
-    usual = replace(usual, size=np.maximum(usual.size, smallest))
-    bent = error / bend[:, np.newaxis]
-    error[1:] -= usual.smoothness * bent[:-1] * bend[1:, np.newaxis]
-    none = np.zeros((2, x.shape[1]))
-    return LineErrors(
-        np.maximum.accumulate(first),
-        np.concatenate([none, error]),
-        np.concatenate([none, bent]),
-        np.concatenate([[1.0, 1.0], noise])[:, np.newaxis],
-        np.concatenate([[1.0, 1.0], bend])[:, np.newaxis],
-        usual,
-        quantile(period),
-    )
+    noise = np.concatenate([[1.0, 1.0], np.sqrt((1.0 + (1.0 + ratio) ** 2 + ratio**2) / 6.0)])
+    bend = np.concatenate([[1.0, 1.0], 0.5 * dt[1:] * (dt[1:] + dt[:-1]) / period**2])
+    noise, bend = noise[:, np.newaxis], bend[:, np.newaxis]
+    error = np.zeros_like(x)
+    error[2:] = moves[1:] - ratio[:, np.newaxis] * moves[:-1]
+    error[2:][gap[1:] | gap[:-1]] = 0.0
+    plain = error[2:] / np.maximum(noise, bend)[2:]
+    windows = np.array_split(plain, max(1, len(plain) // WINDOW))
+    sizes = np.array([robust_scale(part, SHARE) for part in windows])
+    shares = [share_of_noise(part, size) for part, size in zip(windows, sizes, strict=True)]
+    usual = _loudest(period, sizes, np.array(shares))
+    smallest = _smallest(np.abs(moves))[-1]
+    least = np.minimum(np.where(np.isfinite(smallest), smallest, 0.0), np.abs(error).max(axis=0))
+    usual = replace(usual, size=np.maximum(usual.size, least))
+    bent = error / bend
+    error[3:] -= usual.smoothness * bent[2:-1] * bend[3:]
+    limit = usual.limits(quantile(period), noise, bend)
+    return LineErrors(np.maximum.accumulate(first), error, bent, limit, usual)
 
 
-def _usual(period: float, errors: FloatArray) -> Usual:
-    """Return what is usual of the loudest of all windows of errors (N, m)."""
-    windows = max(1, len(errors) // WINDOW)
-    size, longer = divmod(len(errors), windows)
-    signals, cut = errors.shape[1], longer * (size + 1)
-    parts = [
-        errors[:cut].reshape(longer, size + 1, signals),
-        errors[cut:].reshape(windows - longer, size, signals),
-    ]
-    parts = [part.swapaxes(0, 1) for part in parts if len(part)]
-    sizes = [robust_scale(part, SHARE) for part in parts]
-    noisy = np.concatenate([share_of_noise(*both) for both in zip(parts, sizes, strict=True)])
-    every = np.concatenate(sizes)
-    loudest = np.argmax(every, axis=0)[np.newaxis]
-    return Usual(
-        period,
-        np.take_along_axis(every, loudest, 0)[0],
-        np.take_along_axis(noisy, loudest, 0)[0],
-    )
+def _loudest(period: float, sizes: FloatArray, shares: FloatArray) -> Usual:
+    """Return what is usual of the loudest of all windows, shape (K, m)."""
+    loudest = np.argmax(sizes, axis=0)[np.newaxis]
+    size, noisy = (np.take_along_axis(one, loudest, 0)[0] for one in (sizes, shares))
+    return Usual(period, size, noisy)
 
 
-def _smallest_steps(steps: FloatArray) -> FloatArray:
-    """Return the smallest step of every signal that is seen so often, 0 where none is."""
-    steps = np.where(steps > 0.0, steps, np.inf)
-    if len(steps) < SEEN:
-        return np.zeros(steps.shape[1])
-    smallest = np.partition(steps, SEEN - 1, axis=0)[SEEN - 1]
-    return np.where(np.isfinite(smallest), smallest, 0.0)
+def _smallest(steps: FloatArray) -> FloatArray:
+    """Return the smallest steps of every signal that are not zero, shape (SEEN, m)."""
+    none = np.full((SEEN, steps.shape[1]), np.inf)
+    steps = np.concatenate([none, np.where(steps > 0.0, steps, np.inf)])
+    return np.partition(steps, SEEN - 1, axis=0)[:SEEN]
