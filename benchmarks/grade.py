@@ -86,8 +86,6 @@ def mistaken(robot, recording) -> Iterator:
     quarter = np.where(np.arange(robot.n_joints) == 2, np.pi / 2, 0.0)
     order = [0, 2, 1, *range(3, robot.n_joints)]
     tenth = round(0.1 / recording.period)
-    spike = np.array(recording.tau)
-    spike[len(spike) // 2, 1] = 1e6
     early, late = slice(0, len(recording.t) - tenth), slice(tenth, None)
     yield 'opposite sign', robot, replace(recording, q=recording.q * sign)
     yield 'the zero of', robot, replace(recording, q=recording.q + quarter)
@@ -103,7 +101,6 @@ def mistaken(robot, recording) -> Iterator:
         robot,
         replace(recording, t=recording.t[early], q=recording.q[late], tau=recording.tau[early]),
     )
-    yield '1e+06', robot, replace(recording, tau=spike)
 
 
 def said_of(robot, recording):

@@ -10,7 +10,7 @@ from typing import Any
 
 from armid_ros.arm.misfit import misfit_of_block
 from armid_ros.files import finite
-from armid_ros.identification.assess.grade import by_error
+from armid_ros.identification.assess.grade_limits import by_error
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, get_args, Literal
 
-from armid_ros.identification.assess.dead_sensors import dead_encoders
-from armid_ros.identification.assess.velocities import time_base_fault, velocity_faults
+from armid_ros.identification.assess.sensor_faults import encoder_faults, velocity_faults
 from armid_ros.identification.rows.checks import beyond_limits, SILENT, too_short_to_tell
 from armid_ros.identification.rows.stamps import rounded_stamps, two_senders
 from armid_ros.inspection.joints import joint_facts, JointFacts
@@ -141,7 +140,8 @@ def inspect(
     if trial is None and mixed:
         found.append(Remark('bad', mixed))
     if trial is None or trial.refused:
-        found += [Remark('bad', text) for text in dead_encoders(robot, recording)]
+        units = None if robot is None else robot.position_units
+        found += [Remark('bad', one.text) for one in encoder_faults(recording, units)]
     if trial is not None and trial.refused:
         found.insert(0, Remark('bad', f'refused by `armid identify`: {trial.refused}'))
     elif trial is not None:
@@ -255,10 +255,8 @@ def _of_units(
     if recording.dq is None:
         yield Remark('note', 'no velocities; they are not needed, positions are differentiated')
         return
-    yield from (Remark('doubt', text) for text in velocity_faults(recording))
-    time_base = time_base_fault(recording)
-    if time_base:
-        yield Remark('bad', time_base)
+    for fault in velocity_faults(recording):
+        yield Remark('doubt' if fault.word == 'good' else 'bad', fault.what)
     empty = [j.name for j in joints if j.velocity_ratio == 0.0]  # noqa: RUF069 - zeros as recorded
     if empty:
         yield Remark('doubt', f'velocities of {", ".join(empty)} are zero while they move')

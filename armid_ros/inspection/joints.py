@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.identification.assess.velocities import velocity_ratio, VelocityRatio
+from armid_ros.identification.assess.sensor_faults import velocity_ratio
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.recording.series import NOTHING
@@ -74,8 +74,8 @@ class JointFacts:
 def joint_facts(recording: Recording) -> tuple[JointFacts, ...]:
     """Return the facts of every joint of a recording."""
     derivative = _derivative(recording)
-    ratio = velocity_ratio(recording)
-    return tuple(_facts(recording, derivative, ratio, j) for j in range(recording.n_joints))
+    ratios = velocity_ratio(recording)
+    return tuple(_facts(recording, derivative, ratios, j) for j in range(recording.n_joints))
 
 
 def _derivative(recording: Recording) -> FloatArray:
@@ -92,7 +92,7 @@ def _derivative(recording: Recording) -> FloatArray:
 
 
 def _facts(
-    recording: Recording, derivative: FloatArray, found: VelocityRatio | None, j: int
+    recording: Recording, derivative: FloatArray, ratios: tuple[FloatArray, FloatArray], j: int
 ) -> JointFacts:
     q, speed = recording.q[:, j], np.abs(derivative[:, j])
     top = float(np.percentile(speed, 99))
@@ -100,9 +100,7 @@ def _facts(
     changes = np.abs(np.diff(q))
     moved = changes[changes > 0.0]
     still = float(np.ptp(q)) < STILL
-    ratio, fit = None, 0.0
-    if found is not None and np.isfinite(found.ratio[j]):
-        ratio, fit = float(found.ratio[j]), float(found.fit[j])
+    ratio, fit = (float(one[j]) for one in ratios)
     tau = None if recording.tau is None else recording.tau[:, j]
     return JointFacts(
         name=recording.joints[j],
@@ -112,7 +110,7 @@ def _facts(
         moving=0.0 if still else float(moves.mean()),
         step=float(moved.min()) if len(moved) else 0.0,
         repeated=0.0 if still else float(np.mean(changes[moves[1:]] == 0.0)),  # noqa: RUF069 - as recorded
-        velocity_ratio=ratio,
+        velocity_ratio=ratio if np.isfinite(ratio) else None,
         velocity_fit=fit,
         effort_rms=None if tau is None else float(np.sqrt(np.mean(tau**2))),
         effort_largest=None if tau is None else float(np.abs(tau).max()),

@@ -13,7 +13,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.identification import Identification, identify, Score
 from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
-from armid_ros.identification.assess.undriven import held_elsewhere
+from armid_ros.identification.assess.sensor_faults import held_elsewhere
 from armid_ros.identification.rows.checks import FOLLOWS, torque_factors
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording

@@ -11,7 +11,7 @@ from armid_ros.diagnosis.prepare import mended
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import identify
 from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.identification.assess.dead_sensors import dead_channels
+from armid_ros.identification.assess.sensor_faults import torque_faults
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 import numpy as np
 import pytest
@@ -209,8 +209,8 @@ def test_a_model_that_is_worse_than_none_is_refused(bench):
 def test_torques_of_which_none_was_measured_are_one_fault(bench):
     one = bench.recordings()[0]
     silent = replace(one, tau=0.0 * one.tau)
-    (said,) = dead_channels(bench.arm, silent, [])
-    assert 'every joint' in said and 'constant' in said
+    (fault,) = torque_faults(bench.arm, silent, [])
+    assert 'every joint' in fault.what and 'constant' in fault.what
 
 
 def test_a_joint_that_nobody_drives_is_not_dead(bench):
@@ -219,13 +219,13 @@ def test_a_joint_that_nobody_drives_is_not_dead(bench):
     used = conditioning(recordings, SignalSettings())
     limited = [replace(one, tau=np.clip(one.tau, -0.4, 0.4)) for one in recordings]
     data = [part.at_rows for part in trajectories(limited, used)]
-    assert not any(list(dead_channels(bench.arm, one, data)) for one in limited)
+    assert not any(list(torque_faults(bench.arm, one, data)) for one in limited)
     free = [replace(one, tau=one.tau * [1.0, 0.0]) for one in recordings]
     light = bench.robot.rigid_parameters.copy()
     light[-10:] = 0.0
     passive = replace(bench.arm, robot=bench.robot.with_inertias(light))
     data = [part.at_rows for part in trajectories(free, used)]
-    assert not any(list(dead_channels(passive, one, data)) for one in free)
+    assert not any(list(torque_faults(passive, one, data)) for one in free)
 
 
 def test_a_recording_in_two_roles_is_said(bench):

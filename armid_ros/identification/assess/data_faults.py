@@ -10,32 +10,26 @@ explains any gap. Names, signs and units are those that identification tells; se
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple
+from collections.abc import Iterator, Sequence
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
 from armid_ros.errors import IdentificationError
-from armid_ros.identification.assess.dead_sensors import dead_channels, dead_encoders
-from armid_ros.identification.assess.hypotheses import Hypothesis
 from armid_ros.identification.assess.joint_units import (
     factors_since,
     unit_faults,
     units_beyond_drives,
 )
 from armid_ros.identification.assess.mistakes import find_mistake, slow_motions
-from armid_ros.identification.assess.undriven import held_elsewhere
-from armid_ros.identification.assess.velocities import time_base_fault
+from armid_ros.identification.assess.sensor_faults import sensor_faults
 from armid_ros.identification.rows.checks import (
     check_motion,
     driven_by_friction,
-    unit_of,
     wrong_sign,
 )
 from armid_ros.identification.rows.feedback import laws_of_controllers
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.identification.rows.stamps import uneven_stamps
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
@@ -46,58 +40,6 @@ import numpy.typing as npt
 _BEYOND = 1.5
 #: Share of samples at the very extreme of a reading, above which it is clipped.
 _CLIPPED = 0.02
-#: A step of a position at this multiple of the highest velocity is none of the arm.
-_IMPOSSIBLE = 10.0
-
-
-class SensorFault(NamedTuple):
-    """A fault of clocks or sensors in one recording, with its joint and remedy in words."""
-
-    kind: Literal['stamps', 'encoder', 'time', 'torque']
-    source: str
-    text: str
-    fatal: bool
-
-
-def sensor_faults(
-    arm: ArmModel,
-    recordings: Sequence[Recording],
-    motions: Mapping[str, Sequence[Motion]],
-    cutoff_hz: float,
-    band_hz: float,
-) -> Iterator[SensorFault]:
-    """
-    Yield faults of clocks and sensors by kind; each kind makes those after it appear.
-
-    Parameters
-    ----------
-    arm : ArmModel
-        What the data are compared with.
-    recordings : sequence of Recording
-        The data as they were recorded.
-    motions : mapping of str to sequence of Motion
-        Their filtered stretches, by recording.
-    cutoff_hz : float
-        Up to which positions are differentiated [Hz].
-    band_hz : float
-        Up to which rows hold motion [Hz].
-
-    """
-    for one in recordings:
-        uneven = uneven_stamps(one, cutoff_hz, band_hz)
-        if uneven:
-            yield SensorFault('stamps', one.source, f'in {uneven}', fatal=False)
-    for one in recordings:
-        for text in dead_encoders(arm.body, one, motions[one.source]):
-            yield SensorFault('encoder', one.source, text, fatal=True)
-    for one in recordings:
-        text = time_base_fault(one)
-        if text:
-            text = f'in {one.source or "a recording"}: {text}'
-            yield SensorFault('time', one.source, text, fatal=False)
-    for one in recordings:
-        for text in dead_channels(arm, one, motions[one.source]):
-            yield SensorFault('torque', one.source, text, fatal=True)
 
 
 def check_data(
@@ -131,13 +73,8 @@ def check_data(
         What a reader should know.
 
     """
-    motions = {
-        one.source: [part.motion for part in data if part.source == one.source]
-        for one in recordings
-    }
-    band_hz = min(used.kept_hz, *(part.motion.band_hz for part in data))
-    sensors = list(sensor_faults(arm, recordings, motions, used.cutoff_hz, band_hz))
-    mistaken = [fault.text for fault in sensors if fault.kind == sensors[0].kind]
+    sensors = list(sensor_faults(arm, recordings, data, used))
+    mistaken = [fault.text for fault in sensors if fault.word != 'good']
     alone = not any(one.partner is not None for one in recordings)
     if alone and not mistaken:
         now, then = (slow_motions(some, used) for some in (recordings, before))
@@ -151,16 +88,12 @@ def check_data(
         for part in data
         for law in laws_of_controllers(arm.body, part.motion, part.informative)
     ]
-    for one in recordings:
-        faults += _jumps(arm.robot, one)
     if alone and not faults:  # another machine that an arm is tied to may drive it
         moved, torques = [part.motion for part in data], [part.tau for part in data]
         driven = driven_by_friction(arm.robot, moved, torques)
         faults += [wrong_sign(driven)] if driven else []
     notes = [note for one in recordings for note in _extremes(arm.robot, one)]
-    notes += _described_friction(arm)
-    for held in held_elsewhere(arm.robot, recordings, [part.motion for part in data]):
-        (faults if held.spoils else notes).append(held.text)
+    notes += [*_described_friction(arm), *(one.text for one in sensors)]
     try:
         notes += check_motion(arm.robot, recordings, used)
     except IdentificationError as error:
@@ -176,16 +109,13 @@ def _mistaken(
     before: Sequence[Motion],
 ) -> list[str]:
     """Say what every recording shows to be wrong with it: names, signs or units of joints."""
+    # a baseline gives the factor of all torques by itself
     since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
-    mistakes = [find_mistake(arm.body, recording, used) for recording in recordings]
-    said = {
-        tuple(_fault(one, since) for one in mistake.hypotheses) if mistake is not None else ('',)
-        for mistake in mistakes
-    }
-    (first, *others) = said
-    if all(first) and not others:
-        return [', or '.join(first)]
-    return unit_faults(arm, motions, before)
+    found = [find_mistake(arm.body, recording, used) for recording in recordings]
+    of_data = [one for one in found if one is not None and one.of_data]
+    texts = {one.text for one in of_data if not (since and one.hypotheses[0].kind == 'scale')}
+    alike = len(of_data) == len(found) and len(texts) == 1
+    return list(texts) if alike else unit_faults(arm, motions, before)
 
 
 def mistaken_recordings(
@@ -208,40 +138,12 @@ def mistaken_recordings(
         Filters.
 
     """
-    said = []
+    found = []
     for recording, joints in recordings:
         mistake = find_mistake(arm.body, recording, used)
-        if mistake is None or not joints[mistake.joint]:
-            continue
-        faults = [_fault(one, since=False) for one in mistake.hypotheses]
-        if all(faults):
-            said.append(f'{recording.source or "recording"}: {", or ".join(faults)}')
-    return said
-
-
-def _fault(mistake: Hypothesis, since: bool) -> str:
-    """Say what is wrong with data; empty if it is something that may happen to an arm."""
-    # a baseline gives the factor of all torques by itself
-    if mistake.kind == 'scale':
-        unit = '' if since else unit_of(mistake.factor)
-        return f'torques are in {unit} instead of N m: convert them' if unit else ''
-    return mistake.text if mistake.of_data else ''
-
-
-def _jumps(robot: Robot, recording: Recording) -> Iterator[str]:
-    """Say where positions first step faster than a joint can move."""
-    time = np.maximum(np.diff(recording.t), recording.period)[:, np.newaxis]
-    known = np.isfinite(robot.velocity_limit) & (robot.velocity_limit > 0.0)
-    limit = np.where(known, _IMPOSSIBLE * robot.velocity_limit, np.inf)
-    at = np.argwhere(np.abs(np.diff(recording.q, axis=0)) > limit * time)
-    if len(at):
-        row, joint = at[0]
-        step = recording.q[row + 1, joint] - recording.q[row, joint]
-        yield (
-            f'in {recording.source or "a recording"} the position of {robot.joints[joint]} jumps '
-            f'by {step:.3g} {robot.position_units[joint]} at {recording.t[row + 1]:.3f} s: leave '
-            'out what is faulty'
-        )
+        if mistake is not None and joints[mistake.joint] and mistake.of_data:
+            found.append(f'{recording.source or "recording"}: {mistake.text}')
+    return found
 
 
 def _described_friction(arm: ArmModel) -> list[str]:

@@ -14,27 +14,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import get_args
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.assess.data_faults import sensor_faults
-from armid_ros.identification.assess.grade_limits import LIMITS
+from armid_ros.identification.assess.grade_limits import by_error, LIMITS, Word
 from armid_ros.identification.assess.joint_units import units_beyond_drives
-from armid_ros.identification.assess.mistakes import Mistake, suspected_mistake
-from armid_ros.identification.assess.undriven import held_elsewhere
-from armid_ros.identification.assess.velocities import velocity_faults
+from armid_ros.identification.assess.mistakes import find_mistake, Mistake
+from armid_ros.identification.assess.sensor_faults import Fault, sensor_faults
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.checks import moving
+from armid_ros.identification.rows.damage import without_damage
 from armid_ros.identification.rows.regression import Fit, Score
-from armid_ros.identification.rows.signals import Conditioning
-from armid_ros.identification.rows.stamps import rounded_stamps
+from armid_ros.identification.rows.signals import Conditioning, SignalSettings
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 from scipy import stats
-
-Word = Literal['good', 'poor', 'unusable']
-_WORDS: tuple[Word, ...] = ('good', 'poor', 'unusable')
 
 
 @dataclass(frozen=True)
@@ -62,11 +57,6 @@ class Grade:
         return {'grade': self.word, 'reasons': list(self.reasons)}
 
 
-class _Reason(NamedTuple):
-    word: Word
-    text: str
-
-
 def grade(
     result: Identification,
     description: ArmModel,
@@ -91,100 +81,77 @@ def grade(
         Those recordings.
 
     """
-    robot, every = description.robot, [*recordings, *held_out]
+    every = [*recordings, *held_out]
     fits = [*result.training, *(fit for part in validation.values() for fit in part)]
-    motions = {
-        one.source: [fit.motion for fit in fits if fit.source == one.source] for one in every
-    }
-    used = result.used
-    band_hz = min(used.kept_hz, *(fit.motion.band_hz for fit in result.training))
-    sensors = list(sensor_faults(description, every, motions, used.cutoff_hz, band_hz))
+    sensors = list(sensor_faults(description, every, fits, result.used))
     # what else a recording with a dead sensor seems to show is of that
-    blind = {fault.source for fault in sensors if fault.fatal}
+    blind = {fault.source for fault in sensors if fault.word == 'unusable'}
     seeing = [one for one in every if one.source not in blind]
-    mistakes, suspicions = _mistakes(result, description, seeing)
-    moved = [fit.motion for fit in fits]
-    units = [] if mistakes else units_beyond_drives(robot, seeing, moved)
+    mistakes = _mistakes(result, description, seeing)
+    units = units_beyond_drives(description.robot, seeing, [fit.motion for fit in fits])
     faults = [
-        *(_Reason('unusable' if fault.fatal else 'poor', fault.text) for fault in sensors),
-        *mistakes,
-        *(_Reason('poor', text) for text in units),
-        *(
-            _Reason('poor' if found.spoils else 'good', found.text)
-            for found in held_elsewhere(robot, every, moved)
-        ),
+        *(fault for fault in sensors if fault.word != 'good'),
+        *(mistakes or (Fault(text, 'poor') for text in units)),
     ]
     reasons = [
         *faults,
         *_errors(result, validation),
         *_resting(result, validation),
-        *_clocks(every),
-        *_velocities(every),
-        *suspicions,
+        *(fault for fault in sensors if fault.word == 'good'),
     ]
     ordered = _worst_first(reasons)
     return Grade(
         ordered[0].word,
         tuple(f'{reason.text[0].upper()}{reason.text[1:]}.' for reason in ordered),
-        tuple(fault.text for fault in _worst_first(faults) if fault.word != 'good'),
+        tuple(fault.text for fault in _worst_first(faults)),
     )
 
 
-def _worst_first(reasons: Sequence[_Reason]) -> list[_Reason]:
-    return sorted(reasons, key=lambda reason: -_WORDS.index(reason.word))
-
-
-def by_error(error: float) -> Word:
-    """Return the grade of a relative torque error on data that were not fitted [%]."""
-    return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'
+def _worst_first(reasons: Sequence[Fault]) -> list[Fault]:
+    return sorted(reasons, key=lambda reason: -get_args(Word).index(reason.word))
 
 
 def _mistakes(
     result: Identification, description: ArmModel, recordings: Sequence[Recording]
-) -> tuple[list[_Reason], list[_Reason]]:
-    """Return what recordings show to be wrong, and what links explain as well, which is a note."""
-    # Zeros and names are those of a day: what one recording of several suggests is of its motion.
-    robot = description.body
-    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
-    for recording in recordings:
-        mistake = suspected_mistake(robot, recording, result.used)
+) -> list[Fault]:
+    """Return what recordings show to be wrong: names, signs, units, zeros, delays, gravity."""
+    robot, used = description.body, result.used
+    alike: dict[tuple[object, ...], dict[str, Mistake]] = {}
+    settings = SignalSettings(used.cutoff_hz, used.decimation)
+    for recording in without_damage(recordings, settings)[0] if recordings else ():
+        mistake = find_mistake(robot, recording, used)
         if mistake is not None:
-            kind = (mistake.links, mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
-            alike.setdefault(kind, []).append((recording.source, mistake))
-    mistakes, suspicions = [], []
+            kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
+            alike.setdefault(kind, {})[recording.source] = mistake
+    faults = []
     for found in alike.values():
-        worst = max((mistake for _, mistake in found), key=lambda m: float(m.before.joints.max()))
-        where = ', '.join(dict.fromkeys(source for source, _ in found))
+        worst = max(found.values(), key=lambda mistake: float(mistake.before.joints.max()))
         text = worst.sentence(robot)
         if len(found) < len(recordings):
-            text = f'in {where}: {text}'
+            text = f'in {", ".join(found)}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
-        if worst.links and len(found) == len(recordings):
-            suspicions.append(_Reason('good', text))
-        elif not worst.links:
-            mistakes.append(_Reason('unusable' if certain else 'poor', text))
-    return mistakes, suspicions
+        faults.append(Fault(text, 'unusable' if certain else 'poor'))
+    return faults
 
 
-def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[_Reason]:
+def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
     for bag, fits in validation.items():
-        worst = _Worst.of(Score.of(fits).joint_relative_error_percent, fits, result)
-        word = by_error(worst.error)
+        error, said = _worst(Score.of(fits).joint_relative_error_percent, fits, result)
         use = {
             'good': '',
             'poor': ', too much to compute torques with',
             'unusable': ', the model does not describe this motion',
         }
-        text = f'torque error on {bag}, held out: {worst.said}{use[word]}'
-        yield _Reason(word, text)
+        word = by_error(error)
+        yield Fault(f'torque error on {bag}, held out: {said}{use[word]}', word)
     if not validation:
         yield _halves(result)
     # what was held out, or what was fitted where nothing was
     fits = [fit for part in validation.values() for fit in part] or list(result.training)
     every = Score.of(fits).joint_relative_error_percent
     if np.all(every[moving(fit.motion for fit in fits)] > LIMITS.unusable):
-        yield _Reason('unusable', f'the torque of no joint is predicted to {LIMITS.unusable:g} %')
+        yield Fault(f'the torque of no joint is predicted to {LIMITS.unusable:g} %', 'unusable')
         return
     noisy = every - beyond_noise(every, fits, result.used) > LIMITS.unusable
     if np.any(noisy):
@@ -192,42 +159,38 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
             f'{result.arm.robot.joints[j]} ({every[j]:.0f} %)' for j in np.flatnonzero(noisy)
         )
         text = f'the torque is hardly predicted of {named}, where it is noise or friction at rest'
-        yield _Reason('good', text)
+        yield Fault(text, 'good')
 
 
-class _Worst(NamedTuple):
-    """The joint that is predicted worst: its error beyond noise [%], and its error in words."""
+def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> tuple[float, str]:
+    """
+    Choose the joint that is predicted worst, or is off most where noise is all of that.
 
-    error: float
-    said: str
+    Returns
+    -------
+    error : float
+        Its error beyond noise [%].
+    text : str
+        Its error in words.
 
-    @classmethod
-    def of(cls, errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
-        """Choose it among errors of joints as shares of their torque, shape (n,) [%]."""
-        joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
-        moves = moving(fit.motion for fit in fits)
-        largest = worst = int(np.argmax(np.where(moves, errors, -1.0)))
-        error = float(beyond.max())
-        if by_error(error) != by_error(errors[largest]):  # most of the largest error is noise
-            worst = int(np.lexsort((errors, beyond))[-1])
-        said = f'{errors[worst]:.3g} %'
-        details = []
-        if by_error(error) != by_error(errors[worst]):
-            details.append(f'{error:.3g} % without noise')
-        if len(joints) > 1:
-            details.append(
-                f'worst joint: {joints[worst]}{"" if worst == largest else " beyond noise"}'
-            )
-        return cls(error, f'{said} ({", ".join(details)})' if details else said)
+    """
+    joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
+    moves = moving(fit.motion for fit in fits)
+    worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
+    error = float(beyond[worst])
+    noisy = by_error(error) != by_error(errors[worst])
+    details = [f'{error:.3g} % without noise'] if noisy else []
+    details += [f'worst joint: {joints[worst]}'] if len(joints) > 1 else []
+    said = f'{errors[worst]:.3g} %'
+    return error, f'{said} ({", ".join(details)})' if details else said
 
 
-def _halves(result: Identification) -> _Reason:
+def _halves(result: Identification) -> Fault:
     """Judge by what one half of the data says of the other, where nothing was held out."""
     training = Score.of(result.training).joint_relative_error_percent
     every = result.halves.joints
-    worst = _Worst.of(every, result.training, result)
-    word = by_error(worst.error)
-    text = f'cross-check between the halves of the data: {worst.said}'
+    error, said = _worst(every, result.training, result)
+    word, text = by_error(error), f'cross-check between the halves of the data: {said}'
     undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
     undetermined &= beyond_noise(every, result.training, result.used) > 0.0
     if np.any(undetermined):
@@ -239,54 +202,25 @@ def _halves(result: Identification) -> _Reason:
             f'{training[joint]:.2g} %: {time:.2g} s of this motion do not determine '
             f'{result.base.rank} parameters; record longer, or move more'
         )
-    return _Reason(word, text)
+    return Fault(text, word)
 
 
-def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> list[_Reason]:
-    """Say which joints nothing is known of, or are not checked, because they do not move."""
+def _resting(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
+    """Yield which joints nothing is known of, or are not checked, because they do not move."""
     fitted = moving(fit.motion for fit in result.training)
     held_out = [fit.motion for part in validation.values() for fit in part]
     checked = moving(held_out) if held_out else fitted
     joints = np.array(result.arm.robot.joints)
-    reasons = []
     if not np.all(fitted):
-        names, others = ', '.join(joints[~fitted]), ','.join(joints[fitted])
-        text = (
-            f'not identified and not checked, as they do not move: {names}; record a motion of '
-            f'all joints, or ask for the others alone with --joints {others}'
+        yield Fault(
+            'not identified and not checked, as they do not move: '
+            f'{", ".join(joints[~fitted])}; record a motion of all joints, or ask for the others '
+            f'alone with --joints {",".join(joints[fitted])}',
+            'poor',
         )
-        reasons.append(_Reason('poor', text))
     if np.any(fitted & ~checked):
         names = ', '.join(joints[fitted & ~checked])
-        text = f'not checked, as they do not move in what was held out: {names}'
-        reasons.append(_Reason('good', text))
-    return reasons
-
-
-def _velocities(recordings: Sequence[Recording]) -> Iterator[_Reason]:
-    """Say whose recorded velocities are not those of the positions, which alone were used."""
-    alike: dict[str, list[str]] = {}
-    for recording in recordings:
-        for text in velocity_faults(recording):
-            alike.setdefault(text, []).append(recording.source or 'a recording')
-    for text, sources in alike.items():
-        where = '' if len(sources) == len(recordings) else f'in {", ".join(sources)}, '
-        yield _Reason('good', f'{where}{text}; the fit takes velocities from the positions')
-
-
-def _clocks(recordings: Sequence[Recording]) -> Iterator[_Reason]:
-    """Say of which recordings stamps jumped back, or are rounded."""
-    for recording in recordings:
-        report = recording.report
-        if report.restarted:
-            text = (
-                f'the clock of {recording.source} jumped back; {report.restarted} of '
-                f'{report.messages} messages, on the shorter side of it, are left out'
-            )
-            yield _Reason('good', text)
-        rounded = rounded_stamps(recording)
-        if rounded:
-            yield _Reason('good', f'in {recording.source or "a recording"} {rounded}')
+        yield Fault(f'not checked, as they do not move in what was held out: {names}', 'good')
 
 
 def beyond_noise(errors: FloatArray, fits: Sequence[Fit], used: Conditioning) -> FloatArray:
@@ -330,8 +264,7 @@ def torque_noise(fits: Sequence[Fit], used: Conditioning) -> FloatArray:
     friction steps in few of them.
 
     """
-    parts = [np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits]
-    differences = np.concatenate(parts)
+    differences = np.concatenate([np.abs(np.diff(fit.tau, 2, axis=0)) for fit in fits])
     if not len(differences):
         return np.zeros(fits[0].motion.n_joints)
     deviation = np.median(differences, axis=0) / float(stats.norm.ppf(0.75))

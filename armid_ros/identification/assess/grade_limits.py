@@ -11,7 +11,10 @@ smaller is measured by ``benchmarks.grade``; see docs/identification.md.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
+#: What an identification is good for.
+Word = Literal['good', 'poor', 'unusable']
 #: Independent values of a residual in one recording. Of ten simulated arms that have lived and to
 #: which nothing happened, with other motions each day, the logarithm of the ratio of two residuals
 #: of a joint has a deviation of 0.35 with one recording a day and 0.19 with three; 8 make 0.38 and
@@ -54,10 +57,6 @@ class GradeLimits:
     gravity_change : float
         Change of the gravity vector as a share of its length from which the description cannot be
         what is wrong; a quarter is a tilt of 14 degrees.
-    jump : float
-        Ratio of a step between two samples to what 98 % of a recording spans (torque) or to what
-        the top speed of its joint makes in the same time (position), from which a sample is
-        faulty.
 
     """
 
@@ -69,7 +68,11 @@ class GradeLimits:
     free_body: float = 3.0
     torque_factor: float = 2.0
     gravity_change: float = 0.25
-    jump: float = 10.0
 
 
 LIMITS = GradeLimits()
+
+
+def by_error(error: float) -> Word:
+    """Return the grade of a relative torque error on data that were not fitted [%]."""
+    return 'good' if error <= LIMITS.poor else 'poor' if error <= LIMITS.unusable else 'unusable'

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import combinations
 from typing import Literal
 
@@ -34,28 +33,18 @@ TURNS = (-135.0, -90.0, -45.0, 45.0, 90.0, 135.0, 180.0)
 _FINER = (-15.0, 15.0)
 #: Gravity of Jupiter [m/s^2]: no arm stands where there is more.
 _STRONGEST = 24.8
-#: Free values that are within this of an axis [degrees] are written as that axis.
-_AXIS = 15.0
+#: A gravity vector is written as a known one from which it differs by less than this share.
+_KNOWN = 0.3
 #: Samples that gravity and the factor of all torques are estimated from.
 _ROWS = 600
 #: Correlation from which the factor of a joint is known: it leaves 15 % of the torque at most.
 _CLEAR = 0.989
 
+Kind = Literal[
+    'nothing', 'body', 'gravity', 'scale', 'degrees', 'unit', 'sign', 'exchange', 'zero', 'delay'
+]
 Quantity = Literal['position', 'torque', 'position and torque']
 QUANTITIES: tuple[Quantity, ...] = ('position and torque', 'position', 'torque')
-Kind = Literal[
-    'nothing',
-    'body',
-    'gravity',
-    'scale',
-    'degrees',
-    'unit',
-    'sign',
-    'exchange',
-    'zero',
-    'delay',
-    'samples',
-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +68,8 @@ class Hypothesis:
         Returns the description as it would be without the mistake.
     nearby : callable
         Returns finer steps of the same kind.
-    material : bool
-        Whether the description cannot be what is wrong instead.
-    factor : float
-        Of the torques of all joints together, where they are off by one.
-    disputable : bool
-        Whether other masses would explain as much, so that a person has to say which it is.
-    without : tuple of Motion
-        The recording without faulty samples, where there are any.
+    of_data : bool
+        Whether it is of the data for sure, and of nothing that may happen to an arm.
 
     """
 
@@ -97,10 +80,7 @@ class Hypothesis:
     values: int = 1
     body: Callable[[Robot], Robot] = lambda robot: robot
     nearby: Callable[[], Sequence[Hypothesis]] = tuple
-    material: bool = True
-    factor: float = 1.0
-    disputable: bool = False
-    without: tuple[Motion, ...] = ()
+    of_data: bool = False
 
     @property
     def of_masses(self) -> bool:
@@ -108,18 +88,9 @@ class Hypothesis:
         return self.kind in ('gravity', 'scale')
 
     @property
-    def of_motion(self) -> bool:
-        """Whether it is judged with a fitted body alone: that follows any factor of a torque."""
-        return self.kind != 'unit' and not self.of_masses
-
-    @property
-    def of_data(self) -> bool:
-        """Whether it is of the data, and of nothing that may happen to an arm."""
-        return self.kind in ('exchange', 'degrees', 'unit', 'sign')
-
-    def stretches(self, stretches: Sequence[Motion]) -> list[Motion]:
-        """Return all of a recording as it would be without the mistake."""
-        return list(self.without) or [self.motion(motion) for motion in stretches]
+    def disputable(self) -> bool:
+        """Whether other masses would explain as much, so that a person has to say which it is."""
+        return self.kind == 'scale' and not self.of_data
 
 
 AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
@@ -134,43 +105,45 @@ WITHOUT_BODY = Hypothesis(
 
 def hypotheses(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
     """
-    Yield what may be wrong with recorded motions of an arm, but for delays and faulty samples.
+    Yield what may be wrong with recorded motions of an arm, but for delays.
 
     Of an arm that moves by a few degrees some position is beyond a turn, if it is in degrees.
 
     """
     turned = np.max([np.abs(one.q).max(axis=0) for one in motions], axis=0) > 2.0 * np.pi
+    turned &= ~robot.prismatic
     yield from _of_all_torques(robot, motions)
-    if np.any(turned) and not np.all(robot.prismatic):
+    if np.any(turned):
         yield _in_degrees(robot)
     for joint in range(robot.n_joints):
         for unit in TORQUE_UNITS:
             yield in_unit(robot, joint, unit)
         for quantity in QUANTITIES:
             yield _reversed(robot, joint, quantity)
-        if not robot.prismatic[joint]:
-            if robot.n_joints > 1 and turned[joint]:
-                yield _in_degrees(robot, joint)
-            for degrees in TURNS:
-                yield _zero_off(robot, joint, degrees)
+        if turned[joint] and robot.n_joints > 1:
+            yield _in_degrees(robot, joint)
+        for degrees in () if robot.prismatic[joint] else TURNS:
+            yield _zero_off(robot, joint, degrees)
     for first, second in combinations(range(robot.n_joints), 2):
         for quantity in QUANTITIES:
             yield _exchanged(robot, first, second, quantity)
 
 
 def _of_all_torques(robot: Robot, motions: Sequence[Motion]) -> Iterator[Hypothesis]:
-    """Yield the gravity, and the factor of all torques, that fit best."""
+    """Yield the gravity, and the factor of all torques, that fit best, if masses do not."""
     motion = thinned(motions, _ROWS)
     if motion is None:
         return
     described = inverse_dynamics(robot, motion)
     weightless = inverse_dynamics(robot.with_gravity(np.zeros(3)), motion)
     by_gravity = gravity_sensitivity(robot, motion.q)
-    yield other_gravity(robot, common_values(motion, weightless, by_gravity))
+    found = other_gravity(robot, common_values(motion, weightless, by_gravity))
+    if found is not None:
+        yield found
     nothing, column = np.zeros_like(described), described[:, :, np.newaxis]
     factor = float(common_values(motion, nothing, column)[0])
-    if abs(factor) > np.finfo(float).tiny:
-        yield other_scale(robot, factor, motions)
+    if abs(factor) > np.finfo(float).tiny and _beyond_masses(factor):
+        yield _other_scale(robot, factor, motions)
 
 
 def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
@@ -180,8 +153,9 @@ def in_unit(robot: Robot, joint: int, unit: str) -> Hypothesis:
         'unit',
         f'the torque of {robot.joints[joint]} seems to be in {wrong} instead of {right}: '
         'convert it',
-        partial(_scaled, joint=joint, quantity='torque', factor=1.0 / TORQUE_UNITS[unit]),
+        _times('torque', joint, 1.0 / TORQUE_UNITS[unit]),
         (joint, unit),
+        of_data=True,
     )
 
 
@@ -212,7 +186,7 @@ def shifted(motion: Motion, seconds: float) -> Motion:
     return replace(motion, q=q, dq=dq, ddq=ddq).select(inside)
 
 
-def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis:
+def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis | None:
     """
     Return that gravity is not as described.
 
@@ -221,22 +195,28 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis:
     robot : Robot
         The description.
     vector : ndarray, shape (3,)
-        What it is instead [m/s^2]. It is material if it may be a planet's and is too far from the
-        description to be wrong masses: these make all weight larger or smaller, and turn it
-        nowhere.
+        What it is instead [m/s^2].
+
+    Returns
+    -------
+    Hypothesis or None
+        None unless it may be a planet's and is too far from the description to be wrong masses:
+        these make all weight larger or smaller, and turn it nowhere.
 
     """
     told = robot.gravity
     size, length = (float(np.linalg.norm(one)) for one in (told, vector))
     far = LIMITS.gravity_change * max(size, 1.0) < np.linalg.norm(vector - told)
-    weighs = length / size if size > 0.0 else np.inf
     turned = np.linalg.norm(vector / max(length, 1e-9) - told / max(size, 1e-9))
-    turns = turned > LIMITS.gravity_change
-    material = bool(far and length < _STRONGEST and (turns or _beyond_masses(weighs)))
-    if not material:
-        return Hypothesis('gravity', '', values=3, material=False)
-    axis, option = known_gravity(vector, told) if length > 0.0 else (vector, '0,0,0')
-    direction = ', '.join(f'{part:.3g}' for part in axis)
+    weighs = length / size if size > 0.0 else np.inf
+    if not (far and length < _STRONGEST):
+        return None
+    if turned <= LIMITS.gravity_change and not _beyond_masses(weighs):
+        return None
+    known, option = known_gravity(vector, told)
+    direction = ', '.join(
+        f'{part + 0.0:.3g}' for part in known / max(float(np.linalg.norm(known)), 1e-9)
+    )
     return Hypothesis(
         'gravity',
         f'gravity seems to act along ({direction}) of the base with {length:.3g} m/s^2: '
@@ -246,88 +226,66 @@ def other_gravity(robot: Robot, vector: FloatArray) -> Hypothesis:
     )
 
 
-def other_scale(robot: Robot, factor: float, motions: Sequence[Motion] = ()) -> Hypothesis:
-    """
-    Return that efforts are a factor from N m: a unit where it is that of every joint, or currents.
-
-    Parameters
-    ----------
-    robot : Robot
-        The description.
-    factor : float
-        Of all joints together.
-    motions : sequence of Motion
-        Data with torques, which show the factors of single joints.
-
-    """
-    of_joints = np.full(robot.n_joints, np.nan)
-    if motions:
-        torques = [motion.tau for motion in motions if motion.tau is not None]
-        factors, correlation = torque_factors(robot, motions, torques)
-        of_joints = np.where(correlation > _CLEAR, factors, np.nan)
-    unit = unit_of(factor, [one for one in of_joints if one > 0.0])
-    text = (
-        f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
-        if unit
-        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
-        'currents, or wrong masses in the description'
-    )
-    known = of_joints > 0.0
-    if known.any() and not unit:
-        gains = ','.join(f'{1.0 / one:.3g}' if one > 0.0 else '?' for one in of_joints)
-        hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
-        text += f'; for currents give --current-gain {gains}, as exact as those masses'
-        text += f'; that of {hidden} is not determined' if hidden else ''
-    return Hypothesis(
-        'scale',
-        text,
-        lambda motion: _changed(motion, 'torque', lambda values: values / factor),
-        material=_beyond_masses(factor),
-        factor=factor,
-        disputable=not unit,
-    )
-
-
 def known_gravity(vector: FloatArray, told: FloatArray) -> tuple[FloatArray, str]:
     """
     Write a gravity vector that was found as a person would.
 
     Parameters
     ----------
-    vector : ndarray, shape (3,)
-        As it was found [m/s^2].
-    told : ndarray, shape (3,)
-        As described; its magnitude is kept where the estimated one is close.
+    vector, told : ndarray, shape (3,)
+        As it was found, and as described [m/s^2]: it may act along another axis.
 
     Returns
     -------
-    direction : ndarray, shape (3,)
-        Unit vector; that of an axis where it is near.
+    vector : ndarray, shape (3,)
+        A known one where it is near [m/s^2].
     option : str
         What to give to --gravity.
 
     """
-    size = float(np.linalg.norm(vector))
-    direction = vector / size
-    axis = np.round(direction)
-    if np.count_nonzero(axis) == 1 and direction @ axis > np.cos(np.deg2rad(_AXIS)):
-        direction = axis + 0.0
-    sizes = [float(np.linalg.norm(told)), *(-value[2] for value in GRAVITIES.values())]
-    near = min(sizes, key=lambda known: abs(np.log(size / max(known, 1e-9))))
-    size = near if 0.75 < size / max(near, 1e-9) < 1.33 else size
-    for name, value in GRAVITIES.items():
-        if np.allclose(size * direction, value, atol=1e-6):
-            return direction, name
-    return direction, ','.join(f'{part:.3g}' for part in size * direction + 0.0)
+    known = {name: np.array(value) for name, value in GRAVITIES.items()}
+    size = float(np.linalg.norm(told))
+    for axis in size * np.concatenate([np.eye(3), -np.eye(3)]):
+        known.setdefault(','.join(f'{part:.3g}' for part in axis + 0.0), axis)
+    off = {
+        name: float(np.linalg.norm(vector - value)) / max(float(np.linalg.norm(value)), 1e-9)
+        for name, value in known.items()
+    }
+    name = min(off, key=off.__getitem__)
+    if off[name] < _KNOWN:
+        return known[name], name
+    return vector, ','.join(f'{part:.3g}' for part in vector + 0.0)
+
+
+def _other_scale(robot: Robot, factor: float, motions: Sequence[Motion]) -> Hypothesis:
+    """Return that efforts are a factor from N m: a unit where it is every joint's, or currents."""
+    torques = [motion.tau for motion in motions if motion.tau is not None]
+    factors, correlation = torque_factors(robot, motions, torques)
+    known = (correlation > _CLEAR) & (factors > 0.0)
+    unit = unit_of(factor, factors[known].tolist())
+    text = (
+        f'the efforts of all joints seem to be in {unit} instead of N m: convert them'
+        if unit
+        else f'the efforts of all joints seem to be {factor:.2g} times the torque in N m: '
+        'currents, or wrong masses in the description'
+    )
+    if known.any() and not unit:
+        shown = zip(factors, known, strict=True)
+        gains = ','.join(f'{1.0 / one:.3g}' if clear else '?' for one, clear in shown)
+        hidden = ', '.join(robot.joints[k] for k in np.flatnonzero(~known))
+        text += f'; for currents give --current-gain {gains}, as exact as those masses'
+        text += f'; that of {hidden} is not determined' if hidden else ''
+    scaled = _times('torque', slice(None), 1.0 / factor)
+    return Hypothesis('scale', text, scaled, of_data=bool(unit))
 
 
 def _reversed(robot: Robot, joint: int, quantity: Quantity) -> Hypothesis:
-    change = partial(_scaled, joint=joint, quantity=quantity, factor=-1.0)
     name = robot.joints[joint]
     text = f'the {quantity} of {name} seems to have the opposite sign: negate it'
     if quantity == 'position and torque':
         text = f'position and torque of {name} seem to have the opposite sign: negate both'
-    return Hypothesis('sign', text, change, (joint, quantity))
+    change = _times(quantity, joint, -1.0)
+    return Hypothesis('sign', text, change, (joint, quantity), of_data=True)
 
 
 def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hypothesis:
@@ -339,6 +297,7 @@ def _exchanged(robot: Robot, first: int, second: int, quantity: Quantity) -> Hyp
         'exchanged: check the names of the joints',
         lambda motion: _changed(motion, quantity, lambda values: values[:, order]),
         (first, second, quantity),
+        of_data=True,
     )
 
 
@@ -359,12 +318,11 @@ def _zero_off(robot: Robot, joint: int, degrees: float) -> Hypothesis:
 
 def _in_degrees(robot: Robot, joint: int | None = None) -> Hypothesis:
     """Return that positions are in degrees: those of all joints that turn, or of one."""
-    columns = slice(None) if joint is None else joint
     text = 'the positions seem to be in degrees: convert them to rad'
     if joint is not None:
         text = f'the position of {robot.joints[joint]} seems to be in degrees: convert it to rad'
-    change = partial(_scaled, joint=columns, quantity='position', factor=np.deg2rad(1.0))
-    return Hypothesis('degrees', text, change, (joint,))
+    change = _times('position', slice(None) if joint is None else joint, np.deg2rad(1.0))
+    return Hypothesis('degrees', text, change, (joint,), of_data=True)
 
 
 def _beyond_masses(factor: float) -> bool:
@@ -372,11 +330,15 @@ def _beyond_masses(factor: float) -> bool:
     return not 1.0 / LIMITS.torque_factor < factor < LIMITS.torque_factor
 
 
-def _scaled(motion: Motion, joint: int | slice, quantity: Quantity, factor: float) -> Motion:
-    """Return a motion in which a quantity of one joint, or of some, is multiplied."""
-    scale = np.ones(motion.n_joints)
-    scale[joint] = factor
-    return _changed(motion, quantity, lambda values: values * scale)
+def _times(quantity: Quantity, joint: int | slice, factor: float) -> Callable[[Motion], Motion]:
+    """Return what multiplies a quantity of one joint, or of some."""
+
+    def scaled(values: FloatArray) -> FloatArray:
+        scale = np.ones(values.shape[1])
+        scale[joint] = factor
+        return values * scale
+
+    return lambda motion: _changed(motion, quantity, scaled)
 
 
 def _changed(

@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.hypotheses import in_unit
 from armid_ros.identification.rows.checks import (
-    effort_unit,
     FOLLOWS,
     NEAR,
     torque_factors,
@@ -72,13 +71,8 @@ def units_beyond_drives(
     needed = np.max([np.abs(inverse_dynamics(robot, one)).max(axis=0) for one in motions], axis=0)
     for joint in np.flatnonzero(beyond & (needed < robot.torque_limit)).tolist():
         limit, unit = robot.torque_limit[joint], robot.torque_units[joint]
-        units = [name for name, per in TORQUE_UNITS.items() if usual[joint] / per < limit]
-        in_unit = (
-            ' or '.join(effort_unit(robot, joint, one) for one in units if one != 'kN m')
-            or 'another unit'
-        )
         yield (
-            f'the torque of {robot.joints[joint]} seems to be in {in_unit} instead of {unit}: '
+            f'the torque of {robot.joints[joint]} seems to be in another unit than {unit}: '
             f'half of its readings are beyond {usual[joint]:.3g}, its drive gives '
             f'{limit:.4g} {unit}; convert it, or correct the limit in the description'
         )
@@ -113,24 +107,21 @@ def unit_faults(
     clear = np.flatnonzero(factors > 0.0).tolist()
     if not before or len(clear) < min(2, robot.n_joints):
         return []
-    near = [set(units_near(factors[k], _NEAR_SINCE)) for k in clear]
     typical = float(np.median(factors[clear]))
-    units = [one for one in units_near(typical) if all(one in some for some in near)]
-    if units:
-        return [
-            f'torques are in {" or ".join(units)} if those of the baseline are in N m: '
-            'convert them'
-        ]
-    if 1.0 / _GAINS < typical < _GAINS:
+    units = set(units_near(typical)).intersection(
+        *(units_near(factors[k], _NEAR_SINCE) for k in clear)
+    )
+    if not units and 1.0 / _GAINS < typical < _GAINS:
         return []
     named = ', '.join(f'{factors[k]:.3g} in {robot.joints[k]}' for k in clear)
     gains = ','.join(f'{1.0 / factor:.3g}' if factor > 0.0 else '?' for factor in factors)
-    lacking = '' if len(clear) == len(factors) else '; ?: not determined by these data'
-    return [
-        f'torques are those of the baseline times {named}: one of the two is in other units than '
-        'N m (currents? drivers change from one to the other with their version): convert each '
-        f'joint by its own gain, as with --current-gain {gains}{lacking}'
-    ]
+    remedy = (
+        f'{" or ".join(sorted(units))} if those of the baseline are in N m: convert them'
+        if units
+        else 'other units than N m (currents? drivers change from one to the other with their '
+        f'version): convert each joint by its own gain, as with --current-gain {gains}'
+    )
+    return [f'torques are those of the baseline times {named}: one of the two is in {remedy}']
 
 
 def factors_since(
@@ -163,9 +154,8 @@ def factors_since(
             slope = np.where(known, slope / np.where(known, then, 1.0), 0.0)
             correlation = np.minimum(correlation, follows)
         better = (correlation > np.maximum(best, FOLLOWS)) & (slope > 0.0)
-        best, factors = (
-            np.where(better, new, old) for new, old in ((correlation, best), (slope, factors))
-        )
+        best = np.where(better, correlation, best)
+        factors = np.where(better, slope, factors)
     return factors
 
 
@@ -175,14 +165,14 @@ def _factors(arm: ArmModel, motions: Sequence[Motion]) -> tuple[FloatArray, Floa
     if not arm.effects:
         torques = [motion.tau for motion in motions if motion.tau is not None]
         return torque_factors(arm.robot, motions, torques)
-    slope, correlation = np.zeros((2, arm.robot.n_joints))
-    for joint in range(len(slope)):
-        x, y = (torque[moves[:, joint], joint] for torque in (expected, measured))
-        x, y = x - x.mean(), y - y.mean()
-        size = float(np.sqrt((x @ x) * (y @ y)))
-        if size > 0.0:
-            slope[joint], correlation[joint] = (x @ y) / (x @ x), (x @ y) / size
-    return slope, correlation
+    x, y = (
+        np.where(moves, torque - np.mean(torque, axis=0, where=moves), 0.0)
+        for torque in (expected, measured)
+    )
+    product, own, other = (np.sum(one, axis=0) for one in (x * y, x * x, y * y))
+    known = own * other > 0.0
+    slope = np.divide(product, own, out=np.zeros_like(own), where=known)
+    return slope, np.divide(product, np.sqrt(own * other), out=np.zeros_like(own), where=known)
 
 
 def _torques(

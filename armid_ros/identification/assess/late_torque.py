@@ -17,11 +17,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from armid_ros.effects.load import described_spread
 from armid_ros.effects.slipping import Hysteresis
 from armid_ros.effects.timing import smoothed, within_band
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.assess.hypotheses import shifted
+from armid_ros.identification.assess.prediction_error import (
+    beside,
+    near_deviation,
+    root_mean_square,
+)
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,
@@ -39,11 +43,9 @@ from scipy.stats import t as student
 #: which any length between follows. Of 63 recordings with friction of 1 to 3 mrad they are off
 #: by -1 to 6 ms (5 to 95 %), 1 and 3 mrad alone by 0 to 6, 0.1 to 30 mrad by -3 to 6, and no
 #: length at all by -24 to 17 ms with an interval that is six times as wide.
-LENGTHS = (0.0003, 0.001, 0.003, 0.01)
+_LENGTHS = (0.0003, 0.001, 0.003, 0.01)
 #: Longest delay that is looked for [s].
-LONGEST = 0.3
-#: Columns of each joint's own, see `_rows`.
-_OWN = 3 + 2 * (1 + len(LENGTHS))
+_LONGEST = 0.3
 #: Parts of a recording of which each tells a delay by itself: ten are nine degrees of freedom.
 _BLOCKS = 10
 #: Steps of Gauss and Newton, and the one that ends them [s].
@@ -59,7 +61,7 @@ class Delay(NamedTuple):
 
 def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay | None:
     """
-    Return a delay that is told from zero.
+    Return a delay with its 95 % interval; None where that holds zero.
 
     Parameters
     ----------
@@ -69,11 +71,6 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         Data with torques.
     used : Conditioning
         Filters that the recording is identified with.
-
-    Returns
-    -------
-    Delay or None
-        With its 95 % interval; None where that holds zero.
 
     """
     stretches = list(segments(recording, used))
@@ -88,14 +85,14 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
         found = _step(rows) if rows else None
         if found is None:
             return None
-        before, (step, half) = seconds, found
-        seconds = float(np.clip(seconds + step, -LONGEST, LONGEST))
+        before, half = seconds, found.half_width
+        seconds = float(np.clip(seconds + found.seconds, -_LONGEST, _LONGEST))
         if abs(seconds - before) < _SETTLED:
             break
     return Delay(seconds, half) if abs(seconds) > half else None
 
 
-def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:
+def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, FloatArray]:
     """
     Return what a torque may consist of, and the torque, in the band of the motion.
 
@@ -103,43 +100,41 @@ def _rows(robot: Robot, motion: Motion, used: Conditioning) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (n, M, k + 10 n + 3)
-        Of each joint k columns of its own: offset, viscous friction, drive inertia, dry friction
+    own : ndarray, shape (n, M, k)
+        Of each joint columns of its own: offset, viscous friction, drive inertia, dry friction
         that gives way over no length and over several, constant and in proportion to the load.
-        Then what bodies near the description add, what a delay of 1 s does, what is to be
-        explained, and the torque [N m or N].
+    shared : ndarray, shape (n, M, 10 n + 3)
+        What bodies near the description add, what a delay of 1 s does, what is to be explained,
+        and the torque [N m or N].
 
     """
     assert motion.tau is not None
     n, kept = motion.n_joints, np.array(decimated_samples(len(motion), used), dtype=np.intp)
     bent = Hysteresis(
-        np.tile(np.eye(n), (len(LENGTHS), 1)), np.ones(n * len(LENGTHS)), np.repeat(LENGTHS, n)
+        np.tile(np.eye(n), (len(_LENGTHS), 1)), np.ones(n * len(_LENGTHS)), np.repeat(_LENGTHS, n)
     ).along(motion.q, motion.dq)
     slow = motion.select(kept)
     both = np.concatenate([motion.tau, np.sign(motion.dq), bent], axis=1)
-    tau, *dry = np.split(within_band(slow, decimate(both, used)), len(LENGTHS) + 2, axis=1)
+    tau, *dry = np.split(within_band(slow, decimate(both, used)), len(_LENGTHS) + 2, axis=1)
     slow = smoothed(slow)
     body = inverse_dynamics(robot, slow)
     loaded = [np.abs(body) * part for part in dry]
     own = np.stack([np.ones_like(body), slow.dq, slow.ddq, *dry, *loaded], axis=-1)
-    near = regressor(robot, slow) * (described_spread(robot).ravel() / np.sqrt(3.0))
+    near = regressor(robot, slow) * near_deviation(robot)
     rate = np.gradient(body, slow.t, axis=0)
-    shared = np.stack([-rate, tau - body, tau], axis=-1)
-    return np.concatenate([own, near, shared], axis=-1).transpose(1, 0, 2)
+    shared = np.concatenate([near, np.stack([-rate, tau - body, tau], axis=-1)], axis=-1)
+    return own.transpose(1, 0, 2), shared.transpose(1, 0, 2)
 
 
-def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
-    """Fit a delay beside friction, drives and a near body; return it and its half width [s]."""
+def _step(parts: Sequence[tuple[FloatArray, FloatArray]]) -> Delay | None:
+    """Fit a delay beside friction, drives and a near body."""
     # the deviation allows for residuals that are alike for long, or in all of a joint (Liang and
     # Zeger 1986): sums of their products with the rate over parts of the recording, or over
     # joints, whichever vary more
-    rows = np.concatenate(parts, axis=1)
-    own, shared = np.split(rows[:, :, :-1], [_OWN], axis=2)
-    # what columns of each joint's own leave of the others (Frisch and Waugh 1933)
-    shared, own = shared / _size(rows[:, :, -1:]), own / _size(own)
-    turned = own.transpose(0, 2, 1)
-    normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
-    shared = shared - own @ np.linalg.solve(normal, turned @ shared)
+    own, shared = (np.concatenate(some, axis=1) for some in zip(*parts, strict=True))
+    own = own / root_mean_square(own.transpose(1, 0, 2))[:, np.newaxis]
+    torque = root_mean_square(shared[:, :, -1].T)
+    shared = beside(own, shared[:, :, :-1] / torque[:, np.newaxis, np.newaxis])
     near, rate, rest = shared[:, :, :-2], shared[:, :, -2], shared[:, :, -1]
     stacked = near.reshape(-1, near.shape[2])
     prior = LIMITS.floor**2 * near.shape[1] / FREEDOM
@@ -151,18 +146,7 @@ def _step(parts: Sequence[FloatArray]) -> tuple[float, float] | None:
         return None
     delay = float(np.sum(alone * rest)) / known
     score = alone * (rest - by_body[:, :, 1] - alone * delay)
-    blocks = [float(part.sum()) for part in np.array_split(score, _BLOCKS, axis=1)]
-    deviation = max(_spread(np.array(blocks)), _spread(score.sum(axis=1))) / known
-    return delay, float(student.ppf(0.975, _BLOCKS - 1)) * deviation
-
-
-def _size(columns: FloatArray) -> FloatArray:
-    """Return the root mean square of every column, shape (n, 1, k); one where there is none."""
-    size = np.sqrt(np.mean(columns**2, axis=1, keepdims=True))
-    return np.where(size > 0.0, size, 1.0)
-
-
-def _spread(sums: FloatArray) -> float:
-    """Return the deviation of the total of some sums; zero for one alone, which tells none."""
-    count = len(sums)
-    return float(np.sqrt(np.sum(sums**2) * count / max(count - 1, 1)))
+    blocks = np.array([part.sum() for part in np.array_split(score, _BLOCKS, axis=1)])
+    # the deviation of the total of some sums; one alone tells none
+    spreads = [np.sqrt(np.sum(x**2) * len(x) / max(len(x) - 1, 1)) for x in (blocks, score.sum(1))]
+    return Delay(delay, float(student.ppf(0.975, _BLOCKS - 1) * max(spreads) / known))

@@ -21,8 +21,6 @@ from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
 
-#: Blocks of a recording, of which every other one is fitted.
-_BLOCKS = 10
 #: Columns of each joint's own: offset, viscous and Coulomb friction, drive inertia.
 _OWN = 4
 #: A joint below this share of its top speed may be held by its friction.
@@ -53,11 +51,10 @@ class PredictionError:
 
     def whole(self, robot: Robot) -> float:
         """Return the error of all slides or of all other joints together, whichever is more."""
-        alike = [robot.prismatic, ~robot.prismatic]
         left = self.joints * self.torque
         return max(
             float(np.linalg.norm(left[own]) / np.linalg.norm(self.torque[own]))
-            for own in alike
+            for own in (robot.prismatic, ~robot.prismatic)
             if np.any(own)
         )
 
@@ -79,10 +76,6 @@ class PredictionError:
     def least(self, other: PredictionError) -> PredictionError:
         """Return the smaller error of every joint."""
         return replace(self, joints=np.minimum(self.joints, other.joints))
-
-    def best_gain(self) -> float:
-        """Return the largest ratio that any prediction could have."""
-        return self.gain(replace(self, joints=np.zeros_like(self.joints), off=0.0))
 
 
 def thinned(stretches: Sequence[Motion], rows: int) -> Motion | None:
@@ -116,19 +109,17 @@ def prediction_error(robot: Robot, motion: Motion, *, near: bool) -> PredictionE
 
     """
     assert motion.tau is not None
-    count, n = motion.q.shape
-    scale, weight = _scale(motion.tau), _weight(motion)
+    (count, n), joints = motion.q.shape, np.arange(motion.n_joints)
+    scale, weight = root_mean_square(motion.tau), _weight(motion)
     own = np.zeros((count, n, n, _OWN))
-    for joint in range(n):
-        own[:, joint, joint] = _own_columns(motion, joint)
+    own[:, joints, joints] = _own_columns(motion)
     columns = own.reshape(count, n, -1)
     bodies = 0
     if near:
         body = regressor(robot, motion)
         described = body @ robot.rigid_parameters
-        deviation = described_spread(robot).ravel() / np.sqrt(3.0)
-        bodies = len(deviation)
-        by_body = body * deviation * np.sqrt(FREEDOM / count) / scale[:, np.newaxis]
+        by_body = body * (near_deviation(robot) * np.sqrt(FREEDOM / count)) / scale[:, np.newaxis]
+        bodies = by_body.shape[2]
         columns = np.concatenate([by_body, columns], axis=2)
     else:
         described = inverse_dynamics(robot, motion)
@@ -149,8 +140,7 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     """
     Fit values that all joints share, such as gravity, beside friction and drive of each joint.
 
-    What each joint has of its own is projected out (Frisch and Waugh 1933). Joints are weighted
-    by their residuals, down to the floor.
+    Joints are weighted by their residuals, down to the floor.
 
     Parameters
     ----------
@@ -167,15 +157,12 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
 
     """
     assert motion.tau is not None
-    scale, weight = _scale(motion.tau), _weight(motion)
+    weight = _weight(motion)[:, :, np.newaxis]
     rest = (motion.tau - fixed)[:, :, np.newaxis]
-    both = np.concatenate([columns, rest], axis=2) * (weight / scale)[:, :, np.newaxis]
-    both = both.transpose(1, 0, 2)
-    own = np.stack([_own_columns(motion, joint) for joint in range(motion.n_joints)])
-    own *= weight.T[:, :, np.newaxis]
-    basis, sizes, _ = np.linalg.svd(own, full_matrices=False)
-    basis = basis * (sizes > 1e-9 * sizes[:, :1])[:, np.newaxis]
-    both = both - basis @ (basis.transpose(0, 2, 1) @ both)
+    scale = root_mean_square(motion.tau)[:, np.newaxis]
+    both = np.concatenate([columns, rest], axis=2) / scale * weight
+    own = _own_columns(motion) * weight
+    both = beside(own.transpose(1, 0, 2), both.transpose(1, 0, 2))
     values, size = np.empty(0), np.ones(len(both))
     for _ in range(_PASSES):
         stacked = (both / size[:, np.newaxis, np.newaxis]).reshape(-1, both.shape[2])
@@ -185,40 +172,43 @@ def common_values(motion: Motion, fixed: FloatArray, columns: FloatArray) -> Flo
     return values
 
 
-def left_of_blocks(columns: FloatArray, rest: FloatArray) -> FloatArray:
+def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
     """
-    Return held-out residuals of two folds: blocks take turns at being fitted and predicted.
-
-    A row whose prediction is less sure than a measurement of it (leverage above one, Hoaglin and
-    Welsch 1978) stays as it is: a joint may rest in all that was fitted.
+    Return what columns of each joint's own leave of others (Frisch and Waugh 1933).
 
     Parameters
     ----------
-    columns : ndarray, shape (N, k)
-        Regressor with columns of mean square one.
-    rest : ndarray, shape (N,)
-        What is fitted, as a share of the torque.
+    own : ndarray, shape (n, M, k)
+        Columns with a mean square of about one.
+    shared : ndarray, shape (n, M, c)
+        Others.
 
     Returns
     -------
-    ndarray, shape (N,)
+    ndarray, shape (n, M, c)
 
     """
-    left = rest.copy()
-    even = (np.arange(len(rest)) * _BLOCKS // len(rest)) % 2 == 0
-    for fitted in (even, ~even):
-        own, others = columns[fitted], columns[~fitted]
-        normal = own.T @ own + LIMITS.floor**2 * np.eye(columns.shape[1])
-        leverage = np.sum(others * np.linalg.solve(normal, others.T).T, axis=1)
-        predicted = others @ np.linalg.solve(normal, own.T @ rest[fitted])
-        left[~fitted] -= np.where(leverage <= 1.0, predicted, 0.0)
-    return left
+    turned = own.transpose(0, 2, 1)
+    normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
+    return np.asarray(shared - own @ np.linalg.solve(normal, turned @ shared))
 
 
-def _own_columns(motion: Motion, joint: int) -> FloatArray:
-    dq, ddq = motion.dq[:, joint], motion.ddq[:, joint]
-    columns = np.column_stack([np.ones(len(dq)), dq, np.sign(dq), ddq])
-    return columns / _scale(columns)
+def near_deviation(robot: Robot) -> FloatArray:
+    """Return standard deviations of rigid parameters of a description, shape (10 n,)."""
+    return np.asarray(described_spread(robot).ravel() / np.sqrt(3.0))
+
+
+def root_mean_square(columns: FloatArray) -> FloatArray:
+    """Return the root mean square of every column; one where there is none."""
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _own_columns(motion: Motion) -> FloatArray:
+    """Return columns of each joint's own, of mean square one, shape (N, n, 4)."""
+    dq, ddq = motion.dq, motion.ddq
+    columns = np.stack([np.ones_like(dq), dq, np.sign(dq), ddq], axis=-1)
+    return columns / root_mean_square(columns)
 
 
 def _weight(motion: Motion) -> FloatArray:
@@ -229,9 +219,3 @@ def _weight(motion: Motion) -> FloatArray:
     moves = speed > _SLOW * speed.max(axis=0)
     moves[:, ~moves.any(axis=0)] = True
     return np.asarray(moves / np.sqrt(moves.mean(axis=0)))
-
-
-def _scale(columns: FloatArray) -> FloatArray:
-    """Return the root mean square of every column; one where there is none."""
-    size = np.sqrt(np.mean(columns**2, axis=0))
-    return np.where(size > 0.0, size, 1.0)

@@ -14,11 +14,7 @@ from armid_ros.identification.assess.hypotheses import (
     known_gravity,
     other_gravity,
 )
-from armid_ros.identification.assess.mistakes import (
-    faulty_samples,
-    find_mistake,
-    suspected_mistake,
-)
+from armid_ros.identification.assess.mistakes import find_mistake
 from armid_ros.identification.rows.checks import unit_of
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
@@ -220,26 +216,6 @@ def test_a_zero_that_is_off(robot, sound, joint, degrees):
     assert f'the zero of {robot.joints[joint]} seems to be off by about {degrees:.0f} ' in said
 
 
-def with_last_centre(robot, aside):
-    """Return a robot whose last link has its centre so far beside its own axis, along y [m]."""
-    links = robot.rigid_parameters.reshape(-1, 10).copy()
-    links[-1, 1:4] = links[-1, 0] * np.array([0.0, aside, 0.02])
-    return robot.with_inertias(links.ravel())
-
-
-def test_a_centre_of_a_wrist_a_few_millimetres_off_is_no_wrong_zero(robot):
-    """Its weight points elsewhere by a third of a turn; the description has it near the axis."""
-    described, real = (with_last_centre(robot, aside) for aside in (-0.004, 0.012))
-    recording = recording_of(real, 1, friction=0.1)
-    assert mistake_in(described, recording) == ''
-    used = conditioning([recording], SignalSettings())
-    found = suspected_mistake(described, recording, used)
-    assert found.links
-    said = found.sentence(described)
-    assert 'links that are off as those of a description may be explain that' in said
-    assert f'the zero of {robot.joints[-1]} seems to be off' in said
-
-
 @pytest.mark.parametrize(
     ('vector', 'believed'),
     [
@@ -253,7 +229,7 @@ def test_a_centre_of_a_wrist_a_few_millimetres_off_is_no_wrong_zero(robot):
     ],
 )
 def test_weight_half_as_much_again_is_of_masses_and_not_of_gravity(robot, vector, believed):
-    assert other_gravity(robot, np.array(vector)).material is believed
+    assert (other_gravity(robot, np.array(vector)) is not None) is believed
 
 
 @pytest.mark.parametrize('pair', [(0, 1), (1, 2), (2, 3), (0, 3)])
@@ -371,32 +347,9 @@ def test_gravity_along_another_axis(robot, vector):
     assert f'along ({direction}) of the base' in said
 
 
-def test_one_torque_out_of_all_proportion(robot, sound):
-    tau = np.array(sound.tau)
-    tau[700, 2] = 1e6
-    said = mistake_in(robot, replace(sound, tau=tau))
-    assert said.startswith('the torque of upper_arm_yaw is 1e+06 N m at 7.000 s')
-
-
-def test_a_position_that_jumps_by_a_turn(robot, sound):
-    q = np.array(sound.q)
-    q[700:720, 1] += 2.0 * np.pi
-    said = mistake_in(robot, replace(sound, q=q))
-    assert said.startswith('the position of shoulder_roll jumps by 6.29 rad at 7.000 s')
-
-
-def test_a_slide_jumps_by_metres_and_pushes_in_newtons():
-    lift = robot_from_urdf(GANTRY)
-    recording = recording_of(lift, 1)
-    q = np.array(recording.q)
-    q[700:720, 0] += 40.0
-    assert 'lift jumps by 40 m at 7.000 s' in mistake_in(lift, replace(recording, q=q))
-    said = in_unit(lift, 0, 'N mm').text
+def test_a_slide_pushes_in_newtons():
+    said = in_unit(robot_from_urdf(GANTRY), 0, 'N mm').text
     assert said == 'the torque of lift seems to be in mN instead of N: convert it'
-
-
-def test_reversals_of_friction_are_no_faulty_samples(robot, sound):
-    assert faulty_samples(robot, sound, conditioning([sound], SignalSettings())) is None
 
 
 def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, sound):
@@ -413,9 +366,9 @@ def test_a_description_without_masses_does_not_hide_an_opposite_sign(robot, soun
 def test_every_hypothesis_has_a_sentence_with_its_joints(robot, sound):
     turned = Motion(sound.joints, sound.t, *np.tile(np.rad2deg(sound.q), (4, 1, 1)))
     found = [delayed(0.02, 0.004), *hypotheses(robot, [turned])]
-    for said, one in ((one.text, one) for one in found if one.material):
+    for one in found:
         named = [robot.joints[place] for place in one.where if isinstance(place, int)]
-        assert 'seem' in said and all(name in said for name in named)
+        assert 'seem' in one.text and all(name in one.text for name in named)
 
 
 @pytest.mark.parametrize(
