@@ -10,7 +10,7 @@ the hand, a joint wears, or something acts that the model does not have. Some ba
     python -m benchmarks.fleet generate DIR [--arms N] [--bags M] [--changed K] [--damaged D]
     python -m benchmarks.fleet score DIR RESULTS     after `armid fleet identify` and `watch`
     python -m benchmarks.fleet costs [DIR]           processor time, memory, bytes, efficiency
-    python -m benchmarks.fleet merge                 10,000 triangles of 84 parameters
+    python -m benchmarks.fleet merge                 10,000 bags of 84 parameters
 
 Without a word: a small fleet, all of it.
 
@@ -262,26 +262,20 @@ def _used(dask_worker):
 
 
 def merge(count=10_000, joints=7, rigid=63):
-    """Time the merge of triangles of seven joints with 84 parameters, sixteen at a time."""
-    from armid_ros.identification.fitting.triangle import Triangle
+    """Time the sum of normal equations of seven joints with 84 parameters."""
+    from armid_ros.identification.fitting.normal_equations import NormalEquations
 
     rng = np.random.default_rng(0)
     rank = rigid + 3 * joints
-    factors = np.zeros((joints, rank + 1, rank + 1))
-    for joint in range(joints):
-        active = [*range(9 * joint, rigid), *(rigid + joint + joints * k for k in range(3)), rank]
-        factor = np.triu(rng.normal(size=(len(active), len(active))))
-        factors[joint][: len(active), active] = factor
-    one = Triangle(factors, np.full(joints, 1000.0))
-    level, start = [one] * count, time.process_time()
-    while len(level) > 1:
-        level = [Triangle.merged(level[k : k + 16]) for k in range(0, len(level), 16)]
+    factors = rng.normal(size=(joints, rank + 1, rank + 1))
+    one = NormalEquations(factors.transpose(0, 2, 1) @ factors, np.full(joints, 1000.0))
+    start = time.process_time()
+    whole = sum([one] * (count - 1), one)
     seconds = time.process_time() - start
-    expected = np.sqrt(count) * np.linalg.norm(one.factors)
-    error = abs(np.linalg.norm(level[0].factors) / expected - 1.0)
+    error = np.abs(whole.products / (count * one.products) - 1.0).max()
     print(
-        f'{count} triangles of {rank} parameters merged in {seconds:.1f} s, '
-        f'{8 * len(one.packed()) / 1e3:.0f} kB each; norm off by {error:.1e}'
+        f'{count} bags of {rank} parameters added up in {seconds:.1f} s, '
+        f'{8 * len(one.packed()) / 1e3:.0f} kB each; off by {error:.1e}'
     )
 
 

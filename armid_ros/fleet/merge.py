@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to estimates: triangles merged, a fit, and its deviations.
+From bags to estimates: normal equations added up, a fit, and its deviations.
 
 The deviations of a fit come from the spectrum of its residuals, which no summary of fixed size
 has; so bags are read a second time, for the noise products at the values of their arm. These add
@@ -17,13 +17,12 @@ from dataclasses import dataclass
 from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import BagFile
 from armid_ros.fleet.job import Job
+from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.excited import bounds, identifiable_base
-from armid_ros.identification.fitting.least_squares import noise_products
-from armid_ros.identification.fitting.triangle import (
-    fit_triangle,
-    joint_std,
-    Triangle,
-    TriangleFit,
+from armid_ros.identification.fitting.normal_equations import (
+    NormalEquations,
+    weighted_fit,
+    WeightedFit,
 )
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters
@@ -91,23 +90,23 @@ class FleetFit:
         The identifiable parameters.
     kept : sequence of int
         Columns of the theory that they keep.
-    fit : TriangleFit
+    fit : WeightedFit
         The fit in these.
 
     """
 
     base: BaseParameters
     kept: Sequence[int]
-    fit: TriangleFit
+    fit: WeightedFit
 
     @classmethod
-    def of(cls, triangle: Triangle, job: Job) -> FleetFit | None:
-        """Fit compressed rows; None where there are too few."""
-        base, kept = identifiable_base(job.theory, triangle)
-        if triangle.counts.sum() < 2 * base.rank:
+    def of(cls, normal: NormalEquations, job: Job) -> FleetFit | None:
+        """Fit normal equations; None where there are too few rows."""
+        base, kept = identifiable_base(job.theory, normal)
+        if normal.counts.sum() < 2 * base.rank:
             return None
         limits = bounds(job.arm, base)
-        fit = fit_triangle(triangle.restrict(kept), weighted=job.settings.weighted, bounds=limits)
+        fit = weighted_fit(normal.restrict(kept), weighted=job.settings.weighted, bounds=limits)
         return cls(base, tuple(kept), fit)
 
     def noise(self, rows: Iterable[Regression]) -> FloatArray:
@@ -120,15 +119,15 @@ class FleetFit:
             products += noise_products([some], residual * weights, weights, self.fit.inverse)
         return products
 
-    def estimate(self, triangle: Triangle, noise: FloatArray) -> FleetEstimate:
-        """Return the estimate of compressed rows, given the noise products of the same rows."""
-        some = triangle.restrict(self.kept)
-        squares = some.squares(self.fit.values).sum() / some.torque_squares.sum()
+    def estimate(self, normal: NormalEquations, noise: FloatArray) -> FleetEstimate:
+        """Return the estimate, given the noise products of the same rows."""
+        some = normal.restrict(self.kept)
+        squares = some.squares(self.fit.values).sum() / some.target_squares.sum()
         return FleetEstimate(
             self.base.parameters,
             self.fit.values,
-            np.sqrt(np.diag(self.fit.covariance(noise))),
-            joint_std(some, self.fit.values),
+            np.sqrt(np.diag(sandwich(self.fit.bread, noise))),
+            some.joint_std(self.fit.values),
             float(100.0 * np.sqrt(squares)),
             self.fit.condition_number,
         )
@@ -141,7 +140,7 @@ class MergedBags:
 
     Attributes
     ----------
-    triangle : Triangle or None
+    normal : NormalEquations or None
         Of all their rows; None if all were refused.
     seconds : float
         Motion in them [s].
@@ -154,7 +153,7 @@ class MergedBags:
 
     """
 
-    triangle: Triangle | None = None
+    normal: NormalEquations | None = None
     seconds: float = 0.0
     versions: tuple[tuple[str, str], ...] = ()
     found: int = 0
@@ -163,9 +162,9 @@ class MergedBags:
     @classmethod
     def of(cls, parts: Sequence[MergedBags]) -> MergedBags:
         """Merge several groups of bags, in order."""
-        triangles = [part.triangle for part in parts if part.triangle is not None]
+        known = [part.normal for part in parts if part.normal is not None]
         return cls(
-            Triangle.merged(triangles) if triangles else None,
+            sum(known[1:], known[0]) if known else None,
             sum(part.seconds for part in parts),
             tuple(version for part in parts for version in part.versions),
             sum(part.found for part in parts),

@@ -3,7 +3,7 @@
 """
 The tables of results: what is in them, and how a bag or an arm becomes rows.
 
-    bags/arm=A/day=D/BAG.parquet         one row: what was recorded, how well it fits, its triangle
+    bags/arm=A/day=D/BAG.parquet         one row: what was recorded, its fit and normal equations
     parameters/arm=A/day=D/BAG.parquet   one row a parameter: estimate of the bag by itself
     arms/arm=A/estimate.parquet          one row a parameter: estimate of all bags
     refused/arm=A/BAG.parquet            one row: why a bag is not used
@@ -26,7 +26,7 @@ from armid_ros.fleet.job import Job
 from armid_ros.fleet.merge import FleetEstimate, MergedBags, Refused
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.summary import BagSummary
-from armid_ros.identification.fitting.triangle import Triangle
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 import numpy as np
 import pyarrow as pa
 
@@ -53,7 +53,7 @@ BAGS = pa.schema(
         ('highest', _NUMBERS),
         ('top_speed', _NUMBERS),  # [rad/s or m/s]
         ('notes', pa.list_(pa.string())),
-        ('triangle', _NUMBERS),  # as Triangle.packed
+        ('normal_equations', _NUMBERS),  # as NormalEquations.packed
     ]
 )
 _PARAMETER = [
@@ -118,7 +118,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
         'highest': summary.highest,
         'top_speed': summary.top_speed,
         'notes': list(summary.notes),
-        'triangle': summary.triangle.packed(),
+        'normal_equations': summary.normal.packed(),
     }
     store.write_table(part_of('bags', bag, summary.day), pa.Table.from_pylist([row], BAGS))
     for day in [] if bag.day else _days(store, bag):
@@ -154,7 +154,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
                 np.array(row['lowest']),
                 np.array(row['highest']),
                 np.array(row['top_speed']),
-                Triangle.unpacked(np.array(row['triangle'])),
+                NormalEquations.unpacked(np.array(row['normal_equations'])),
                 computed=row['run'] == job.run,
             )
     return None

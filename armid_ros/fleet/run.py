@@ -139,7 +139,7 @@ def merge(prepared: Sequence[PreparedBag]) -> MergedBags:
 def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
     """Task: merge the groups of an arm, and fit all its bags."""
     merged = MergedBags.of(groups)
-    return merged, None if merged.triangle is None else FleetFit.of(merged.triangle, job)
+    return merged, None if merged.normal is None else FleetFit.of(merged.normal, job)
 
 
 def noise(prepared: Sequence[PreparedBag], fitted: Fitted, job: Job) -> FloatArray | None:
@@ -158,11 +158,11 @@ def finish(
     """Task: write the estimate of an arm."""
     merged, known = fitted
     problem = ''
-    if known is None or merged.triangle is None:
+    if known is None or merged.normal is None:
         problem = 'no bag of it can be used'
     else:
         total = np.sum([one for one in products if one is not None], axis=0)
-        write_arm(Store(job.out), arm, known.estimate(merged.triangle, total), merged, job)
+        write_arm(Store(job.out), arm, known.estimate(merged.normal, total), merged, job)
     return ArmOutcome(arm, len(merged.versions), merged.found, merged.refused, problem)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One bag as a summary of fixed size: a triangle, its own estimate, and how the arm moved."""
+"""One bag as a summary of fixed size: normal equations, own estimate, and how the arm moved."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armid_ros.fleet.bags import BagFile, DAY_NS
 from armid_ros.fleet.job import filters_at, Job
 from armid_ros.fleet.merge import FleetEstimate, FleetFit, MergedBags, Refused
 from armid_ros.fleet.store import fetched
-from armid_ros.identification.fitting.triangle import Triangle
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.streaming import streamed
@@ -46,7 +46,7 @@ class BagSummary:
         Positions [rad or m].
     top_speed : ndarray, shape (n,)
         Of the filtered motion [rad/s or m/s].
-    triangle : Triangle
+    normal : NormalEquations
         Its rows in the columns that the arm's theory keeps.
     own : FleetEstimate or None
         Its estimate by itself; None where it is too short for that, or among the results.
@@ -65,7 +65,7 @@ class BagSummary:
     lowest: FloatArray
     highest: FloatArray
     top_speed: FloatArray
-    triangle: Triangle
+    normal: NormalEquations
     own: FleetEstimate | None = None
     notes: tuple[str, ...] = ()
     computed: bool = True
@@ -94,7 +94,7 @@ class PreparedBag:
         if isinstance(one, Refused):
             return MergedBags(refused=(one,))
         version = one.bag.url, one.bag.version
-        return MergedBags(one.triangle, one.seconds, (version,), 0 if one.computed else 1)
+        return MergedBags(one.normal, one.seconds, (version,), 0 if one.computed else 1)
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
         """Yield the rows of the bag, as they were kept or read again."""
@@ -149,7 +149,7 @@ def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression
 
 def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
     robot = job.arm.robot
-    triangles: list[Triangle] = []
+    normal: NormalEquations | None = None
     kept: list[Regression] | None = []
     start_ns, samples, seconds = 0, 0, 0.0
     lowest, highest = np.full(robot.n_joints, np.inf), np.full(robot.n_joints, -np.inf)
@@ -163,31 +163,31 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
             top_speed = np.maximum(top_speed, np.abs(part.motion.dq).max(axis=0))
         if not parts:
             continue
-        if not triangles:
+        if normal is None:
             check_torque(job.arm, [piece], parts)
-        triangles.append(Triangle.of(parts))
+        own_normal = NormalEquations.of(parts)
+        normal = own_normal if normal is None else normal + own_normal
         if kept is not None:
             kept.extend(parts)
             if sum(part.columns.nbytes for part in kept) > budget:
                 kept = None
     check_positions(robot, path, lowest, highest)
     notes = resting(robot, path, highest - lowest)
-    if not triangles:
+    if normal is None:
         raise IdentificationError(
             f'{path}: {seconds:.2f} s in {samples} samples is too short; '
             'record a movement of several seconds'
         )
-    triangle = Triangle.merged(triangles)
-    fit = FleetFit.of(triangle, job)
+    fit = FleetFit.of(normal, job)
     own = None
     if fit is not None:
         rows = (part for _, parts in pieces(path, job) for part in parts) if kept is None else kept
-        own = fit.estimate(triangle, fit.noise(rows))
+        own = fit.estimate(normal, fit.noise(rows))
     stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
     day = bag.day or stamped.date().isoformat()
     apart = datetime.date.fromisoformat(day) - stamped.date()
     if abs(apart.days) > 1:  # the clock counts from its start; one day off is a time zone
         start_ns += apart.days * DAY_NS
     motion = start_ns, seconds, samples, lowest, highest, top_speed
-    summary = BagSummary(bag, day, *motion, triangle, own, notes)
+    summary = BagSummary(bag, day, *motion, normal, own, notes)
     return PreparedBag(summary, None if kept is None else tuple(kept))

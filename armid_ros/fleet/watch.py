@@ -108,7 +108,7 @@ class WatchedArm:
     compared : tuple of ParameterHistory
         The same without what its siblings share on a day, which is no change of its own.
     bags : tuple of dict
-        A row of the table ``bags`` each, in order of time, without triangles.
+        A row of the table ``bags`` each, in order of time, without normal equations.
     judged : Judged
         Results of the tests.
     named : tuple of HistoryChange
@@ -189,7 +189,7 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     if not kind_of:
         raise FleetError(f'{store.url}: holds no fleet; run `armid fleet identify` first')
     bags: dict[str, list[dict[str, Any]]] = {}
-    for row in table_of(store, 'bags').drop_columns(['triangle']).to_pylist():
+    for row in table_of(store, 'bags').drop_columns(['normal_equations']).to_pylist():
         bags.setdefault(str(row['arm']), []).append(row)
     for rows in bags.values():
         rows.sort(key=lambda row: (row['start_ns'], row['bag']))

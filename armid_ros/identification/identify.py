@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate
+from armid_ros.identification.fitting.covariance import scatter
 from armid_ros.identification.fitting.excited import base_spread, determined, excited
 from armid_ros.identification.fitting.held_out import cutoff_of_torques, halves_error, HalvesError
 from armid_ros.identification.fitting.identifiability import Unidentified, unidentified
@@ -22,7 +23,6 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
-from armid_ros.identification.fitting.normal_equations import scatter
 from armid_ros.identification.fitting.quasi_static import with_uncertain_inertia
 from armid_ros.identification.physical.fit_among_bodies import fit_to_bodies, PhysicalSettings
 from armid_ros.identification.physical.physical_certificate import PhysicalCertificate

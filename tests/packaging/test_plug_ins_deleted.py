@@ -32,7 +32,7 @@ FEW = (
     'arm/test_arm_model.py',
     'cli/test_completion.py',
     'diagnosis/test_fit.py',
-    'identification/fitting/test_triangle.py',
+    'identification/fitting/test_normal_equations.py',
 )
 
 

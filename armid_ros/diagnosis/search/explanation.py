@@ -25,7 +25,6 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.physical.fit_among_bodies import physical_program, PhysicalSettings
 from armid_ros.motion import FloatArray
 import numpy as np
-import scipy.linalg
 
 NOISE, ESTIMATED = 'noise', 'an estimate of the misfit that such a model has'
 #: Weights of the description that are tried; the largest that fits as well is used.
@@ -162,11 +161,11 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     if not base.rank or base.independent.min() >= len(arm.robot.rigid_parameters):
         return explanation, ()
     known = len(arm.parameters)
-    triangle, count = _triangle(problem, fitted)
+    products, count = _products(problem, fitted)
     program, _ = physical_program(arm, base, PhysicalSettings())
     for weight in _WEIGHTS:
         try:
-            theta = program.solve(triangle, count, weight)
+            theta = program.solve(products, count, weight)
         except IdentificationError:
             continue
         changed = fitted.arm.with_theta(np.concatenate([theta, fitted.arm.theta[known:]]))
@@ -179,15 +178,15 @@ def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
     )
 
 
-def _triangle(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
-    """Return the triangular factor of the base columns and their target, and the rows."""
+def _products(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
+    """Return the products of the base columns and their target, and the number of rows."""
     nuisance = problem.nuisance
     rows, rank, base = nuisance.rows, nuisance.rank, nuisance.base
     back = np.linalg.inv(nuisance.turn)
     then, now = (base.values(x.theta[: len(base.standard)]) for x in (problem.arm, fitted.arm))
     rest = [part.residual(fitted.arm)[:, :, np.newaxis] for part in rows.data]
     left = rows.weighted(rest, range(len(rows.torque)))
-    factors, count = [], 0
+    products, count = np.zeros((rank + 1, rank + 1)), 0
     for k, columns in enumerate(nuisance.columns):
         own = columns[:, :, :rank] @ back
         residual, values = (
@@ -195,7 +194,6 @@ def _triangle(problem: JointFit, fitted: Fitted) -> tuple[FloatArray, float]:
         )
         both = np.concatenate([own, (residual + own @ values)[:, :, np.newaxis]], axis=2)
         flat = both.reshape(-1, rank + 1)
-        factors.append(scipy.linalg.qr(flat, mode='r')[0][: rank + 1])
+        products += flat.T @ flat
         count += nuisance.count[k]
-    whole = scipy.linalg.qr(np.concatenate(factors), mode='r')[0][: rank + 1]
-    return np.asarray(whole), float(count)
+    return products, float(count)

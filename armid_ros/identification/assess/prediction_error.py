@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
-from armid_ros.identification.fitting.triangle import within
+from armid_ros.identification.fitting.normal_equations import within
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot

@@ -18,7 +18,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification.fitting.least_squares import Method, solve
-from armid_ros.identification.fitting.triangle import Triangle
+from armid_ros.identification.fitting.normal_equations import factored, NormalEquations
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns, regroup
 from armid_ros.motion import FloatArray
@@ -50,21 +50,21 @@ def excited(
         The columns of that.
 
     """
-    base, kept = identifiable_base(theory, Triangle.of(problem))
+    base, kept = identifiable_base(theory, NormalEquations.of(problem))
     return base, tuple(part.restrict(kept) for part in problem)
 
 
 def identifiable_base(
-    theory: BaseParameters, triangle: Triangle
+    theory: BaseParameters, normal: NormalEquations
 ) -> tuple[BaseParameters, list[int]]:
     """
-    Group further what the rows of a triangle do not tell apart.
+    Group further what the rows of normal equations do not tell apart.
 
     Parameters
     ----------
     theory : BaseParameters
         What any motion can tell apart.
-    triangle : Triangle
+    normal : NormalEquations
         Rows in the columns that theory keeps.
 
     Returns
@@ -76,7 +76,8 @@ def identifiable_base(
 
     """
     names = tuple(theory.standard[column] for column in theory.independent)
-    data = group_columns(triangle.stacked, names, tolerance=EXCITATION_TOLERANCE)
+    rows, _ = factored(normal.summed()[:-1, :-1])
+    data = group_columns(rows, names, tolerance=EXCITATION_TOLERANCE)
     base = theory if data.rank == theory.rank else regroup(theory, data)
     order = {int(column): position for position, column in enumerate(theory.independent)}
     return base, [order[int(column)] for column in base.independent]

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.excited import bounds
-from armid_ros.identification.fitting.least_squares import noise_products
 from armid_ros.identification.fitting.nonlinear import (
     FittedValues,
     linearised,
@@ -28,8 +28,7 @@ from armid_ros.identification.fitting.nonlinear import (
     torques,
     ungrouped,
 )
-from armid_ros.identification.fitting.sandwich import sandwich
-from armid_ros.identification.fitting.triangle import within
+from armid_ros.identification.fitting.normal_equations import within
 from armid_ros.identification.rows.regression import (
     filtered_columns,
     Regression,

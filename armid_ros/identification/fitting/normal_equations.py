@@ -1,25 +1,254 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Normal equations that are singular, and how much values vary without each recording.
+Normal equations of a regression, joint by joint, and the weighted least squares of them.
 
-Noise makes values as uncertain as their covariance. What a model gets wrong differs from motion
-to motion, and other motions give other values: recordings that are left out show by how much.
+They have a size that does not grow with the rows and add up over stretches, recordings and
+workers. Joints are kept apart, for their weights are known only when all rows are.
 
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from armid_ros.identification.rows.regression import Regression, weighted_rows
-from armid_ros.motion import FloatArray
+from armid_ros.identification.rows.regression import Regression
+from armid_ros.motion import FloatArray, read_only
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
+import scipy.optimize
 
+#: Rounds of reweighting; the weights settle in three to ten.
+ROUNDS = 20
+#: Squares of residuals below this share of those of the target are rounding errors of products.
+_ROUNDING = 1e-12
 #: Directions of columns scaled to one length with less than this share of the largest eigenvalue
 #: are not identifiable: products of columns hold no more digits.
 UNINFORMATIVE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """
+    Products of the columns and the target of all joints.
+
+    Attributes
+    ----------
+    products : ndarray, shape (n, r + 1, r + 1)
+        [W_j, y_j]' [W_j, y_j] of each joint.
+    counts : ndarray, shape (n,)
+        Informative rows of each joint.
+
+    """
+
+    products: FloatArray
+    counts: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, 'products', read_only(self.products))
+        object.__setattr__(self, 'counts', read_only(self.counts))
+
+    @classmethod
+    def of(
+        cls, problem: Sequence[Regression], weights: npt.NDArray[np.floating] | None = None
+    ) -> NormalEquations:
+        """
+        Sum up the rows of one or more stretches.
+
+        Parameters
+        ----------
+        problem : sequence of Regression
+            N rows of each of n joints in r columns.
+        weights : ndarray, shape (N, n), optional
+            Factors of the rows; by default one, and zero where a row is not informative.
+
+        """
+        n_joints, rank = problem[0].columns.shape[1:]
+        products = np.zeros((n_joints, rank + 1, rank + 1))
+        counts, start = np.zeros(n_joints), 0
+        for part in problem:
+            stop = start + len(part.tau)
+            weight = part.informative if weights is None else weights[start:stop]
+            target, start = part.target, stop
+            counts += part.informative.sum(axis=0)
+            for joint in range(n_joints):
+                rows = np.column_stack([part.columns[:, joint], target[:, joint]])
+                active = np.flatnonzero(rows.any(axis=0))  # a joint feels no link before it
+                rows = rows[:, active] * weight[:, joint, np.newaxis]
+                products[joint][np.ix_(active, active)] += rows.T @ rows
+        return cls(products, counts)
+
+    def __add__(self, other: NormalEquations) -> NormalEquations:
+        """Return the normal equations of the rows of both."""
+        return NormalEquations(self.products + other.products, self.counts + other.counts)
+
+    def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> NormalEquations:
+        """Return the normal equations of the same rows in some of their columns."""
+        kept = np.append(np.asarray(columns, dtype=np.intp), self.rank)
+        return NormalEquations(self.products[:, kept[:, np.newaxis], kept], self.counts)
+
+    @property
+    def rank(self) -> int:
+        """Return the number of columns r."""
+        return int(self.products.shape[2]) - 1
+
+    @property
+    def target_squares(self) -> FloatArray:
+        """Sum of the squared targets of each joint, shape (n,) [(N m)^2]."""
+        return np.asarray(self.products[:, -1, -1])
+
+    def summed(self, scale: npt.ArrayLike = 1.0) -> FloatArray:
+        """Return the sum over joints, each divided by a scale (n,), shape (r + 1, r + 1)."""
+        weight = np.broadcast_to(np.asarray(scale, dtype=float), self.counts.shape) ** -2.0
+        return np.asarray(np.tensordot(weight, self.products, axes=1))
+
+    def squares(self, values: FloatArray) -> FloatArray:
+        """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
+        ends = np.append(values, -1.0)
+        return np.maximum(self.products @ ends @ ends, _ROUNDING * self.target_squares)
+
+    def joint_std(self, values: FloatArray) -> FloatArray:
+        """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
+        counts = np.maximum(self.counts, 1.0)
+        rows = float(counts.sum())
+        freedom = rows / max(1.0, rows - self.rank)  # squares of residuals are too small by that
+        return np.asarray(np.sqrt(freedom * self.squares(values) / counts))
+
+    def packed(self) -> FloatArray:
+        """Return all numbers in one row: joints, counts and the upper triangles."""
+        upper = np.triu_indices(self.rank + 1)
+        numbers = self.products[:, upper[0], upper[1]].ravel()
+        return np.concatenate([[len(self.counts)], self.counts, numbers])
+
+    @classmethod
+    def unpacked(cls, numbers: FloatArray) -> NormalEquations:
+        """Return the normal equations that were packed."""
+        joints = int(numbers[0])
+        triangles = numbers[1 + joints :].reshape(joints, -1)
+        size = int(np.sqrt(2 * triangles.shape[1]))
+        first, second = np.triu_indices(size)
+        products = np.zeros((joints, size, size))
+        products[:, first, second] = products[:, second, first] = triangles
+        return cls(products, numbers[1 : 1 + joints])
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedFit:
+    """
+    Weighted least squares.
+
+    Attributes
+    ----------
+    values : ndarray, shape (r,)
+        Parameters.
+    scale : ndarray, shape (n,)
+        What the rows of each joint were divided by.
+    factor, inverse : ndarray, shape (r, r)
+        F with F' F the products of the weighted columns, and its inverse.
+
+    """
+
+    values: FloatArray
+    scale: FloatArray
+    factor: FloatArray
+    inverse: FloatArray
+
+    @property
+    def condition_number(self) -> float:
+        """Of the weighted columns."""
+        return float(np.linalg.cond(self.factor))
+
+    @property
+    def bread(self) -> FloatArray:
+        """Inverse of the products of the weighted columns, shape (r, r)."""
+        return np.asarray(self.inverse @ self.inverse.T)
+
+
+def weighted_fit(
+    normal: NormalEquations,
+    *,
+    weighted: bool = True,
+    bounds: tuple[FloatArray, FloatArray] | None = None,
+) -> WeightedFit:
+    """
+    Fit parameters to normal equations.
+
+    Parameters
+    ----------
+    normal : NormalEquations
+        The rows.
+    weighted : bool
+        Whether every joint is weighted by its own residual.
+    bounds : tuple of two ndarray, each of shape (r,), optional
+        What is physically possible, lower and upper.
+
+    """
+    fit = scaled_fit(normal, np.ones(len(normal.counts)))
+    for _ in range(ROUNDS if weighted else 0):
+        before = fit.scale
+        fit = scaled_fit(normal, positive(normal.joint_std(fit.values)))
+        if np.allclose(fit.scale, before, rtol=1e-6):
+            break
+    if bounds is not None:
+        values = within(fit.values, fit.factor, bounds)
+        return WeightedFit(values, fit.scale, fit.factor, fit.inverse)
+    return fit
+
+
+def scaled_fit(normal: NormalEquations, scale: FloatArray) -> WeightedFit:
+    """Solve with the rows of every joint divided by a number, shape (n,)."""
+    products = normal.summed(scale)
+    factor, inverse = factored(products[:-1, :-1])
+    return WeightedFit(inverse @ (inverse.T @ products[:-1, -1]), scale, factor, inverse)
+
+
+def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """
+    Return F with F' F = products, shape (p, p), and its inverse.
+
+    Directions of less than a rounding error of the others get that.
+
+    """
+    size = np.sqrt(np.diag(products))
+    size = np.where(size > 0.0, size, 1.0)
+    lengths, axes = np.linalg.eigh(products / np.outer(size, size))
+    least = len(size) * np.finfo(float).eps * lengths.max(initial=0.0)
+    lengths = np.sqrt(np.maximum(lengths, max(least, 1e-300)))
+    return lengths[:, np.newaxis] * axes.T * size, axes / lengths / size[:, np.newaxis]
+
+
+def within(
+    values: FloatArray, factor: FloatArray, bounds: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    """
+    Return the best fit within bounds: the one whose predictions differ least from the free.
+
+    Parameters
+    ----------
+    values : ndarray, shape (r,)
+        The free fit.
+    factor : ndarray, shape (r, r)
+        F with F' F the products of the weighted columns.
+    bounds : tuple of two ndarray, each of shape (r,)
+        Lower and upper.
+
+    """
+    if np.all((values >= bounds[0]) & (values <= bounds[1])):
+        return values
+    scale = np.linalg.norm(factor, axis=0)
+    solution = scipy.optimize.lsq_linear(
+        factor / scale, factor @ values, (bounds[0] * scale, bounds[1] * scale), method='bvls'
+    )
+    return np.asarray(np.clip(solution.x / scale, *bounds))
+
+
+def positive(scale: FloatArray) -> FloatArray:
+    """Keep a joint that is fitted exactly from taking all the weight."""
+    floor = max(1e-9 * float(np.max(scale)), 1e-100)
+    return np.maximum(scale, floor)
 
 
 def informative_basis(products: FloatArray) -> FloatArray:
@@ -51,18 +280,6 @@ def informative_basis(products: FloatArray) -> FloatArray:
     return np.asarray(scale[:, np.newaxis] * vectors[:, good] / np.sqrt(values[good]))
 
 
-def scaled_inverse(matrix: FloatArray) -> FloatArray:
-    """
-    Invert a covariance or a precision, (p, p), whose values may be of any units.
-
-    Directions of less than a rounding error of the others get that.
-
-    """
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    both = np.outer(scale, scale)
-    return np.asarray(np.linalg.inv(matrix * both + UNINFORMATIVE * np.eye(len(matrix))) * both)
-
-
 def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     """
     Solve normal equations; directions that are not identifiable get no change.
@@ -83,57 +300,13 @@ def informative_solution(products: FloatArray, aim: FloatArray) -> FloatArray:
     return np.asarray(basis @ (basis.T @ aim))
 
 
-def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+def scaled_inverse(matrix: FloatArray) -> FloatArray:
     """
-    Return the changes of values without each recording, of which squares sum up to a variance.
+    Invert a covariance or a precision, (p, p), whose values may be of any units.
 
-    A change counts by what the other recordings determine of the value: for white noise the
-    squares then sum up to the variance of least squares, also where one recording determines most
-    of a value. A value that the others do not determine has no change.
-
-    Parameters
-    ----------
-    problem : sequence of Regression
-        N rows of r columns.
-    weights : ndarray, shape (N, n)
-        What the fit multiplied the rows of every joint by.
-    values : ndarray, shape (r,)
-        What was fitted.
-
-    Returns
-    -------
-    ndarray, shape (K, r)
-        For each of K recordings; empty for a single one.
-
-    References
-    ----------
-    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
-    Statistics 14, 1986.
+    Directions of less than a rounding error of the others get that.
 
     """
-    parts: dict[str, FloatArray] = {}
-    first = 0
-    for part in problem:
-        weight = weights[first : first + len(part.target)]
-        first += len(part.target)
-        columns, target = weighted_rows([part], weight)
-        own = columns.T @ np.column_stack([columns, target - columns @ values])
-        parts[part.source] = parts.get(part.source, np.zeros_like(own)) + own
-    if len(parts) < 2:
-        return np.zeros((0, len(values)))
-    products = np.array(list(parts.values()))
-    whole = products.sum(axis=0)
-    change, std = _solution(whole)
-    result = []
-    for own in products:
-        held_change, held_std = _solution(whole - own)
-        seen = held_std > 0.0
-        share = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
-        result.append(share * (held_change - change))
-    return np.array(result)
-
-
-def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return means and deviations, (p,), of normal equations (p, p + 1), zero if not seen."""
-    basis = informative_basis(products[:, :-1])
-    return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    both = np.outer(scale, scale)
+    return np.asarray(np.linalg.inv(matrix * both + UNINFORMATIVE * np.eye(len(matrix))) * both)

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-from armid_ros.identification.fitting.least_squares import LEAST_LEFT
+from armid_ros.identification.fitting.covariance import LEAST_LEFT
 from armid_ros.identification.online.background import Background, Job, Pieces
 from armid_ros.identification.online.square_root import PRIOR_STD
 from armid_ros.motion import FloatArray

@@ -20,6 +20,7 @@ from armid_ros.errors import IdentificationError
 from armid_ros.identification.fitting.excited import bounds, excited
 from armid_ros.identification.fitting.least_squares import Method, solve
 from armid_ros.identification.fitting.nonlinear import agree, FittedValues, through, torques
+from armid_ros.identification.fitting.normal_equations import informative_solution
 from armid_ros.identification.physical.physical_certificate import (
     PhysicalCertificate,
     walls_reached,
@@ -158,13 +159,14 @@ def _bodies(
     base, problem, weights = fit.base, fit.problem, fit.solution.weights
     program, notes = physical_program(arm, base, settings)
     prior, lower, upper, boxes = program.prior, program.lower, program.upper, program.boxes
-    # weighted rows, shrunk to one triangular factor per block of successive samples
+    # products of the weighted rows of blocks of successive samples
     ends = np.cumsum([len(part) for part in np.array_split(weights, BLOCKS)])[:-1]
-    rows = np.column_stack(weighted_rows(problem, weights))
-    blocks = [_triangle(part) for part in np.split(rows, ends * weights.shape[1])]
-    whole = np.concatenate(blocks)
-    least = float(np.linalg.norm(_residual(whole, fit.solution.values)))
-    least = max(least, FINEST_FIT * float(np.linalg.norm(whole[:, -1])))
+    columns, target = weighted_rows(problem, weights)
+    rows = np.column_stack([columns, target])
+    blocks = np.array([own.T @ own for own in np.split(rows, ends * weights.shape[1])])
+    whole = blocks.sum(axis=0)
+    least = _misfit(whole, fit.solution.values)
+    least = max(least, FINEST_FIT * float(np.sqrt(whole[-1, -1])))
     counted = np.array_split(np.count_nonzero(weights, axis=1), BLOCKS)
     share = np.array([part.sum() for part in counted], dtype=float)
     counts = share / share.sum() * least**2  # so that the unconstrained fit's mean square is one
@@ -172,7 +174,7 @@ def _bodies(
     tried = _held_out_errors(program, blocks, counts)
     best = min(error for _, error in tried)
     weight = max(w for w, error in tried if error <= (1.0 + TOLERANCE) * best)
-    theta = program.solve(_triangle(whole), float(counts.sum()), weight)
+    theta = program.solve(whole, float(counts.sum()), weight)
     rigid = theta[: len(theta) - len(lower)].reshape(-1, PER_LINK)
     links = tuple(
         Consistency.of(link, values) for link, values in zip(arm.robot.links, rigid, strict=True)
@@ -182,7 +184,6 @@ def _bodies(
     held = (effects - lower <= scale) | (upper - effects <= scale)
     names = arm.parameters[len(theta) - len(lower) :]
     values = base.values(theta)
-    misfit = float(np.linalg.norm(_residual(whole, values)))
     factor = settings.mass_range or np.inf
     off = np.abs(np.log(rigid[:, 0] / prior[: rigid.size : PER_LINK]))
     off = off > (1.0 - _AT_MASS) * np.log(factor)
@@ -203,7 +204,7 @@ def _bodies(
         total_mass=settings.total_mass,
         weight=weight,
         tried=tried,
-        misfit_ratio=max(misfit / least, 1.0),
+        misfit_ratio=max(_misfit(whole, values) / least, 1.0),
         notes=(*notes, *_heavy(arm.robot, rigid)),
         at_mass=tuple(link for link, at in zip(arm.robot.links, off, strict=True) if at),
     )
@@ -296,28 +297,24 @@ def bodily_prior(arm: ArmModel) -> tuple[FloatArray, tuple[str, ...]]:
 
 def _held_out_errors(
     program: PhysicalProgram,
-    blocks: Sequence[FloatArray],
+    blocks: FloatArray,
     counts: FloatArray,
 ) -> tuple[tuple[float, float], ...]:
     """Return the error on blocks left out, per weight, relative to unconstrained fits."""
     free = 0.0
     squares = dict.fromkeys(WEIGHTS, 0.0)
     for left_out, block in enumerate(blocks):
-        others = [b for k, b in enumerate(blocks) if k != left_out]
-        triangle = _triangle(np.concatenate(others))
+        others = np.delete(blocks, left_out, axis=0).sum(axis=0)
         count = float(counts.sum() - counts[left_out])
-        values = np.asarray(np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=1e-10)[0])
-        free += float(np.sum(_residual(block, values) ** 2))
+        free += _misfit(block, informative_solution(others[:-1, :-1], others[:-1, -1])) ** 2
         for weight in WEIGHTS:
-            theta = program.solve(triangle, count, weight)
-            squares[weight] += float(np.sum(_residual(block, program.base.values(theta)) ** 2))
-    floor = max(free, FINEST_FIT**2 * float(sum(np.sum(b[:, -1] ** 2) for b in blocks)))
+            theta = program.solve(others, count, weight)
+            squares[weight] += _misfit(block, program.base.values(theta)) ** 2
+    floor = max(free, FINEST_FIT**2 * float(blocks[:, -1, -1].sum()))
     return tuple((weight, float(np.sqrt(total / floor))) for weight, total in squares.items())
 
 
-def _triangle(rows: FloatArray) -> FloatArray:
-    return np.asarray(scipy.linalg.qr(rows, mode='r', check_finite=False)[0][: rows.shape[1]])
-
-
-def _residual(rows: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(rows[:, -1] - rows[:, :-1] @ values)
+def _misfit(products: FloatArray, values: FloatArray) -> float:
+    """Return the norm of the residual, given products of columns and target."""
+    ends = np.append(values, -1.0)
+    return float(np.sqrt(max(ends @ products @ ends, 0.0)))

@@ -83,16 +83,16 @@ class PhysicalProgram:
     def _rigid(self) -> int:
         return PER_LINK * self.n_links
 
-    def solve(self, triangle: FloatArray, count: float, weight: float) -> FloatArray:
+    def solve(self, products: FloatArray, count: float, weight: float) -> FloatArray:
         """
         Find the parameters.
 
         Parameters
         ----------
-        triangle : ndarray, shape (k, r + 1)
-            Triangular factor of the weighted problem: base columns, then torque.
+        products : ndarray, shape (r + 1, r + 1)
+            Products of the weighted base columns and torque with each other.
         count : float
-            Number N of weighted rows that it stands for.
+            Number N of weighted rows that they are of.
         weight : float
             Weight w of the divergence, positive.
 
@@ -108,24 +108,23 @@ class PhysicalProgram:
 
         """
         rank, size, rigid = self.base.rank, len(self.prior), self._rigid
-        columns = triangle[:, :rank] @ self.base.grouping / np.sqrt(count)
-        lengths = np.linalg.norm(columns[:, rigid:], axis=0)
+        information = self.base.grouping.T @ (products[:rank, :rank] / count) @ self.base.grouping
+        lengths = np.sqrt(np.diag(information)[rigid:])
         # from symmetric matrices, of which the identity is the prior, and effects to theta
         change = np.diag(
             np.concatenate([np.zeros(rigid), 1.0 / np.where(lengths > 0.0, lengths, 1.0)])
         )
         change[:rigid, :rigid] = self._whitened_links
         origin = np.concatenate([np.zeros(rigid), self.prior[rigid:]])
-        a = columns @ change
-        z = triangle[:, rank] / np.sqrt(count) - columns @ origin
+        aim = self.base.grouping.T @ products[:rank, rank] / count - information @ origin
 
         variables = size + _LOG_DETERMINANT * self.n_links
         hessian = np.zeros((variables, variables))
-        hessian[:size, :size] = a.T @ a
+        hessian[:size, :size] = change.T @ information @ change
         hessian[range(rigid, size), range(rigid, size)] += _RIDGE
         identity = [float(i == j) for j in range(4) for i in range(j + 1)]
         gradient = np.zeros(variables)
-        gradient[:size] = -a.T @ z
+        gradient[:size] = -change.T @ aim
         gradient[:rigid] += weight * np.tile(identity, self.n_links)
         for link in range(self.n_links):
             gradient[self._first(link) + _TRIANGLE : self._first(link + 1)] = -weight

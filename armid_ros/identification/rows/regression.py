@@ -97,6 +97,10 @@ class Regression(Stretch):
         linear = self.columns @ values
         return np.asarray(linear if self.constant is None else linear + self.constant)
 
+    def residual(self, values: FloatArray) -> FloatArray:
+        """Return what values of the columns leave of the torque, shape (M, n)."""
+        return np.asarray(self.target - self.columns @ values)
+
     def restrict(self, columns: Sequence[int] | npt.NDArray[np.intp]) -> Regression:
         """Return the problem in some of its columns; itself if that is all of them in order."""
         if np.array_equal(columns, np.arange(self.columns.shape[2])):
@@ -232,6 +236,11 @@ def weighted_rows(
     target = np.concatenate([part.target for part in problem])
     rows = weights[:, :, np.newaxis] * columns
     return rows.reshape(-1, columns.shape[2]), np.asarray((weights * target).ravel())
+
+
+def by_stretch(problem: Sequence[Stretch], rows: FloatArray) -> list[FloatArray]:
+    """Split rows of all stretches, (N, ...), into those of each."""
+    return np.split(rows, np.cumsum([len(part.motion) for part in problem])[:-1])
 
 
 def predictions(arm: ArmModel, recordings: Sequence[Recording], used: Conditioning) -> list[Fit]:

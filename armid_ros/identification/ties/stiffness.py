@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.identification.fitting.sandwich import score_products, widened
+from armid_ros.identification.fitting.covariance import score_products, widened
 from armid_ros.identification.ties.problem import InteractionProblem
 from armid_ros.motion import FloatArray, read_only
 import numpy as np

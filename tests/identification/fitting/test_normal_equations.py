@@ -1,14 +1,112 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Normal equations of which data do not tell every direction."""
+"""Normal equations add up to the fit of all rows; what data do not tell is not changed."""
 
+from armid_ros.identification.fitting.covariance import sandwich
+from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.fitting.normal_equations import (
+    factored,
     informative_basis,
+    NormalEquations,
+    scaled_fit,
+    weighted_fit,
 )
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
+from armid_ros.identification.rows.regression import regressions
+from armid_ros.identification.rows.signals import Conditioning
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+
+from ..conftest import multisine, recorded
+
+USED = Conditioning(200.0, 20.0, 8)
+
+
+@pytest.fixture(scope='module')
+def theory(structure):
+    return structure.base_parameters(np.random.default_rng(0))
+
+
+@pytest.fixture(scope='module')
+def problem(arm, structure, theory):
+    """Return the rows of five recordings in the base parameters."""
+    bags = [
+        recorded(arm, multisine(arm.robot.joints, 20.0, 200.0, seed), seed, torque_noise=0.02)
+        for seed in range(5)
+    ]
+    return regressions(structure, theory.independent, bags, USED)
+
+
+def added(problem):
+    """Add up the normal equations of each recording."""
+    first, *others = (NormalEquations.of([part]) for part in problem)
+    return sum(others, first)
+
+
+def test_the_fit_of_a_sum_is_that_of_all_rows(problem):
+    whole, normal = solve(problem), added(problem)
+    fit = weighted_fit(normal)
+    np.testing.assert_allclose(fit.values, whole.values, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(normal.joint_std(fit.values), whole.joint_std, rtol=1e-9)
+    rows = np.concatenate([part.columns for part in problem]) * whole.weights[:, :, np.newaxis]
+    condition = np.linalg.cond(rows.reshape(-1, rows.shape[2]))
+    assert fit.condition_number == pytest.approx(condition, rel=1e-6)
+
+
+def test_recursion_and_batch_agree(problem, theory):
+    whole = solve(problem)
+    noise = 1.0 / np.max(whole.weights, axis=0)
+    recursive = RecursiveLeastSquares(theory.parameters, noise)
+    for part in problem:
+        for rows, tau, told in zip(part.columns, part.tau, part.informative, strict=True):
+            recursive.update(rows, tau, told.astype(float))
+    batch = scaled_fit(added(problem), noise)
+    # the recursion begins with a ridge, which is all that is between them
+    np.testing.assert_allclose(recursive.values, batch.values, rtol=1e-6, atol=1e-9)
+
+
+def test_squares_of_torques_and_residuals_are_those_of_the_rows(problem):
+    normal = added(problem)
+    values = np.random.default_rng(1).normal(size=normal.rank)
+    told = np.concatenate([part.informative for part in problem])
+    tau = np.concatenate([part.tau for part in problem])
+    left = tau - np.concatenate([part.columns for part in problem]) @ values
+    np.testing.assert_allclose(normal.target_squares, np.sum(told * tau**2, axis=0))
+    np.testing.assert_allclose(normal.squares(values), np.sum(told * left**2, axis=0))
+    np.testing.assert_array_equal(normal.counts, told.sum(axis=0))
+
+
+def test_some_columns_are_the_normal_equations_of_some_columns(problem):
+    kept = np.arange(5, 30)
+    small = NormalEquations.of(problem).restrict(kept)
+    direct = NormalEquations.of([part.restrict(kept) for part in problem])
+    np.testing.assert_allclose(small.products, direct.products, rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_packed_comes_back(problem):
+    normal = NormalEquations.of(problem)
+    arrived = NormalEquations.unpacked(normal.packed())
+    np.testing.assert_array_equal(arrived.products, normal.products)
+    np.testing.assert_array_equal(arrived.counts, normal.counts)
+
+
+@pytest.mark.parametrize('condition', [1e2, 1e10, 1e13])
+def test_a_covariance_is_positive_semi_definite_whatever_the_condition(condition):
+    """A short motion hardly determines some values; the products lose them to rounding."""
+    rng = np.random.default_rng(3)
+    axes = np.linalg.qr(rng.standard_normal((40, 40)))[0]
+    rows = rng.standard_normal((400, 40)) @ (np.geomspace(1.0, 1.0 / condition, 40) * axes).T
+    products = rows.T @ rows
+    _, inverse = factored(products)
+    found = sandwich(inverse @ inverse.T, products)
+    std = np.sqrt(np.diag(found))
+    correlations = found / np.outer(std, std)
+    assert np.all(std > 0.0) and np.abs(correlations).max() < 1.0 + 1e-12
+    assert np.linalg.eigvalsh(correlations).min() > -1e-12
+    if condition < 1e3:
+        np.testing.assert_allclose(found, np.linalg.inv(products), rtol=1e-8)
 
 
 @given(st.integers(0, 1000), st.integers(1, 6))

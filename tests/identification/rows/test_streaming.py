@@ -3,7 +3,7 @@
 """A bag larger than the memory: its rows come piece by piece, and are those of the whole."""
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification.fitting.triangle import fit_triangle, Triangle
+from armid_ros.identification.fitting.normal_equations import NormalEquations, weighted_fit
 from armid_ros.identification.rows.regression import regressions
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.identification.rows.streaming import streamed
@@ -55,7 +55,7 @@ def test_rows_of_pieces_are_those_of_the_whole(tmp_path, smooth, gaps, samples):
     assert sum(len(part.motion) for part in parts) == sum(len(part.motion) for part in whole)
     stacked, expected = (np.concatenate([p.columns for p in some]) for some in (parts, whole))
     np.testing.assert_allclose(stacked, expected, rtol=1e-9, atol=1e-9)
-    one, other = fit_triangle(Triangle.of(parts)), fit_triangle(Triangle.of(whole))
+    one, other = (weighted_fit(NormalEquations.of(rows)) for rows in (parts, whole))
     np.testing.assert_allclose(one.values, other.values, rtol=1e-9, atol=1e-11)
 
 

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
+from armid_ros.identification.fitting.covariance import sandwich, score_products
 from armid_ros.identification.fitting.least_squares import Solution, solve
-from armid_ros.identification.fitting.sandwich import sandwich, score_products
-from armid_ros.identification.fitting.triangle import Triangle
+from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.regression import Regression, weighted_rows
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.interaction import direction, link_columns
@@ -87,17 +87,18 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
         raise IdentificationError(
             f'the rigid fit needs experiments of more than {2 * _ENDS:g} s; there are none'
         )
-    triangle = Triangle.of(problem)
-    scale = np.linalg.norm(triangle.stacked, axis=0)
+    normal = NormalEquations.of(problem)
+    products = normal.summed()[:-1, :-1]
+    scale = np.sqrt(np.diag(products))
     if not np.all(scale > 0.0):
         raise IdentificationError('the rigid fit needs motion of both joints; one stands')
-    sizes = np.linalg.svd(triangle.stacked / scale, compute_uv=False)
-    if sizes[-1] < _APART * sizes[0]:
+    sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
+    if sizes[0] < _APART**2 * sizes[-1]:
         raise IdentificationError(
             'the slow motion does not tell the rigid parameters apart; let both joints '
             'accelerate in several poses'
         )
-    solution = solve(problem, triangle=triangle)
+    solution = solve(problem)
     joints = runs[0].motor.joints
     names = (
         ParameterName('alpha + mm gear^2', joints[0], 'kg m^2'),
@@ -107,7 +108,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
         *(ParameterName('dl + dm gear^2', joint, 'N m s/rad') for joint in joints),
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
-    left = triangle.squares(solution.values).sum() / triangle.torque_squares.sum()
+    left = normal.squares(solution.values).sum() / normal.target_squares.sum()
     estimate = Estimate(names, solution.values, _covariance(problem, solution))
     return RigidFit(estimate, 100.0 * float(np.sqrt(left)))
 

@@ -1,0 +1,229 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Covariances of estimates whose errors are not those of white noise: bread, middle, bread.
+
+The bread is the inverse of the products of the columns, the middle the covariance of the products
+of columns and noise. The spectrum of the residuals tells it (`noise_products`), or neighbouring
+scores (`score_products`). What a model gets wrong differs from motion to motion: recordings that
+are left out show by how much (`scatter`).
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armid_ros.identification.fitting.normal_equations import informative_basis, NormalEquations
+from armid_ros.identification.rows.regression import by_stretch, Regression
+from armid_ros.motion import FloatArray
+import numpy as np
+import numpy.typing as npt
+from scipy import fft
+import scipy.linalg
+
+#: Order of the autoregression that whitens residuals: the slopes of drift, and one resonance.
+AR_ORDER = 3
+#: Least share of the noise that a residual is taken to have kept in a band.
+LEAST_LEFT = 0.1
+
+
+def sandwich(bread: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return bread middle bread', semi-definite whatever rounding does, shape (p, p)."""
+    covariance = bread @ middle @ bread.T
+    std = np.sqrt(np.maximum(np.abs(np.diag(covariance)), 1e-300))
+    sizes, axes = np.linalg.eigh(covariance / np.outer(std, std))
+    root = axes * np.sqrt(sizes.clip(0.0))
+    root *= (std / np.maximum(np.linalg.norm(root, axis=1), 1e-300))[:, np.newaxis]
+    return np.asarray(root @ root.T)
+
+
+def score_products(scores: Sequence[FloatArray], lags: int) -> FloatArray:
+    """
+    Return the covariance of the sum of scores of which neighbours are alike.
+
+    Source: Newey and West 1987.
+
+    Parameters
+    ----------
+    scores : sequence of ndarray, each of shape (M, p)
+        Of the rows of each stretch.
+    lags : int
+        Rows over which errors may last.
+
+    Returns
+    -------
+    ndarray, shape (p, p)
+
+    """
+    products = np.zeros((scores[0].shape[1],) * 2)
+    for part in scores:
+        products += part.T @ part
+        for lag in range(1, min(lags, len(part))):
+            alike = (1.0 - lag / lags) * part[:-lag].T @ part[lag:]
+            products += alike + alike.T
+    return products
+
+
+def widened(covariance: FloatArray, bread: FloatArray, middle: FloatArray) -> FloatArray:
+    """Return a covariance, (p, p), with deviations no less than those of another middle."""
+    ratio = np.diag(bread @ middle @ bread) / np.diag(covariance)
+    factor = np.sqrt(np.maximum(ratio, 1.0))
+    return np.asarray(covariance * np.outer(factor, factor))
+
+
+def noise_products(
+    problem: Sequence[Regression],
+    residual: FloatArray,
+    weights: FloatArray,
+    inverse: FloatArray,
+    instruments: Sequence[FloatArray] | None = None,
+) -> FloatArray:
+    """
+    Return the covariance of the products of columns and noise, W' n.
+
+    The noise of each joint is coloured, with a spectrum Phi that its residual tells; noises of
+    different joints are taken as independent, those of different stretches too. A fit takes most
+    of the noise where the regressor has its power, so the residual has less of it there: at a
+    frequency of a joint the share x^H H^-1 x of what was, x being the transform of the joint's
+    rows, its leverage.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        Stretches, N samples in all, of r columns.
+    residual, weights : ndarray, shape (N, n)
+        Weighted residual of the fit, and the weights.
+    inverse : ndarray, shape (r, r)
+        Inverse of the triangular factor of the weighted problem: H^-1 = inverse inverse'.
+    instruments : sequence of ndarray, each of shape (M, n, k), optional
+        Further columns, one array a stretch.
+
+    Returns
+    -------
+    ndarray, shape (r + k, r + k)
+
+    """
+    rank = len(inverse)
+    extra = [np.empty((*part.tau.shape, 0)) for part in problem]
+    added = extra if instruments is None else instruments
+    size = rank + added[0].shape[2]
+    products = np.zeros((size, size))
+    splits = (by_stretch(problem, rows) for rows in (residual, weights))
+    for part, more, left, weight in zip(problem, added, *splits, strict=True):
+        count = len(part.tau)
+        for joint in range(part.tau.shape[1]):
+            columns = np.concatenate([part.columns[:, joint], more[:, joint]], axis=1)
+            active = np.flatnonzero(columns.any(axis=0))
+            weighted = columns.T[active] * weight[:, joint]
+            # one row a column: real and imaginary parts side by side make real products of it
+            transformed = fft.rfft(weighted, 2 * count).view(float)
+            fitted = active < rank
+            taken = inverse[active[fitted]].T @ transformed[fitted]
+            told = weight[:, joint] > 0.0
+            shares = np.einsum('ab,ab->b', taken, taken).reshape(-1, 2).sum(axis=1)
+            leverage = shares / max(np.count_nonzero(told), 1)
+            spectrum = _noise_spectrum(left[:, joint], told, leverage)
+            spectrum[1:-1] *= 2.0  # the constant and the Nyquist bin have no mirror image
+            transformed *= np.repeat(np.sqrt(spectrum / (2 * count)), 2)
+            products[np.ix_(active, active)] += transformed @ transformed.T
+    return products
+
+
+def _noise_spectrum(
+    residual: FloatArray, told: npt.NDArray[np.bool_], leverage: FloatArray
+) -> FloatArray:
+    """Estimate the power of noise (M + 1,) on the bins of an rfft from a residual (M,)."""
+    count = len(residual)
+    size = 2 * count
+    # the autocovariance of the samples that tell something, over as many pairs as there are
+    # (Parzen 1963), without the negative power that it may have where there are gaps
+    sums, pairs = (
+        np.fft.irfft(np.abs(np.fft.rfft(signal, size)) ** 2)[:count]
+        for signal in (residual, told.astype(float))
+    )
+    lags = sums / np.maximum(pairs, 1.0) * np.arange(count, 0, -1) / count
+    power = np.fft.rfft(np.concatenate([lags, [0.0], lags[:0:-1]])).real.clip(0.0)
+    lags = np.fft.irfft(power, size)[:count]
+    # whitened by an autoregression, smoothed by a Parzen window over lags, and coloured again,
+    # which keeps peaks from being smoothed away (Andrews and Monahan 1992)
+    order, whitening = min(AR_ORDER, len(lags) - 1), np.ones(count + 1)
+    if lags[0] > 0.0 and order >= 1:
+        regular = lags[: order + 1].copy()
+        regular[0] *= 1.0 + 1e-6
+        coefficients = scipy.linalg.solve_toeplitz(regular[:order], regular[1:])
+        filtered = np.fft.rfft(np.concatenate([[1.0], -coefficients]), size)
+        whitening = np.abs(filtered) ** 2
+    lags = np.fft.irfft(power * whitening, size)[: count // 2]
+    # how many lags matter: four times the first at which the correlation is noise
+    quiet = np.abs(lags) < 2.0 / np.sqrt(count) * max(lags[0], 1e-300)
+    first = int(np.argmax(quiet)) if np.any(quiet) else len(lags)
+    reach = int(np.clip(4 * first, min(10, len(lags)), len(lags)))
+    # what the fit took is made up for in the same band
+    left = _smoothed(1.0 - leverage, reach).clip(LEAST_LEFT)
+    return np.asarray(_smoothed(power * whitening, reach).clip(0.0) / left / whitening)
+
+
+def _smoothed(spectrum: FloatArray, reach: int) -> FloatArray:
+    """Smooth a spectrum on the bins of an rfft: keep lags below a reach, Parzen-weighted."""
+    size = 2 * (len(spectrum) - 1)
+    lags = np.fft.irfft(spectrum, size)
+    x = np.arange(reach) / reach
+    parzen = np.where(x < 0.5, 1 - 6 * x**2 + 6 * x**3, 2 * (1 - x) ** 3)
+    tapered = np.zeros(size)
+    tapered[:reach] = lags[:reach] * parzen
+    tapered[size - reach + 1 :] = tapered[1:reach][::-1]
+    return np.asarray(np.fft.rfft(tapered).real)
+
+
+def scatter(problem: Sequence[Regression], weights: FloatArray, values: FloatArray) -> FloatArray:
+    """
+    Return the changes of values without each recording, of which squares sum up to a variance.
+
+    A change counts by what the other recordings determine of the value: for white noise the
+    squares then sum up to the variance of least squares, also where one recording determines most
+    of a value. A value that the others do not determine has no change.
+
+    Parameters
+    ----------
+    problem : sequence of Regression
+        N rows of r columns.
+    weights : ndarray, shape (N, n)
+        What the fit multiplied the rows of every joint by.
+    values : ndarray, shape (r,)
+        What was fitted.
+
+    Returns
+    -------
+    ndarray, shape (K, r)
+        For each of K recordings; empty for a single one.
+
+    References
+    ----------
+    Wu, Jackknife, bootstrap and other resampling methods in regression analysis, Annals of
+    Statistics 14, 1986.
+
+    """
+    parts: dict[str, FloatArray] = {}
+    for part, weight in zip(problem, by_stretch(problem, weights), strict=True):
+        own = NormalEquations.of([part], weight).summed()[:-1]
+        own[:, -1] -= own[:, :-1] @ values
+        parts[part.source] = parts.get(part.source, np.zeros_like(own)) + own
+    if len(parts) < 2:
+        return np.zeros((0, len(values)))
+    products = np.array(list(parts.values()))
+    whole = products.sum(axis=0)
+    change, std = _solution(whole)
+    result = []
+    for own in products:
+        held_change, held_std = _solution(whole - own)
+        seen = held_std > 0.0
+        share = np.where(seen, std / np.where(seen, held_std, 1.0), 0.0)
+        result.append(share * (held_change - change))
+    return np.array(result)
+
+
+def _solution(products: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return means and deviations, (p,), of normal equations (p, p + 1), zero if not seen."""
+    basis = informative_basis(products[:, :-1])
+    return basis @ (basis.T @ products[:, -1]), np.sqrt(np.sum(basis**2, axis=1))
