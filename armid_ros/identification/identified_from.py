@@ -11,7 +11,6 @@ another day may be at the same path by then.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -26,35 +25,27 @@ _END = 1 << 20
 _NOT_DATA = 'metadata.yaml'
 
 
-@dataclass(frozen=True)
-class _Content:
-    """Size of the files of a recording [bytes], and SHA-256 of their sizes, begins and ends."""
-
-    size: int
-    digest: str
-
-    @classmethod
-    def of(cls, path: Path) -> _Content:
-        """Read the content of a file, or of the files of a folder such as a bag."""
-        inside = sorted(path.rglob('*')) if path.is_dir() else [path]
-        digest, total = hashlib.sha256(), 0
-        for file in inside:
-            if not file.is_file() or file.name == _NOT_DATA:
-                continue
-            size = file.stat().st_size
-            total += size
-            digest.update(f'{size};'.encode())
-            with file.open('rb') as stream:
-                digest.update(stream.read(_END))
-                stream.seek(max(_END, size - _END))
-                digest.update(stream.read(_END))
-        return cls(total, digest.hexdigest())
+def _content(path: Path) -> dict[str, Any]:
+    """Return size of a file or folder [bytes], and SHA-256 of the ends of its files."""
+    inside = sorted(path.rglob('*')) if path.is_dir() else [path]
+    digest, total = hashlib.sha256(), 0
+    for file in inside:
+        if not file.is_file() or file.name == _NOT_DATA:
+            continue
+        size = file.stat().st_size
+        total += size
+        digest.update(f'{size};'.encode())
+        with file.open('rb') as stream:
+            digest.update(stream.read(_END))
+            stream.seek(max(_END, size - _END))
+            digest.update(stream.read(_END))
+    return {'size': total, 'digest': digest.hexdigest()}
 
 
 def with_contents(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return identification.json with the contents of its recordings, of those that are there."""
     there = [(name, Path(name)) for name in _names(document)]
-    rows = [{'bag': name, **asdict(_Content.of(path))} for name, path in there if path.exists()]
+    rows = [{'bag': name, **_content(path)} for name, path in there if path.exists()]
     return {**document, 'recordings': rows}
 
 
@@ -93,7 +84,7 @@ def require_as_identified(path: str | Path) -> None:
 
     """
     for place, known in _found(Path(path)).items():
-        if known is not None and _Content.of(place) != known:
+        if known is not None and _content(place) != known:
             raise ModelError(
                 f'{place}: is not the recording any more that {path} was identified from, its '
                 'content is another; name the baseline (--baseline), ask without one '
@@ -101,7 +92,7 @@ def require_as_identified(path: str | Path) -> None:
             )
 
 
-def _found(model: Path) -> dict[Path, _Content | None]:
+def _found(model: Path) -> dict[Path, dict[str, Any] | None]:
     """Return the recordings of a model that are there, and what they held, where that is known."""
     beside = model.with_name('identification.json')
     if not is_file(beside):
@@ -110,7 +101,7 @@ def _found(model: Path) -> dict[Path, _Content | None]:
     with reading(beside, ModelError):
         document = load_json(text)
         known = {
-            str(row['bag']): _Content(int(row['size']), str(row['digest']))
+            str(row['bag']): {'size': int(row['size']), 'digest': str(row['digest'])}
             for row in document.get('recordings', [])
         }
         starts = (Path(), beside.parent, beside.parent.parent)

@@ -34,7 +34,6 @@ from armid_ros.identification.rows.checks import (
     too_short_to_tell,
 )
 from armid_ros.identification.rows.damage import without_damage
-from armid_ros.identification.rows.decimation import check_decimation
 from armid_ros.identification.rows.regression import (
     Fit,
     predictions,
@@ -90,6 +89,11 @@ class IdentificationSettings:
     def least_squares(self) -> Method:
         """Return the least squares that the method is, or starts from."""
         return 'wls' if self.method == 'iv' else self.method
+
+    @property
+    def holds_description(self) -> bool:
+        """Whether the description stays where it is surer; a fit among bodies weighs it itself."""
+        return self.physical is None and self.method != 'iv'
 
 
 @dataclass(frozen=True)
@@ -231,15 +235,27 @@ def identify(
         fit = _fitted(arm, base, problem, recordings, used, settings)
         theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
-        fit, remarks = fit_by_instruments(arm, fit, recordings, used)
-        notes += remarks
-    notes += _remarks(fit, theory)
+        fit = fit_by_instruments(fit, recordings, used)
+    if fit.base.rank < theory.rank:
+        notes += (
+            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
+            'the others are grouped, or stay as described',
+        )
+    if fit.solution.outliers:
+        notes += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
     certificate = None
     if settings.physical is not None:
         fit, certificate = fit_to_bodies(
             arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
+    if not fit.settled:
+        notes += (
+            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
+            'change one another too much in these data; leave some out, or record more',
+        )
+    spread = base_spread(whole, fit.base) if settings.holds_description else None
+    described = fit.base.values(whole.theta)
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -250,8 +266,8 @@ def identify(
         training=fit.fits,
         used=used,
         settings=settings,
-        notes=notes + _unsettled(fit),
-        halves=_halves(whole, fit, settings),
+        notes=notes,
+        halves=halves_error(fit.problem, fit.solution.weights, described, spread),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
@@ -268,24 +284,10 @@ def _fitted(
 ) -> FittedValues:
     """Fit by least squares what data determine better than the description does."""
     method, told, free = settings.least_squares, base, None
-    if _holds(settings):
+    if settings.holds_description:
         told, problem = determined(arm, base, problem, method)
         free = None if told.rank == base.rank else ungrouped(arm, base)
     return fit_values(arm, told, problem, recordings, used, method, free)
-
-
-def _holds(settings: IdentificationSettings) -> bool:
-    """Whether the description stays where it is surer; a fit among bodies weighs it by itself."""
-    return settings.physical is None and settings.method == settings.least_squares
-
-
-def _halves(
-    description: ArmModel, fit: FittedValues, settings: IdentificationSettings
-) -> HalvesError:
-    """Let halves predict each other, with the description weighed as the fit weighs it."""
-    spread = base_spread(description, fit.base) if _holds(settings) else None
-    described = fit.base.values(description.theta)
-    return halves_error(fit.problem, fit.solution.weights, described, spread)
 
 
 def _require_samples(
@@ -296,44 +298,18 @@ def _require_samples(
 ) -> None:
     """Refuse data with fewer than two torques for a parameter."""
     samples = sum(len(part.motion) for part in columns)
-    few = sum(part.tau.size for part in columns) < 2 * theory.rank
-    if few:
-        check_decimation(recordings, used, -(-2 * theory.rank // recordings[0].n_joints))
     left = {part.source for part in columns}
     for recording in recordings:
         if recording.source not in left:
             check_stamps([recording], used)
             raise no_stretch(recording, used)
-    if few:
+    if sum(part.tau.size for part in columns) < 2 * theory.rank:
         check_stamps(recordings, used)
         raise IdentificationError(
             f'{recordings[0].source}: {samples} samples remain after filtering at '
             f'{used.cutoff_hz:g} Hz and decimation by {used.decimation}; {theory.rank} parameters '
-            'need more: record longer'
+            'need more: record longer, or lower --decimation'
         )
-
-
-def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
-    """Say what the data group, and what they were weighted down for."""
-    remarks: tuple[str, ...] = ()
-    if fit.base.rank < theory.rank:
-        remarks += (
-            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
-            'the others are grouped, or stay as described',
-        )
-    if fit.solution.outliers:
-        remarks += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
-    return remarks
-
-
-def _unsettled(fit: FittedValues) -> tuple[str, ...]:
-    """Say so where linearising once more would still change the fit."""
-    if fit.settled:
-        return ()
-    return (
-        f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
-        'change one another too much in these data; leave some out, or record more',
-    )
 
 
 def _with_what_shows_now(

@@ -5,8 +5,6 @@
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
-from armid_ros.identification.online.recursive import RecursiveLeastSquares
-from armid_ros.identification.rows.regression import regressions
 from armid_ros.recording import read_recording
 from armid_ros.robots import load_robot
 import numpy as np
@@ -60,22 +58,6 @@ def test_emps_error_falls_with_every_effect(emps):
     ladder = [(), FRICTION[:1], FRICTION[:2], FRICTION, (*FRICTION, 'asymmetric_friction')]
     errors = [error(fit(robot, bag, effects).training) for effects in ladder]
     np.testing.assert_allclose(errors, [69.4, 17.9, 7.1, 4.04, 3.06], rtol=0.06)
-
-
-def test_recursive_is_batch_on_emps(emps):
-    robot, (bag, _) = emps
-    arm = ArmModel(robot)
-    for name in FRICTION:
-        arm = arm.with_effect(make_effect(name, robot))
-    result = fit(robot, bag, FRICTION, method='ols')
-    recursive = RecursiveLeastSquares(result.estimate.parameters)
-    motion = result.training[0].motion
-    (problem,) = regressions(
-        arm, result.base.independent, [read_recording(bag, joints=robot.joints)], result.used
-    )
-    for rows, tau in zip(problem.columns, motion.tau, strict=True):
-        recursive.update(rows, tau)
-    np.testing.assert_allclose(recursive.estimate.values, result.estimate.values, rtol=1e-6)
 
 
 def test_tx40_needs_the_coupling_of_its_wrist(tx40):

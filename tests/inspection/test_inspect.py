@@ -207,3 +207,12 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
 def test_torques_that_nobody_measured_are_said_once(clean, robot):
     silent = remarks(replace(clean, tau=0.0 * clean.tau), robot)
     assert sum('torque' in one or 'effort' in one for one in silent) == 1
+
+
+@pytest.mark.parametrize('period', [6.0, 7.973, 8.0])
+def test_a_period_is_no_multiple_of_the_step_that_it_is_searched_with(period):
+    t = np.arange(4000) / 200.0
+    angle = 2.0 * np.pi * t[:, np.newaxis] / period
+    q = np.sin(angle + np.array([0.0, 1.0])) + 0.4 * np.sin(3.0 * angle + np.array([2.0, 0.5]))
+    recording = Recording(joints=('a', 'b'), t=t, q=q)
+    assert Sampling.of(recording).period == pytest.approx(period, abs=1e-3)

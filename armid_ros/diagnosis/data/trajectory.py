@@ -18,7 +18,6 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.memoized_arm import rigid_rows
 from armid_ros.effects import Effect
 from armid_ros.identification.rows.checks import check_stamps, moving
-from armid_ros.identification.rows.decimation import check_decimation
 from armid_ros.identification.rows.period import find_period
 from armid_ros.identification.rows.regression import Stretch
 from armid_ros.identification.rows.signals import (
@@ -38,8 +37,6 @@ from scipy import signal
 
 #: Columns are computed at this many times the rate of the rows: enough for signs and hysteresis.
 _OVERSAMPLING = 8
-#: Rows below which no torque is told from noise: two for each of the ten values of a link.
-_FEWEST_ROWS = 20
 #: A joint slower than this share of its top speed for this long [s] is at rest.
 _REST_SPEED, REST_TIME = 0.02, 0.2
 #: Below this share of the top speed, or so many standard deviations of its noise, the sign of a
@@ -196,9 +193,6 @@ def trajectories(
         found = [_trajectory(recording, fold, m, used, least) for m in stretches]
         if not found:
             check_stamps([recording], used)
-        if sum(len(part.rows) for part in found) < _FEWEST_ROWS:
-            check_decimation([recording], used, _FEWEST_ROWS)
-        if not found:
             raise no_stretch(recording, used)
         if allowed is not None:
             found = [replace(part, allowed=allowed) for part in found]

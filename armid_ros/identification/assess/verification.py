@@ -23,7 +23,6 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.identification.assess.consistency import check_noise, NoiseCheck
-from armid_ros.identification.fitting.instruments import unlimited
 from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
@@ -45,6 +44,8 @@ _WORSE = 0.05
 #: Natural frequency of the feedback [rad/s]: 8 Hz, as of arms. A softer one would leave a light
 #: joint to its friction, whose sign at a reversal no model has to the millisecond.
 _BANDWIDTH = 50.0
+#: Far enough for no joint to be at a limit [rad or m].
+_FAR = 1e4
 
 Progress = Callable[[float, str], None]
 
@@ -361,3 +362,11 @@ def simulate_held_out(
             assert scores[0] is not None
             pairs.append(ForwardValidation(scores[1], scores[0]))
     return tuple(pairs), tuple(left_out)
+
+
+def unlimited(arm: ArmModel) -> ArmModel:
+    """Return an arm whose joints have no limits that a simulation could run into."""
+    n = arm.robot.n_joints
+    far, free = np.full(n, _FAR), np.full(n, np.inf)
+    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
+    return replace(arm, robot=robot)

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -41,28 +40,6 @@ _STRETCHES = 16
 #: Nor is a cut-off lowered for less than a tenth of the error; jitter and slack cost a third and
 #: more on every machine that was tried.
 _NEAR = 0.1
-
-
-class _Rows(NamedTuple):
-    """Some rows of all stretches: columns (N, n, r), torque, target and which tell, (N, n)."""
-
-    columns: FloatArray
-    tau: FloatArray
-    target: FloatArray
-    told: npt.NDArray[np.bool_]
-    step: int
-
-    @classmethod
-    def of(cls, problem: Sequence[Regression], most: int) -> _Rows:
-        """Return about so many rows."""
-        step = max(1, sum(len(part.tau) for part in problem) // most)
-        return cls(
-            np.concatenate([part.columns for part in problem])[::step],
-            np.concatenate([part.tau for part in problem])[::step],
-            np.concatenate([part.target for part in problem])[::step],
-            np.concatenate([part.informative for part in problem])[::step],
-            step,
-        )
 
 
 @dataclass(frozen=True)
@@ -109,8 +86,8 @@ def halves_error(
         Of the predicted torque.
 
     """
-    columns, tau, target, told, step = _Rows.of(problem, _OF_HALVES)
-    rest, weight = target - columns @ described, weights[::step]
+    columns, tau, target, told = _some_rows(problem, _OF_HALVES)
+    rest, weight = target - columns @ described, weights[:: _step(problem, _OF_HALVES)]
     most = np.full(len(described), np.inf) if spread is None else spread
     middle = len(tau) // 2
     halves = slice(0, middle), slice(middle, None)
@@ -221,7 +198,7 @@ def _losses(problem: Sequence[Regression]) -> FloatArray:
     # every second stretch is predicted from the others, and those from it; every joint counts by
     # the ratio of its errors: a light one whose torque is mostly noise gains by a low cut-off, and
     # must not hide that a heavy one loses
-    x, _, y, told, _ = _Rows.of(problem, _OF_CUTOFFS)
+    x, _, y, told = _some_rows(problem, _OF_CUTOFFS)
     stretch = np.arange(len(y)) * _STRETCHES // len(y)
     left = np.zeros_like(y)
     whole = _fit(x, y, told, np.ones(y.shape[1]))
@@ -248,3 +225,21 @@ def _fit(
     weights = told * weight
     rows = (x * weights[:, :, np.newaxis]).reshape(-1, x.shape[2])
     return informative_solution(rows.T @ rows, rows.T @ (y * weights).ravel())
+
+
+def _step(problem: Sequence[Regression], most: int) -> int:
+    """Return how many rows apart those are of which there are about so many."""
+    return max(1, sum(len(part.tau) for part in problem) // most)
+
+
+def _some_rows(
+    problem: Sequence[Regression], most: int
+) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    """Return about so many rows: columns (N, n, r), torque, target and which are informative."""
+    step = _step(problem, most)
+    columns, tau, target = (
+        np.concatenate([getattr(part, name) for part in problem])[::step]
+        for name in ('columns', 'tau', 'target')
+    )
+    told = np.concatenate([part.informative for part in problem])[::step]
+    return columns, tau, target, told

@@ -1,14 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Instrumental variables: the regressor of another motion correlates with the noise-free one alone.
+Instrumental variables: the regressor of a smoothed motion correlates with that without noise.
 
 Least squares of noisy columns W is biased by W' W, which has the square of the noise. With columns
-Z of a motion that knows nothing of the noise of encoders and torque sensors,
-Z' (tau - W theta) = 0 has not. Such motions are the recorded one, smoothed far below the band of
-the regressor, and that of the fitted arm, simulated in closed loop along it. Simulation and fit
-take turns.
-Source: Janot, Vandanjon and Gautier 2014 (IDIM-IV).
+Z of a motion without the noise of encoders, Z' (tau - W theta) = 0 has not. That motion is the
+recorded one, smoothed far below the band of the regressor.
+Source: Young 2011; Janot, Vandanjon and Gautier 2014 for robots, with instruments of a simulation.
 
 """
 
@@ -18,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.errors import IdentificationError
 from armid_ros.identification.fitting.covariance import noise_products, sandwich
 from armid_ros.identification.fitting.excited import bounds
 from armid_ros.identification.fitting.nonlinear import (
@@ -29,17 +27,11 @@ from armid_ros.identification.fitting.nonlinear import (
     ungrouped,
 )
 from armid_ros.identification.fitting.normal_equations import within
-from armid_ros.identification.rows.regression import (
-    filtered_columns,
-    Regression,
-    regressions,
-    weighted_rows,
-)
-from armid_ros.identification.rows.signals import Conditioning, segments, unbroken
+from armid_ros.identification.rows.regression import Regression, regressions, weighted_rows
+from armid_ros.identification.rows.signals import Conditioning, unbroken
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
-from armid_ros.simulation import ComputedTorque, Plant, simulate
 import numpy as np
 from scipy import signal
 import scipy.linalg
@@ -49,14 +41,10 @@ _SHARE = 0.2
 #: Samples that a stretch is continued by at its ends at the most: three times the length of the
 #: filter, two sections of second order, as scipy does where nothing is said.
 _EDGE = 15
-#: Simulations; a linear arm settles after two.
+#: Linearisations of an arm whose torque is not linear in its parameters.
 _MOST_ROUNDS = 4
 #: A change of less than this share of a standard deviation is the last.
 _SETTLED = 0.02
-#: An arm under computed torque that is off by more than this share of its motion is no arm.
-_ASTRAY = 0.05
-#: Far enough for no joint to be at a limit [rad or m].
-_FAR = 1e4
 
 
 @dataclass(frozen=True)
@@ -84,18 +72,13 @@ class Instrumented:
 
 
 def fit_by_instruments(
-    arm: ArmModel,
-    fit: FittedValues,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-) -> tuple[FittedValues, tuple[str, ...]]:
+    fit: FittedValues, recordings: Sequence[Recording], used: Conditioning
+) -> FittedValues:
     """
-    Fit by instruments of a simulation, beginning from least squares.
+    Fit by instruments of the smoothed motion, beginning from weighted least squares.
 
     Parameters
     ----------
-    arm : ArmModel
-        The description.
     fit : FittedValues
         Weighted least squares.
     recordings : sequence of Recording
@@ -103,48 +86,23 @@ def fit_by_instruments(
     used : Conditioning
         Filters.
 
-    Returns
-    -------
-    fit : FittedValues
-        The fit by instruments.
-    notes : tuple of str
-        What a person should know of it.
-
-    Raises
-    ------
-    IdentificationError
-        If the description is quasi-static: it has no inertia to simulate.
-
     """
-    if arm.quasi_static:
-        raise IdentificationError(
-            'iv simulates the arm, and a quasi-static model has no inertia; use wls'
-        )
-    notes, free = tuple[str, ...](), ungrouped(fit.arm, fit.base)
-    base, now, simulated = fit.base, fit, True
-    limits = bounds(fit.arm, base)
-    calm = smoothed(recordings, used)
+    base, free, linear = fit.base, ungrouped(fit.arm, fit.base), fit.passes == 1
+    limits, calm, weights = bounds(fit.arm, base), smoothed(recordings, used), fit.solution.weights
     for _ in range(_MOST_ROUNDS):
-        try:
-            columns = _simulated_columns(now, calm, used)
-        except ArmidError as error:
-            along = linear_problem(now.arm, base, calm, used, linear=now.passes == 1)
-            simulated, columns = False, [part.columns for part in along]
-            notes = (
-                f'instruments are of the smoothed motion: the arm is not simulated ({error})',
-            )
-        found = by_instruments(now.problem, columns, fit.solution.weights, limits)
-        step = np.abs(found.values - now.values) / np.sqrt(np.diag(found.covariance))
-        arm = moved(now.arm, base, found.values, free)
-        if now.passes > 1:
-            problem, predicted = linearised(arm, base, recordings, used)
-        else:
-            problem, predicted = now.problem, torques(arm, recordings, used)
-        now = replace(now, arm=arm, values=found.values, problem=problem, predicted=predicted)
-        if np.max(step, initial=0.0) < _SETTLED or not simulated:
+        exact = linear_problem(fit.arm, base, calm, used, linear=linear)
+        found = by_instruments(fit.problem, [part.columns for part in exact], weights, limits)
+        step = np.abs(found.values - fit.values) / np.sqrt(np.diag(found.covariance))
+        solution = replace(fit.solution, values=found.values, covariance=found.covariance)
+        arm = moved(fit.arm, base, found.values, free)
+        fit = replace(fit, arm=arm, values=found.values, solution=solution)
+        if linear:
+            return replace(fit, predicted=torques(arm, recordings, used))
+        problem, predicted = linearised(arm, base, recordings, used)
+        fit = replace(fit, problem=problem, predicted=predicted)
+        if np.max(step, initial=0.0) < _SETTLED:
             break
-    solution = replace(fit.solution, values=found.values, covariance=found.covariance)
-    return replace(now, solution=solution), notes
+    return fit
 
 
 def by_instruments(
@@ -185,7 +143,7 @@ def by_instruments(
         by_w, by_z = inverse @ inverse.T, scipy.linalg.inv(z.T @ w)
     except scipy.linalg.LinAlgError:
         raise IdentificationError(
-            'the simulated motion does not correlate with the recorded one in every parameter: '
+            'the smoothed motion does not correlate with the recorded one in every parameter: '
             'use wls, or record a motion that shows more'
         ) from None
     free = values = by_z @ (z.T @ target)
@@ -231,35 +189,3 @@ def linear_problem(
     if linear:
         return regressions(arm, base.independent, recordings, used)
     return linearised(arm, base, recordings, used)[0]
-
-
-def _simulated_columns(
-    fit: FittedValues, calm: Sequence[Recording], used: Conditioning
-) -> list[FloatArray]:
-    """Return the columns of the arm along its own motion, simulated on the smoothed one."""
-    arm, found = fit.arm, []
-    for motion in (part for recording in calm for part in segments(recording, used)):
-        t = motion.t - motion.t[0]
-        reference = replace(motion, t=t)
-        plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
-        controller = ComputedTorque(plant.arm)
-        run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller).truth
-        q, dq, ddq = (
-            np.column_stack([np.interp(t, run.t, column) for column in values.T])
-            for values in (run.q, run.dq, run.ddq)
-        )
-        off = np.std(q - motion.q, axis=0) / np.maximum(np.std(motion.q, axis=0), 1e-9)
-        if np.max(off) > _ASTRAY:
-            joint = motion.joints[int(np.argmax(off))]
-            raise IdentificationError(f'simulated, {joint} does not follow its reference')
-        along = replace(motion, q=q, dq=dq, ddq=ddq)
-        found.append(filtered_columns(arm, fit.base.independent, along, used))
-    return found
-
-
-def unlimited(arm: ArmModel) -> ArmModel:
-    """Return an arm whose joints have no limits that a simulation could run into."""
-    n = arm.robot.n_joints
-    far, free = np.full(n, _FAR), np.full(n, np.inf)
-    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
-    return replace(arm, robot=robot)

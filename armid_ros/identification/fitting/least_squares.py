@@ -40,7 +40,7 @@ IN_WORDS: dict[Estimator, str] = {
     'ols': 'ordinary least squares',
     'wls': 'least squares weighted by the noise of each joint',
     'irls': 'least squares weighted by the noise of each joint, outliers weighted down',
-    'iv': 'instrumental variables from a simulation of the arm',
+    'iv': 'instrumental variables from the smoothed motion',
 }
 
 #: Residuals beyond this many robust standard deviations lose weight (Huber 1981: 95 % efficiency).

@@ -155,6 +155,7 @@ class CausalFilter:
     """
     Filter and differentiate joint states as they come.
 
+    The sampling period is the median of the first intervals, learned again after every restart.
     A sample with a wrong length, a number that is not finite or beyond what arms have, or a stamp
     slightly behind is left out and counted; the signal is interpolated across. A gap or a larger
     jump of time restarts the filter, which gives nothing until it has settled again.
@@ -166,9 +167,6 @@ class CausalFilter:
     cutoff : float
         Frequency of the row filter F [Hz]; G is MOTION_FILTER_RATIO times as fast, or as fast as
         the sampling rate permits.
-    period : float, optional
-        Sampling period [s]; the median of the first intervals by default, learned again after
-        every restart.
     max_gap : int
         Missing samples that are interpolated across.
     measured_velocity : bool
@@ -194,19 +192,15 @@ class CausalFilter:
         n_joints: int,
         cutoff: float,
         *,
-        period: float | None = None,
         max_gap: int = 10,
         measured_velocity: bool = False,
         prismatic: npt.ArrayLike | None = None,
     ) -> None:
         if not (np.isfinite(cutoff) and cutoff > 0.0):
             raise IdentificationError(f'cut-off frequency {cutoff} Hz: has to be above 0')
-        if period is not None and not (np.isfinite(period) and period > 0.0):
-            raise IdentificationError(f'sampling period {period} s: has to be above 0')
         check_gap(max_gap)
         self._n_joints = n_joints
         self._cutoff = cutoff
-        self._given_period = period
         self.max_gap = max_gap
         self._measured_velocity = measured_velocity
         self._rejected: Counter[str] = Counter()
@@ -346,15 +340,13 @@ class CausalFilter:
 
     def _restart(self) -> None:
         self.generation += 1
-        self._period = self._given_period
+        self._period: float | None = None
         self._intervals = []
         self._lag = None
         self._start = None
         self._last = None
         self._position = None
         self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self.max_gap)
-        if self._period is not None:
-            self._make_filter(self._period)
 
     def _learn(self, dt: float) -> None:
         if dt > 0.0:

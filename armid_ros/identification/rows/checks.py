@@ -145,9 +145,8 @@ def check_torque(
     """
     Refuse torques that are absent, of the wrong sign, in another unit than N m, or a mere command.
 
-    The sign shows in the power: over a recording an arm takes in energy and dissipates it. The
-    unit shows against the rigid body of the description, if all the joints that follow it agree
-    on the same power of ten.
+    Sign and unit show against the rigid body of the description, if all the joints that follow it
+    agree; the sign of the others shows in their friction.
 
     Raises
     ------
@@ -180,25 +179,15 @@ def check_torque(
                     f'{source}: torques of {joints} are {factor:g} times what the description '
                     f'takes; they seem to be in {unit}: convert them to N m'
                 )
-    if _gives_out_energy(problem):
-        raise IdentificationError(
-            f'{source}: the arm gives out energy throughout, so the torques have the wrong sign; '
-            'effort has to be positive along the URDF joint axis: negate it'
-        )
     driven = driven_by_friction(robot, motions, torques)
     if driven:
         raise IdentificationError(f'{source}: {wrong_sign(driven)}')
-    _refuse_laws(robot, problem)
-    if silent:
-        return (f'torque constant throughout: {", ".join(silent)}',)
-    return ()
-
-
-def _refuse_laws(robot: Robot, problem: Sequence[Regression]) -> None:
-    """Refuse torques that are a law of a controller."""
     for part in problem:
         for law in laws_of_controllers(robot, part.motion, part.informative):
             raise IdentificationError(f'{part.source or "recording"}: {law}')
+    if silent:
+        return (f'torque constant throughout: {", ".join(silent)}',)
+    return ()
 
 
 def wrong_sign(joints: Sequence[str]) -> str:
@@ -239,23 +228,6 @@ def driven_by_friction(
         if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
             found.append(name)
     return found
-
-
-def _gives_out_energy(problem: Sequence[Regression]) -> bool:
-    """Whether an arm drives its motors, in all and in every joint, as a wrong sign alone shows."""
-    # a short motion may give out energy too, that of weights that went down; friction is what is
-    # left of the power where weight and inertia of the joint are taken out
-    power = sum(float(np.sum(part.tau * part.motion.dq)) for part in problem)
-    activity = sum(float(np.sum(np.abs(part.tau * part.motion.dq))) for part in problem)
-    if power >= -0.2 * activity:
-        return False
-    tau = np.concatenate([part.tau for part in problem])
-    for joint in range(tau.shape[1]):
-        held, dq = _held([part.motion for part in problem], joint)
-        rest = _rest(np.column_stack([dq, tau[:, joint]]), held)
-        if rest[:, 0] @ rest[:, 1] > 0.0:
-            return False
-    return True
 
 
 def _held(motions: Sequence[Motion], joint: int) -> tuple[FloatArray, FloatArray]:

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.motion import FloatArray, Motion
-from armid_ros.recording import Recording
+from armid_ros.motion import Motion
 import numpy as np
 
 #: Positions of two periods agree within this share of the range of motion.
@@ -16,71 +15,6 @@ _SAME = 0.02
 _FARTHER = 3.0
 #: The shortest period that is looked for [s].
 _SHORTEST = 1.5
-
-
-#: Positions are compared over this share of a period.
-_STRETCH = 0.8
-#: In a stretch that tells, positions vary by this share of what they vary by in all.
-_MOVING = 0.3
-#: How far the time of a motion that repeats may be from what a coarser look found: two of its
-#: steps, which are 0.05 s apart [s].
-_NEAR = 0.1
-#: Samples per second, and samples, at which it is looked at again at the most.
-_FINE_HZ, _MOST_SAMPLES = 200.0, 20_000
-
-
-def exact_period(recording: Recording, about: float) -> float:
-    """
-    Return the time after which the recorded positions are most alike, near one that is known [s].
-
-    It is the minimum of a parabola through the three best lags, so that it is no multiple of a
-    step of the samples: whoever looks at another rate says the same.
-
-    """
-    most = min(_FINE_HZ, _MOST_SAMPLES / max(recording.duration, 1e-9))
-    rate = min(most, 1.0 / recording.period)
-    t = np.arange(recording.t[0], recording.t[-1], 1.0 / rate)
-    q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T])
-    size = q.std(axis=0)
-    q = (q[:, size > 0.0] - q[:, size > 0.0].mean(axis=0)) / size[size > 0.0]
-    reach = max(2, round(_NEAR * rate))
-    middle = round(about * rate)
-    lags = np.arange(max(1, middle - reach), min(middle + reach + 1, len(t) - 1))
-    change = np.array([least_change(q, int(lag)) for lag in lags])
-    best = int(np.argmin(change)) if len(lags) else 0
-    if not 0 < best < len(lags) - 1 or not np.all(np.isfinite(change[best - 1 : best + 2])):
-        return about
-    before, least, after = change[best - 1 : best + 2]
-    bend = before - 2.0 * least + after
-    return float((lags[best] + (0.5 * (before - after) / bend if bend > 0.0 else 0.0)) / rate)
-
-
-def least_change(q: FloatArray, lag: int) -> float:
-    """
-    Return the mean square change after a lag where it is least; infinite where all rest.
-
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        Positions, of zero mean and unit deviation.
-    lag : int
-        Samples.
-
-    """
-    width = min(int(_STRETCH * lag), len(q) - lag)
-    change = np.mean((q[lag:] - q[:-lag]) ** 2, axis=1) / 2.0
-    first, second = (_window_means(values[: len(change)], width) for values in (q, q**2))
-    spread = np.mean(second - first**2, axis=1)
-    moving = spread > _MOVING
-    if not moving.any():
-        return np.inf
-    return float(np.min(_window_means(change[:, np.newaxis], width)[moving, 0] / spread[moving]))
-
-
-def _window_means(values: FloatArray, width: int) -> FloatArray:
-    """Return the means of all windows of a width, shape (N - width + 1, k)."""
-    sums = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
-    return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
 def find_period(motion: Motion) -> tuple[int, slice] | None:

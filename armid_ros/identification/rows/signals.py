@@ -18,14 +18,14 @@ from functools import cached_property
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.rows.spectrum import mean_spectrum
-from armid_ros.identification.rows.stamps import require_one_sender
+from armid_ros.identification.rows.stamps import two_senders
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Recording
 from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal
+from scipy import signal
 from scipy.interpolate import CubicSpline
 
 #: Samples per second below which no motion of an arm is followed [Hz].
@@ -154,7 +154,9 @@ def conditioning(recordings: list[Recording], settings: SignalSettings) -> Condi
     """
     for recording in recordings:
         _require_rate(recording)
-        require_one_sender(recording)
+        mixed = two_senders(recording)
+        if mixed:
+            raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
     rate = float(np.median([1.0 / recording.period for recording in recordings]))
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     if cutoff is None or decimation is None:
@@ -389,11 +391,7 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
     band = rate / max(len(q) for q, _ in stretches)
     spectra = []
     for q, end in stretches:  # the power of velocities
-        steps = np.diff(q, axis=0)
-        transformed = fft.rfft(steps - steps.mean(axis=0), axis=0)
-        power = np.abs(transformed) ** 2 / len(steps)
-        power[1 : (len(steps) + 1) // 2] *= 2.0  # the constant and the Nyquist bin are single
-        spectra.append((fft.rfftfreq(len(steps), 1.0 / rate), power, end))
+        spectra.append((*signal.periodogram(np.diff(q, axis=0), rate, axis=0), end))
     for joint in range(stretches[0][0].shape[1]):
         kept = [
             (frequency[inside], power[inside, joint])

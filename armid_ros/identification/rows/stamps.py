@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
@@ -92,13 +91,6 @@ def _wander(t: FloatArray) -> float:
     windows = t[: len(t) - len(t) % _WINDOW].reshape(-1, _WINDOW).T
     line = np.linalg.qr(np.column_stack([np.ones(_WINDOW), np.arange(_WINDOW)]))[0]
     return float(np.sqrt(np.median(np.mean((windows - line @ (line.T @ windows)) ** 2, axis=0))))
-
-
-def require_one_sender(recording: Recording) -> None:
-    """Raise an IdentificationError where messages come from two senders."""
-    mixed = two_senders(recording)
-    if mixed:
-        raise IdentificationError(f'{recording.source or "recording"}: {mixed}')
 
 
 def two_senders(recording: Recording) -> str:

@@ -33,37 +33,20 @@ import numpy.typing as npt
 _FORGET_PERIODS = 16.0
 
 
-class _Cuts:
-    """Where a recording is cut into pieces, given the filters that reach beyond a row."""
-
-    def __init__(self, used: Conditioning) -> None:
-        self.used = used
-        periods = (EDGE_PERIODS + _FORGET_PERIODS) * used.rate_hz / used.cutoff_hz
-        self._margin = int(np.ceil(periods)) + len(used.taps())
-
-    def keep(self, piece: Recording) -> int:
-        """Return the stamp of the sample that the next piece begins with [ns]."""
-        return self._stamp(piece, self._places(piece)[0])
-
-    def end(self, piece: Recording) -> int:
-        """Return when the rows of a piece end and those of the next one begin [ns]."""
-        half = round(0.5e9 / self.used.rate_hz)
-        return self._stamp(piece, self._places(piece)[1]) - half
-
-    def _places(self, piece: Recording) -> tuple[int, int]:
-        """Return with which sample the next piece begins, and with which its rows."""
-        longest = GAP_PERIODS * max(1.0 / self.used.rate_hz, piece.period)
-        gaps = np.flatnonzero(np.diff(piece.t) > longest)
-        origin = int(gaps[-1]) + 1 if len(gaps) else 0
-        first = len(piece) - 2 * self._margin
-        if first <= origin:
-            return origin, origin
-        first -= (first - origin) % self.used.decimation
-        return first, first + self._margin
-
-    @staticmethod
-    def _stamp(piece: Recording, sample: int) -> int:
-        return piece.start_ns + round(1e9 * float(piece.t[sample]))
+def _cuts(piece: Recording, used: Conditioning) -> tuple[int, int]:
+    """Return the stamps that the next piece begins with, and where its own rows begin [ns]."""
+    periods = (EDGE_PERIODS + _FORGET_PERIODS) * used.rate_hz / used.cutoff_hz
+    margin = int(np.ceil(periods)) + len(used.taps())
+    longest = GAP_PERIODS * max(1.0 / used.rate_hz, piece.period)
+    gaps = np.flatnonzero(np.diff(piece.t) > longest)
+    origin = int(gaps[-1]) + 1 if len(gaps) else 0
+    first = max(len(piece) - 2 * margin, origin)
+    row = first
+    if first > origin:
+        first -= (first - origin) % used.decimation
+        row = first + margin
+    keep, own = (piece.start_ns + round(1e9 * float(piece.t[k])) for k in (first, row))
+    return keep, own - round(0.5e9 / used.rate_hz)
 
 
 def streamed(
@@ -95,21 +78,21 @@ def streamed(
         As of ``read_recording``.
 
     """
-    cuts: list[_Cuts] = []  # made with the first piece, before any cut
+    chosen: list[Conditioning] = []  # with the first piece, before any cut
     start = -np.inf
     for piece, last in read_pieces(
         path,
         joints=arm.robot.joints,
         topic=topic,
         samples=samples,
-        keep=lambda piece: cuts[0].keep(piece),
+        keep=lambda piece: _cuts(piece, chosen[0])[0],
         settings=settings,
     ):
-        if not cuts:
-            cuts.append(_Cuts(choose(piece)))
-        used = cuts[0].used
+        if not chosen:
+            chosen.append(choose(piece))
+        used = chosen[0]
         (repaired,), _ = without_damage([piece], SignalSettings(used.cutoff_hz, used.decimation))
-        stop = np.inf if last else float(cuts[0].end(piece))
+        stop = np.inf if last else float(_cuts(piece, used)[1])
         owned = []
         for rows in regressions(arm, columns, [repaired], used):
             t = 1e9 * rows.motion.t

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from armid_ros.identification import Fit
-from armid_ros.identification.rows.period import exact_period, find_period
+from armid_ros.identification.rows.period import find_period
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.blocks import (
@@ -109,7 +109,6 @@ def _repeatability(
                     TableCell(f'{shares[k]:.0f} %', 'telling' if shares[k] > _TELLING else ''),
                 )
             )
-        period = exact_period(recording, period)
         source = recording.source or 'in memory'
         folds.append(
             Fold(

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every estimator finds the arm; instrumental variables are not biased by encoder noise."""
 
-from dataclasses import replace
-
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import IdentificationError
@@ -83,13 +81,6 @@ def test_intervals_hold_the_truth(arm, motion):
         off.append(np.abs(error) / found.estimate.std)
     assert 0.85 < np.mean(np.array(off) < 1.96) <= 1.0
     assert np.max(off) < 5.0
-
-
-def test_a_slow_model_has_no_inertia_to_simulate(arm, motion):
-    slow = replace(ArmModel(arm.robot, arm.effects), quasi_static=True)
-    recording = recorded(arm, motion, 0, 0.05)
-    with pytest.raises(IdentificationError, match='iv simulates the arm'):
-        identify(slow, [recording], IdentificationSettings('iv'), rng=np.random.default_rng(0))
 
 
 def test_settings_that_no_estimator_has_are_refused():

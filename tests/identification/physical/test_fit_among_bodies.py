@@ -9,7 +9,6 @@ from armid_ros.identification import IdentificationSettings, identify, Score
 from armid_ros.identification.physical.fit_among_bodies import bodily_prior, PhysicalSettings
 from armid_ros.identification.physical.physical_program import box_conditions
 from armid_ros.model.pseudo_inertia import link_parameters, pseudo_inertia
-from armid_ros.robots import load_robot
 import numpy as np
 import pytest
 
@@ -118,12 +117,6 @@ def test_no_mass_is_beyond_its_range_and_held_out_torques_hardly_suffer(
     assert held.physical.held_out_ratio < 1.03
 
 
-@pytest.mark.parametrize('factor', [1.0, 0.5, np.inf, np.nan])
-def test_a_mass_range_is_a_factor_above_one(factor):
-    with pytest.raises(IdentificationError, match='a factor above 1'):
-        PhysicalSettings(mass_range=factor)
-
-
 def test_a_mass_that_is_not_the_arms_is_said_to_cost(drawing, recording, bodies):
     """A tenth of what it weighs."""
     assert not any('constraints cost' in line for line in bodies.physical.activity)
@@ -183,25 +176,23 @@ def test_a_description_without_masses_gets_a_prior(arm, recording):
     assert Score.of(result.training).relative_error_percent < 1.0
 
 
-class TestRefusals:
-    """What cannot be is refused, with the reason."""
-
-    def test_negative_mass(self):
-        with pytest.raises(IdentificationError, match=r'total mass -1.*positive'):
-            PhysicalSettings(total_mass=-1.0)
-
-    def test_box_inside_out(self):
-        with pytest.raises(IdentificationError, match=r"joint 'elbow'.*below"):
-            PhysicalSettings(boxes={'elbow': ((0, 0, 0), (1, -1, 1))})
-
-    def test_unknown_joint(self, drawing, recording):
-        settings = PhysicalSettings(boxes={'elbow': ((0, 0, 0), (1, 1, 1))})
-        with pytest.raises(RobotError, match='elbow_pitch'):
-            run(drawing, recording, settings)
+@pytest.mark.parametrize(
+    ('settings', 'said'),
+    [
+        ({'total_mass': -1.0}, r'total mass -1.*positive'),
+        ({'boxes': {'elbow': ((0, 0, 0), (1, -1, 1))}}, r"joint 'elbow'.*below"),
+        *(({'mass_range': factor}, 'a factor above 1') for factor in (1.0, 0.5, np.inf, np.nan)),
+    ],
+)
+def test_what_cannot_be_is_refused(settings, said):
+    with pytest.raises(IdentificationError, match=said):
+        PhysicalSettings(**settings)
 
 
-def test_links_of_a_robot_are_named(bodies):
-    assert tuple(link.link for link in bodies.physical.links) == load_robot('humanoid_arm').links
+def test_a_box_of_an_unknown_joint_is_refused(drawing, recording):
+    settings = PhysicalSettings(boxes={'elbow': ((0, 0, 0), (1, 1, 1))})
+    with pytest.raises(RobotError, match='elbow_pitch'):
+        run(drawing, recording, settings)
 
 
 @pytest.fixture(scope='module')

@@ -59,7 +59,7 @@ def test_cutoff_is_where_half_the_power_is_left():
 def test_a_constant_acceleration_is_what_it_is_at_any_rate(rate):
     """At poles as fast as the samples it was 0.4 % too small, more than deviations of inertias."""
     t = np.arange(round(3.0 * rate)) / rate
-    causal = CausalFilter(1, CUTOFF, period=1.0 / rate)
+    causal = CausalFilter(1, CUTOFF)
     out = [update(causal, s, [0.5 * 7.0 * s**2], None, [0.0]) for s in t]
     assert out[-1].ddq[0] == pytest.approx(7.0, rel=1e-6)
     late = out[-1].t - 3.0 / causal.pole
@@ -71,8 +71,8 @@ def test_what_is_missing_has_the_acceleration_of_what_is_around_it(lost):
     """Straight lines across gaps would be off by ten to a hundred times as much."""
     t = np.arange(0.0, 3.0, 0.01)
     q, tau = stream(t)
-    whole = CausalFilter(2, CUTOFF, period=0.01)
-    gappy = CausalFilter(2, CUTOFF, period=0.01)
+    whole = CausalFilter(2, CUTOFF)
+    gappy = CausalFilter(2, CUTOFF)
     off = np.zeros(2)
     for k, sample in enumerate(zip(t, q, [None] * len(t), np.cos(tau), strict=True)):
         expected = update(whole, *sample)
@@ -138,7 +138,7 @@ def test_nothing_comes_out_until_the_start_is_forgotten():
     """Only what is independent of the start is given out: it starts with any past."""
     t = np.arange(0.0, 2.0, 1e-3)
     q, tau = stream(t)
-    late, early = CausalFilter(2, CUTOFF, period=1e-3), CausalFilter(2, CUTOFF, period=1e-3)
+    late, early = CausalFilter(2, CUTOFF), CausalFilter(2, CUTOFF)
     stamps, values = table(run(late, t[500:], q[500:], tau[500:]))
     all_stamps, all_values = table(run(early, t, q, tau))
     first = np.searchsorted(all_stamps, stamps[0])
@@ -190,8 +190,8 @@ def test_a_gap_or_a_jump_restarts_and_leaves_no_trace(jump, reason):
     t = np.arange(0.0, 2.0, 1e-3)
     q, tau = stream(t)
     stamps = np.where(t < 1.0, t, t + jump)
-    jumped = CausalFilter(2, CUTOFF, period=1e-3)
-    fresh = CausalFilter(2, CUTOFF, period=1e-3)
+    jumped = CausalFilter(2, CUTOFF)
+    fresh = CausalFilter(2, CUTOFF)
     run(jumped, stamps[:1000], q[:1000], tau[:1000])
     generation = jumped.generation
     a = table(run(jumped, stamps[1000:], q[1000:] + 1.0, tau[1000:]))
@@ -257,7 +257,6 @@ def test_a_new_rate_after_a_dropout_is_learned():
     [
         ({'cutoff': 0.0}, 'cut-off'),
         ({'cutoff': np.nan}, 'cut-off'),
-        ({'cutoff': 5.0, 'period': -1.0}, 'period'),
         ({'cutoff': 5.0, 'max_gap': 0}, 'gap'),
     ],
 )

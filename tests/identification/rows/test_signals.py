@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
+from armid_ros.identification import IdentificationSettings, identify
 from armid_ros.identification.rows.signals import (
     Conditioning,
     conditioning,
@@ -153,3 +154,10 @@ def test_stamps_that_are_no_seconds_are_named(factor, unit):
     recording = Recording(joints=('a',), t=t, q=q, tau=q, source='bag')
     with pytest.raises(IdentificationError, match=f'bag: .* seem to be {unit}.*1000 samples/s'):
         conditioning([replace(recording, t=factor * t)], SignalSettings())
+
+
+def test_a_cutoff_that_was_asked_for_is_too_low(arm, structure):
+    run = recorded(arm, multisine(arm.robot.joints, 2.0, 500.0, seed=1), torque_noise=0.01)
+    settings = IdentificationSettings(signals=SignalSettings(cutoff_hz=0.001))
+    with pytest.raises(IdentificationError, match=r'bag: --cutoff 0.001 Hz is too low for 2.00 s'):
+        identify(structure, [run], settings, rng=np.random.default_rng(0))

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.identification import grade, IdentificationSettings, identify
-from armid_ros.identification.assess.data_faults import check_data
-from armid_ros.identification.rows.regression import Stretch
-from armid_ros.identification.rows.signals import conditioning, segments, SignalSettings
+from armid_ros.identification.rows.signals import SignalSettings
 from armid_ros.identification.rows.stamps import uneven_stamps
 import numpy as np
 import pytest
@@ -54,14 +52,6 @@ def test_identification_says_it_and_not_to_decimate_less(structure, run):
         short = jittered(run, by).select(slice(0, 1000))
         with pytest.raises(IdentificationError, match=said):
             identify(structure, [short], few, rng=np.random.default_rng(0))
-
-
-def test_a_diagnosis_says_it(arm, run):
-    late = jittered(run, 0.02)
-    used = conditioning([run], SignalSettings())
-    data = [Stretch('run', one, np.abs(one.dq) > 0.1) for one in segments(run, used)]
-    faults, _ = check_data(arm, [late], used, data)
-    assert any('time stamps are uneven' in one for one in faults)
 
 
 def test_a_grade_says_it_where_enough_is_left(structure, run):

@@ -145,26 +145,25 @@ def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
 
 
 @pytest.mark.slow
-def test_deviations_that_are_stated_are_those_of_repeats(pair) -> None:
-    """The scatter of one stiffness over 150 draws, within what so many draws can tell."""
-    poses = with_torques(pair, stepping(pair, read_gait(), np.linspace(0.0, 1.8, 101)[:-1]))
-    found = [find_springs(pair, poses, 0.05, seed) for seed in range(150)]
+@pytest.mark.parametrize(
+    ('times', 'draws'),
+    [(np.linspace(0.0, 1.8, 101)[:-1], 150), (np.arange(0.0, 3.0, 1e-3), 60)],
+    ids=['poses', 'recording'],
+)
+def test_deviations_that_are_stated_are_those_of_repeats(pair, times, draws) -> None:
+    """
+    The scatter of one stiffness over draws, within what so many draws can tell.
+
+    As if rows of a recording were independent the deviations would be a third too small.
+
+    """
+    motions = with_torques(pair, stepping(pair, read_gait(), times))
+    found = [find_springs(pair, motions, 0.05, seed) for seed in range(draws)]
     values = np.array([part.stiffness[0] for part in found])
     stated = np.mean([part.std[0] ** 2 for part in found])
     ratio = values.var(ddof=1) / stated
     low, high = chi2.ppf([0.0005, 0.9995], len(found) - 1) / (len(found) - 1)
     assert low < ratio < high
-
-
-@pytest.mark.slow
-def test_deviations_of_a_recording_allow_for_samples_that_filters_make_alike(pair) -> None:
-    """As if rows were independent they would be a third too small, half of the variance."""
-    short = with_torques(pair, stepping(pair, read_gait(), np.arange(0.0, 3.0, 1e-3)))
-    found = [find_springs(pair, short, 0.05, seed) for seed in range(60)]
-    values = np.array([part.stiffness[0] for part in found])
-    stated = np.mean([part.std[0] ** 2 for part in found])
-    low, high = chi2.ppf([0.0005, 0.9995], len(found) - 1) / (len(found) - 1)
-    assert low < values.var(ddof=1) / stated < high
 
 
 def test_inertias_of_links_that_hardly_turn_stay_near_their_description(pair) -> None:
