@@ -117,13 +117,6 @@ def test_wrong_sign_of_an_arm_that_the_description_does_not_know(arm, recording)
         run(light, replace(recording, tau=-recording.tau))
 
 
-def test_a_decimation_that_leaves_nothing_is_answered_with_one_that_works(structure, recording):
-    with pytest.raises(IdentificationError, match='--decimation 100000 leaves 0') as caught:
-        run(structure, recording, decimation=100_000)
-    (largest,) = re.findall(r'--decimation (\d+) is the largest', str(caught.value))
-    run(structure, recording, decimation=int(largest))
-
-
 def test_a_position_beyond_its_limit_is_said_and_not_refused(structure, recording):
     robot = structure.robot
     lower = robot.lower.copy()

@@ -285,19 +285,20 @@ def _iterate(
         promised = tuple(part.torque(solution.values) for part in now.problem)
         if passes > 1 and abs(now.gain(promised)) < _NOTHING:
             break
-        steps = [now.damped(damping, limits) for damping in _DAMPINGS]
+        trial, vain = None, 0.0
         # straight to a solution that keeps its promise, else the best of damped steps
-        trial = None
-        for values in (solution.values, *steps):
+        for damping in (0.0, *_DAMPINGS):
+            values = now.damped(damping, limits) if damping else solution.values
+            linear = tuple(part.torque(values) for part in now.problem)
+            vain = max(vain, now.gain(linear)) if damping else vain
             stepped = moved(now.arm, base, values, free)
             predicted = torques(stepped, recordings, used)
             if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):
                 trial = _State(stepped, values, through(now.problem, predicted, values))
-            if values is solution.values and now.cost(predicted) <= _KEPT * now.cost(promised):
+            if not damping and now.cost(predicted) <= _KEPT * now.cost(promised):
                 break
         if trial is None:
-            vain = [now.gain(tuple(p.torque(values) for p in now.problem)) for values in steps]
-            settled = max(vain) < _STUCK * now.cost()
+            settled = vain < _STUCK * now.cost()
             break
         settled = agree(now.problem, solution.weights, promised, trial.predicted)
         settled = settled or now.gain(trial.predicted) < _LITTLE

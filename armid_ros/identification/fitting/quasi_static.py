@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.nonlinear import FittedValues, torques
+from armid_ros.identification.fitting.nonlinear import FittedValues
 from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning
 from armid_ros.recording import Recording
@@ -53,7 +53,7 @@ def with_uncertain_inertia(
     fit : FittedValues
         With the larger covariance.
     notes : tuple of str
-        What inertia is of the torque, and how slow the motion would have to be, where it matters.
+        How slow the motion would have to be, where it matters.
 
     """
     rigid = len(description.robot.rigid_parameters)
@@ -72,12 +72,6 @@ def with_uncertain_inertia(
     ratio = np.sqrt(np.diag(added) / np.maximum(np.diag(plain), 1e-300)).max()
     notes: tuple[str, ...] = ()
     if ratio > _NEGLIGIBLE:
-        # the share of inertia in the torque of the description
-        still = replace(description, quasi_static=True)
-        whole, weight = (
-            np.concatenate(torques(arm, recordings, used)) for arm in (description, still)
-        )
-        share = float(np.linalg.norm(whole - weight) / np.linalg.norm(whole))
         # what inertia takes goes with the square of the speed
         speed = float(np.sqrt(_NEGLIGIBLE / ratio))
         slower = (
@@ -86,8 +80,7 @@ def with_uncertain_inertia(
             else f'at {speed:.2g} times the speed it would not matter'
         )
         notes = (
-            f'too fast for quasi-static: inertia takes {100.0 * share:.2g} % of the torque by the '
-            'description, which is taken off, and what that may be wrong by is in the intervals; '
-            + slower,
+            'too fast for quasi-static: the inertia of the description is taken off, and what it '
+            f'may be wrong by is in the intervals; {slower}',
         )
     return replace(fit, solution=solution), notes

@@ -13,7 +13,7 @@ filtered, which leaves their equation as true as it was without them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -263,15 +263,9 @@ def filtered_torque(arm: ArmModel, motion: Motion, used: Conditioning) -> FloatA
     ndarray, shape (M, n)
 
     """
-    unsure = unsure_samples(arm, motion)
-    if not all(effect.instantaneous for effect in arm.effects):
-        return decimate(bridged(arm.torque(motion), unsure), used)
-    margin = max(arm.neighbours(1.0 / used.rate_hz), _longest(unsure))
-    blocks = []
-    for _, around, inside in _overlapping(len(motion), used, margin):
-        torque = bridged(arm.torque(motion.select(around)), unsure[around])
-        blocks.append(decimate(torque[inside], used))
-    return np.concatenate(blocks)
+    local, first = all(effect.instantaneous for effect in arm.effects), np.zeros(1, dtype=np.intp)
+    torque = _Source(lambda part: arm.torque(part)[:, :, np.newaxis], first, first, local, False)
+    return _filtered(arm, [torque], motion, used)[:, :, 0]
 
 
 def _rows(
@@ -313,33 +307,7 @@ def filtered_columns(
     ndarray, shape (M, n, r)
 
     """
-    result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, len(columns)))
-    sources = _sources(arm, columns)
-    unsure = unsure_samples(arm, motion)
-    for source in sources:
-        if not source.instantaneous:
-            whole = bridged(source.columns(motion)[:, :, source.inner], unsure)
-            result[:, :, source.outer] = decimate(whole, used)
-    margin = arm.neighbours(1.0 / used.rate_hz)
-    stride = used.smooth_stride if margin == 0 else 1
-    margin = max(margin, _longest(unsure))
-    first = 0
-    for samples, around, inside in _overlapping(len(motion), used, margin):
-        part = motion.select(around)
-        count = len(decimated_samples(samples.stop - samples.start, used))
-        for source in sources:
-            if source.smooth and stride > 1:
-                few = motion.select(slice(samples.start, samples.stop, stride))
-                block = source.columns(few)  # interpolation would hardly change what is smooth
-                filtered = decimate(block[:, :, source.inner], used, stride)
-                result[first : first + count, :, source.outer] = filtered
-            elif source.instantaneous:
-                block = bridged(source.columns(part)[:, :, source.inner], unsure[around])
-                result[first : first + count, :, source.outer] = decimate(block[inside], used)
-        first += count
-        tick(samples.stop - samples.start)
-    result.setflags(write=False)  # so that nobody who freezes it has to copy it
-    return result
+    return _filtered(arm, _sources(arm, columns), motion, used, tick)
 
 
 class _Source(NamedTuple):
@@ -367,6 +335,47 @@ def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
             sources.append(_Source(function, inner, outer, local, smooth=start == 0))
         start += size
     return sources
+
+
+def _filtered(
+    arm: ArmModel,
+    sources: Sequence[_Source],
+    motion: Motion,
+    used: Conditioning,
+    tick: Callable[[int], None] = lambda samples: None,
+) -> FloatArray:
+    """Filter and decimate what sources make of a stretch, chunk by chunk, shape (M, n, r)."""
+    count = sum(len(source.outer) for source in sources)
+    result = np.empty((len(decimated_samples(len(motion), used)), motion.n_joints, count))
+    unsure = unsure_samples(arm, motion)
+    for source in sources:
+        if not source.instantaneous:
+            whole = bridged(source.columns(motion)[:, :, source.inner], unsure)
+            result[:, :, source.outer] = decimate(whole, used)
+    margin = arm.neighbours(1.0 / used.rate_hz)
+    stride = used.smooth_stride if margin == 0 else 1
+    sure = ~np.pad(unsure, ((1, 1), (0, 0)))
+    longest = max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
+    margin, overlap, first = max(margin, longest), len(used.taps()) - 1, 0
+    step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
+    for start in range(0, max(1, len(motion) - overlap), step):
+        stop, before = min(len(motion), start + step + overlap), max(0, start - margin)
+        around, inside = slice(before, stop + margin), slice(start - before, stop - before)
+        rows = slice(first, first + len(decimated_samples(stop - start, used)))
+        for source in sources:
+            if source.smooth and stride > 1:
+                few = motion.select(slice(start, stop, stride))
+                block = source.columns(few)  # interpolation would hardly change what is smooth
+                result[rows, :, source.outer] = decimate(block[:, :, source.inner], used, stride)
+            elif source.instantaneous:
+                block = source.columns(motion.select(around))[:, :, source.inner]
+                result[rows, :, source.outer] = decimate(
+                    bridged(block, unsure[around])[inside], used
+                )
+        first = rows.stop
+        tick(stop - start)
+    result.setflags(write=False)  # so that nobody who freezes it has to copy it
+    return result
 
 
 def unsure_samples(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
@@ -410,12 +419,6 @@ def bridged(values: FloatArray, unsure: npt.NDArray[np.bool_]) -> FloatArray:
     return result
 
 
-def _longest(unsure: npt.NDArray[np.bool_]) -> int:
-    """Return how many samples the longest run of unsure ones has."""
-    sure = ~np.pad(unsure, ((1, 1), (0, 0)))
-    return max(int(np.diff(np.flatnonzero(column)).max()) - 1 for column in sure.T)
-
-
 def _held(arm: ArmModel, motion: Motion) -> list[int]:
     """Return the joints that dry friction may hold, as columns of the motion."""
     held = {joint for effect in arm.effects if effect.holds_at_rest for joint in effect.joints}
@@ -433,14 +436,3 @@ def _at_rest(arm: ArmModel, motion: Motion) -> npt.NDArray[np.bool_]:
         for start, stop in edges[np.diff(edges, axis=1)[:, 0] >= shortest]:
             rest[start:stop, joint] = True
     return rest
-
-
-def _overlapping(
-    n_samples: int, used: Conditioning, margin: int
-) -> Iterator[tuple[slice, slice, slice]]:
-    """Yield chunks that overlap by the filter, each with a margin, and where it is within that."""
-    overlap = len(used.taps()) - 1
-    step = max(used.decimation, _CHUNK // used.decimation * used.decimation)
-    for start in range(0, max(1, n_samples - overlap), step):
-        stop, first = min(n_samples, start + step + overlap), max(0, start - margin)
-        yield slice(start, stop), slice(first, stop + margin), slice(start - first, stop - first)
