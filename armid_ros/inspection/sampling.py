@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armid_ros.motion import FloatArray
+from armid_ros.identification.rows.period import least_change, parabola_minimum
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -16,10 +16,6 @@ GAP = 5.0
 _SAME = 0.03
 _SEARCH_HZ = 20.0
 _LONGEST = 3000
-#: Positions are compared over this share of a period.
-_STRETCH = 0.8
-#: In a stretch that tells, positions vary by this share of what they vary by in all.
-_MOVING = 0.3
 
 
 @dataclass(frozen=True)
@@ -89,40 +85,9 @@ def find_repetition(recording: Recording) -> float | None:
     q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T[varying]])
     q = (q - q.mean(axis=0)) / q.std(axis=0)
     lags = np.arange(max(2, int(rate)), int(0.6 * len(t)))
-    change = np.array([_least_change(q, int(lag)) for lag in lags])
+    change = np.array([least_change(q, int(lag)) for lag in lags])
     low = change < max(_SAME, (np.pi * 2 / rate) ** 2 / 4)
     for k in range(1, len(lags) - 1):
-        before, least, after = change[k - 1 : k + 2]
-        if low[k] and least <= before and least <= after:
-            bend = before - 2.0 * least + after  # of a parabola through the three
-            beside = 0.5 * (before - after) / bend if 0.0 < bend < np.inf else 0.0
-            return float((lags[k] + beside) / rate)
+        if low[k] and change[k] <= change[k - 1] and change[k] <= change[k + 1]:
+            return float(lags[k] + parabola_minimum(*change[k - 1 : k + 2])) / rate
     return None
-
-
-def _least_change(q: FloatArray, lag: int) -> float:
-    """
-    Return the mean square change after a lag where it is least; infinite where all rest.
-
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        Positions, of zero mean and unit deviation.
-    lag : int
-        Samples.
-
-    """
-    width = min(int(_STRETCH * lag), len(q) - lag)
-    change = np.mean((q[lag:] - q[:-lag]) ** 2, axis=1) / 2.0
-    first, second = (_window_means(values[: len(change)], width) for values in (q, q**2))
-    spread = np.mean(second - first**2, axis=1)
-    moving = spread > _MOVING
-    if not moving.any():
-        return np.inf
-    return float(np.min(_window_means(change[:, np.newaxis], width)[moving, 0] / spread[moving]))
-
-
-def _window_means(values: FloatArray, width: int) -> FloatArray:
-    """Return the means of all windows of a width, shape (N - width + 1, k)."""
-    sums = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
-    return np.asarray((sums[width:] - sums[:-width]) / width)

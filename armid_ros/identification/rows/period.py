@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from armid_ros.motion import Motion
+from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 #: Positions of two periods agree within this share of the range of motion.
@@ -15,6 +15,10 @@ _SAME = 0.02
 _FARTHER = 3.0
 #: The shortest period that is looked for [s].
 _SHORTEST = 1.5
+#: Positions are compared over this share of a period.
+_STRETCH = 0.8
+#: In a stretch that tells, positions vary by this share of what they vary by in all.
+_MOVING = 0.3
 
 
 def find_period(motion: Motion) -> tuple[int, slice] | None:
@@ -66,3 +70,37 @@ def find_period(motion: Motion) -> tuple[int, slice] | None:
         errors.append(float(np.mean(gap**2)))
     lag = lags[int(np.argmin(errors))]
     return lag, slice(part.start, min(part.stop, len(motion) - lag))
+
+
+def least_change(q: FloatArray, lag: int) -> float:
+    """
+    Return the mean square change after a lag where it is least; infinite where all rest.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        Positions, of zero mean and unit deviation.
+    lag : int
+        Samples.
+
+    """
+    width = min(int(_STRETCH * lag), len(q) - lag)
+    change = np.mean((q[lag:] - q[:-lag]) ** 2, axis=1) / 2.0
+    first, second = (_window_means(values[: len(change)], width) for values in (q, q**2))
+    spread = np.mean(second - first**2, axis=1)
+    moving = spread > _MOVING
+    if not moving.any():
+        return np.inf
+    return float(np.min(_window_means(change[:, np.newaxis], width)[moving, 0] / spread[moving]))
+
+
+def _window_means(values: FloatArray, width: int) -> FloatArray:
+    """Return the means of all windows of a width, shape (N - width + 1, k)."""
+    sums = np.cumsum(np.vstack([np.zeros((1, values.shape[1])), values]), axis=0)
+    return np.asarray((sums[width:] - sums[:-width]) / width)
+
+
+def parabola_minimum(before: float, least: float, after: float) -> float:
+    """Return where a parabola through values at -1, 0 and 1 is least; 0 if it has no minimum."""
+    bend = before - 2.0 * least + after
+    return float(0.5 * (before - after) / bend) if 0.0 < bend < np.inf else 0.0

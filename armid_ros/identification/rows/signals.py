@@ -280,6 +280,7 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
         f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
         f'the longest without a gap has {longest:.2f} s, more than {_shortest(used):.2f} s are '
         'needed; record longer, or without gaps'
+        + (', or lower --decimation' if 'decimation' in used.given else '')
     )
 
 

@@ -19,7 +19,7 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.covariance import sandwich, score_products
 from armid_ros.identification.fitting.least_squares import Solution, solve
 from armid_ros.identification.fitting.normal_equations import NormalEquations
-from armid_ros.identification.rows.regression import Regression, weighted_rows
+from armid_ros.identification.rows.regression import by_stretch, Regression, weighted_rows
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.interaction import direction, link_columns
 import numpy as np
@@ -119,8 +119,7 @@ def _covariance(problem: Sequence[Regression], solution: Solution) -> FloatArray
     joints = solution.weights.shape[1]
     scores = rows * (target - rows @ solution.values)[:, np.newaxis]
     scores = scores.reshape(-1, joints, rows.shape[1]).sum(axis=1)
-    ends = np.cumsum([len(part.motion) for part in problem])[:-1]
-    middle = score_products(np.split(scores, ends), _LASTING * _KEPT)
+    middle = score_products(by_stretch(problem, scores), _LASTING * _KEPT)
     freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
     bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
     return np.asarray(freedom * sandwich(bread, middle))
