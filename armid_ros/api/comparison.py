@@ -10,7 +10,6 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.identification import IdentificationResult
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
-from armid_ros.files import json_text, write_file
 from armid_ros.identification.assess.compare import compare as run
 from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
@@ -41,6 +40,8 @@ class ComparisonResult(Shown):
 
     core: Comparison
 
+    files = ('comparison.json', 'report.html')
+
     @property
     def anything(self) -> bool:
         """Whether something changed beyond chance: parameters, or what a model leaves."""
@@ -55,7 +56,7 @@ class ComparisonResult(Shown):
         """Return all parameters as a pandas table, before and after."""
         return data_frame(self.document()['parameters'])
 
-    def document(self) -> dict[str, Any]:
+    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what comparison.json holds."""
         return self.core.document()
 
@@ -64,13 +65,6 @@ class ComparisonResult(Shown):
         from armid_ros.report.compare_report import compare_report
 
         return compare_report(self.core, origin.provenance)
-
-    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write comparison.json and report.html into a folder."""
-        document = self.document()
-        write_file(folder / 'report.html', self.page(origin))
-        write_file(folder / 'comparison.json', json_text(document, indent=1))
-        return document
 
     def summary(self) -> Summary:
         """Return what changed, the surest first."""
@@ -88,7 +82,7 @@ class ComparisonResult(Shown):
         ]
         heads = ('parameter', 'joint', 'before', 'after', 'std') if rows else ()
         first, *more = tell(self.core)
-        return Summary(first, verdict(self.core)[0], heads, rows, lines=more[:1])
+        return Summary(first, verdict(self.core)[0], heads, rows, lines=more)
 
     def tone(self) -> str:
         """Return the colour that stands for a change, or for models that describe no arm."""

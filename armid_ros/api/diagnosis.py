@@ -32,6 +32,7 @@ from armid_ros.diagnosis import (
     EXPERIMENT_FILE,
     next_run,
 )
+from armid_ros.diagnosis.next_run.steps import MODEL
 from armid_ros.effects.tied import Partner
 from armid_ros.errors import IdentificationError
 from armid_ros.excitation import save_excitation
@@ -158,7 +159,7 @@ class DiagnosisResult(ShownModel):
             for row in effect['parameters']
         )
 
-    def document(self) -> dict[str, Any]:
+    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what diagnosis.json holds."""
         extras = self.extras
         return {
@@ -202,7 +203,7 @@ class DiagnosisResult(ShownModel):
     def files(self) -> list[str]:
         """Return the names of the files of the result."""
         return [
-            *('diagnosis.json', 'model.yaml', 'report.html'),
+            *('diagnosis.json', 'report.html', 'model.yaml'),
             *([] if self.extras.residual is None else [TABLE_FILE]),
             *([] if self.extras.next_run is None else [EXPERIMENT_FILE]),
         ]
@@ -243,8 +244,8 @@ class DiagnosisResult(ShownModel):
     def _with_notes(self, *notes: str) -> DiagnosisResult:
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
-    def summary(self) -> Summary:
-        """Return the verdict, named values that are not zero, minor effects and notes."""
+    def summary(self, model: str = MODEL) -> Summary:
+        """Return the verdict, values that are not zero, notes, and steps with a model's path."""
         rows = named_rows(self.core.findings, certain=True)
         return Summary(
             printed(self.core.summary),
@@ -252,6 +253,7 @@ class DiagnosisResult(ShownModel):
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
             self.extras.sentences(self.core),
+            self.extras.steps(self.core, model),
         )
 
     def tone(self) -> str:

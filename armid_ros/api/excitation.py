@@ -40,7 +40,7 @@ from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording, write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
-from armid_ros.robots import joints_beside_arms
+from armid_ros.robots import joints_beside_arms, Robot
 import numpy as np
 import numpy.typing as npt
 
@@ -94,6 +94,11 @@ class ExcitationResult(Shown):
     after: tuple[str, ...] = ()
     seed: int = 0
 
+    files = (
+        *('excitation.json', 'report.html', 'excitation.yaml', 'excitation.csv'),
+        f'{BAG} (a bag)',
+    )
+
     @property
     def trajectory(self) -> Excitation:
         """Return what is to be run, from rest to rest."""
@@ -127,7 +132,7 @@ class ExcitationResult(Shown):
     @cached_property
     def planner(self) -> TransferPlanner:
         """Return what plans the ways to the trajectory and back."""
-        return transfer_planner(self.arm, self.core.settings, self.scene)
+        return _planner(self.arm, self.core.settings, self.scene)
 
     @cached_property
     def start(self) -> FloatArray:
@@ -231,18 +236,40 @@ class ExcitationResult(Shown):
     def summary(self) -> Summary:
         """Return how much of its limits every joint uses."""
         shares = self.core.limits_used(self.arm)
-        joints, unchecked = self.arm.robot.joints, self.scene.unchecked
+        joints = self.arm.robot.joints
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
             for k, joint in enumerate(joints)
         ]
+        pose = [
+            f'{joint} {value:.3g} {unit}'
+            for joint, value, unit in zip(
+                joints, self.start, self.arm.robot.position_units, strict=True
+            )
+            if value
+        ]
+        where = f'{", ".join(pose) or "zero"}' + ', the others at zero' * (
+            0 < len(pose) < len(joints)
+        )
+        fault = '' if self.given_start is not None else self.planner.free_start()[1]
+        information = self.core.information
+        unseen = int(np.sum(~np.isfinite(information.std)))
+        stopped = self.core.stopped
         return Summary(
-            f'{self.arm.robot.name}: {self.duration:.1f} s, condition number '
-            f'{self.core.information.condition:.4g}, {len(self.core.information.parameters)} '
-            'parameters',
+            f'{self.core.settings.speed}: condition number {information.condition:.1f}, '
+            f'{len(information.parameters)} parameters' + f', {unseen} not seen' * bool(unseen),
             heads=('joint', *(f'{name} used' for name in shares)),
             rows=rows,
-            lines=['not checked: ' + '; '.join(unchecked)] if unchecked else [],
+            lines=(
+                str(self.fitness),
+                f'starts at rest at {where}'
+                + f' (the zero of the description is not free: {fault})' * bool(fault)
+                + f', is on the trajectory after {self.run.approach.duration:.1f} s and back '
+                f'after {self.run.duration:.1f} s',
+                f'stopped early ({stopped}): the best so far, not what the seed would give'
+                if stopped
+                else '',
+            ),
         )
 
 
@@ -260,8 +287,19 @@ def design_excitation(
     start: FloatArray | None = None,
     after: RecordingLike | Sequence[RecordingLike] = (),
     rival: ArmModel | None = None,
+    speed: str | float = 'fast',
+    criterion: str = 'D',
+    target: str = 'all',
+    focus: Sequence[str] = (),
+    harmonics: int = 5,
+    acceleration: FloatArray | None = None,
+    noise: FloatArray | None = None,
+    clearance: float = 0.01,
+    starts: int | None = None,
+    iterations: int = 200,
+    candidates: int = 25,
+    processes: int = 2,
     progress: Callable[[DesignProgress], None] | None = None,
-    **settings: Any,
 ) -> ExcitationResult:
     """
     Find a trajectory that shows the parameters, inside all limits and free of collisions.
@@ -296,11 +334,26 @@ def design_excitation(
         Recordings whose information the trajectory adds to.
     rival : ArmModel, optional
         With ``criterion='T'``: what may be there in place of the effects of ``arm``.
+    speed : str or float
+        'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
+    criterion : {'D', 'A', 'E', 'condition', 'T'}
+        What is made best; 'T' tells the arm from ``rival``.
+    target : {'all', 'gravity', 'effects'}
+        Of which parameters.
+    focus : sequence of str
+        Names of effects to see best, everything else being fitted too.
+    harmonics : int
+        Fourier harmonics per joint.
+    acceleration, noise : ndarray, shape (n,), optional
+        Acceleration limits [rad/s^2 or m/s^2], by default the top speed in 0.25 s; standard
+        deviation of the torque noise [N m or N], by default 1 % of the torque limits.
+    clearance : float
+        Distance between bodies that may touch [m].
+    starts, iterations, candidates, processes : int
+        Searches, by default 4, and 1 above 20 joints; iterations of each; random trajectories
+        that each begins with; searches at a time.
     progress : callable, optional
         Called with the progress of the search.
-    **settings
-        Further ones of ``armid_ros.excitation.DesignSettings``: ``speed='slow'``, ``starts=1``,
-        ``iterations=20``, ``criterion='D'``.
 
     Returns
     -------
@@ -322,34 +375,44 @@ def design_excitation(
 
     """
     model = arm_of(arm)
-    others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
-    if others:
-        kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
-        raise TrajectoryError(
-            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
-            f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
-        )
+    if isinstance(arm, str | Path):
+        _require_one_arm(model.robot, arm)
     if joint_limits is not None:
-        velocity = joint_limits if isinstance(joint_limits, Mapping) else {}
-        file = None if isinstance(joint_limits, Mapping) else joint_limits
-        given = [f'{joint}:={limit}' for joint, limit in velocity.items()]
-        robot, acceleration = with_joint_limits(model.robot, file, given)
-        model = replace(model, robot=robot)
-        settings = {'acceleration': acceleration, **settings}
+        model, known = _limited(model, joint_limits)
+        acceleration = known if acceleration is None else acceleration
     many = model.robot.n_joints > _MANY_JOINTS
-    usual: dict[str, Any] = {'starts': 1, 'time_budget': 25.0} if many else {'time_budget': 120.0}
-    budget = {} if time_budget is None else {'time_budget': time_budget}
-    known = design_settings(duration, periods, **usual | budget | settings)
+    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
+    settings = DesignSettings(
+        period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
+        n_periods=periods,
+        run_in=run_in,
+        speed=speed,
+        criterion=criterion,
+        target=target,
+        focus=tuple(focus),
+        harmonics=harmonics,
+        acceleration=acceleration,
+        noise=noise,
+        clearance=clearance,
+        starts=starts or (1 if many else 4),
+        iterations=iterations,
+        candidates=candidates,
+        processes=processes,
+        time_budget=(25.0 if many else 120.0) if time_budget is None else time_budget,
+    )
     if scene is None:
         height = None if floor is None else str(floor)
-        scene = CollisionScene.of(model.robot, known.clearance, height, environment)
+        scene = CollisionScene.of(model.robot, clearance, height, environment)
+    fault = '' if start is None else _planner(model, settings, scene).fault(start)
+    if fault:
+        raise TrajectoryError(f'--start: {fault}')
     earlier = recordings_of(after, model.robot)
     found = design(
         model,
-        known,
+        settings,
         np.random.default_rng(rng),
         collision=scene.bodies,
-        prior_information=_information(model, known, earlier, rng) if earlier else None,
+        prior_information=_information(model, settings, earlier, rng) if earlier else None,
         rival=rival,
         progress=progress,
     )
@@ -357,28 +420,28 @@ def design_excitation(
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
 
 
-def design_settings(duration: float, periods: int, **settings: Any) -> DesignSettings:
-    """
-    Return the settings of a design that lasts from rest to rest.
-
-    Parameters
-    ----------
-    duration : float
-        Of the whole run [s].
-    periods : int
-        Identical periods in it.
-    **settings
-        Further ones of `DesignSettings`.
-
-    """
-    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
-    period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
-    return DesignSettings(period=period, n_periods=periods, run_in=run_in, **settings)
+def _require_one_arm(robot: Robot, source: str | Path) -> None:
+    others = joints_beside_arms(robot)
+    if others:
+        kept = ', '.join(repr(joint) for joint in robot.joints if joint not in others)
+        raise TrajectoryError(
+            f'{source}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'ar.load_robot({str(source)!r}, joints=[{kept}])'
+        )
 
 
-def transfer_planner(
-    arm: ArmModel, settings: DesignSettings, scene: CollisionScene
-) -> TransferPlanner:
+def _limited(
+    model: ArmModel, given: str | Path | Mapping[str, float]
+) -> tuple[ArmModel, FloatArray | None]:
+    """Return the model with velocity limits of a file or by name, and acceleration limits."""
+    named = given if isinstance(given, Mapping) else {}
+    file = None if isinstance(given, Mapping) else given
+    velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
+    robot, acceleration = with_joint_limits(model.robot, file, velocity)
+    return replace(model, robot=robot), acceleration
+
+
+def _planner(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -> TransferPlanner:
     """Return what plans the ways of an arm to a run with such settings, and back."""
     return TransferPlanner(
         arm,

@@ -101,6 +101,11 @@ class IdentificationResult(ShownModel):
     gains: DriveGains | None = None
 
     @property
+    def files(self) -> list[str]:
+        """Return the names of the files of the result."""
+        return ['identification.json', 'report.html', 'model.yaml', *self.exports]
+
+    @property
     def arm(self) -> ArmModel:
         """Return the identified model."""
         return self.core.arm
@@ -257,8 +262,8 @@ class IdentificationResult(ShownModel):
                 *(self.gains.sentences() if self.gains else ()),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),
                 f'{count}; condition number {core.condition_number:.3g}',
-                *(f'next: {step}' for step in steps[:1]),
             ),
+            steps[:1],
         )
 
     def tone(self) -> str:

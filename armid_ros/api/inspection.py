@@ -20,7 +20,6 @@ from armid_ros.api.arguments import (
 )
 from armid_ros.api.identification import identify
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
-from armid_ros.files import json_text, write_file
 from armid_ros.inspection import (
     check_links,
     description_remarks,
@@ -62,6 +61,8 @@ class InspectionResult(Shown):
 
     core: Inspection
 
+    files = ('inspection.json', 'inspection.html')
+
     @property
     def remarks(self) -> tuple[str, ...]:
         """Return what a person should know, the worst first."""
@@ -76,7 +77,7 @@ class InspectionResult(Shown):
         """Return ranges, speeds and efforts of the joints as a pandas table."""
         return data_frame(self.core.joints)
 
-    def document(self) -> dict[str, Any]:
+    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what ``armid inspect --json`` prints."""
         return inspection_document(self.core)
 
@@ -86,25 +87,25 @@ class InspectionResult(Shown):
 
         return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
 
-    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write inspection.json and inspection.html into a folder."""
-        document = self.document()
-        write_file(folder / 'inspection.json', json_text(document, indent=1))
-        write_file(folder / 'inspection.html', self.page(origin))
-        return document
-
     def summary(self) -> Summary:
-        """Return the joints, and the worst of what was remarked."""
-        from armid_ros.report.notation import plain
-        from armid_ros.report.sections.inspection import joint_heads, joint_rows
+        """Return the verdict, the joints, what was remarked, and how it was sampled."""
+        from armid_ros.report.sections.inspection import joint_heads, joint_rows, recording_facts
 
-        sampling, heads = self.core.sampling, joint_heads(self.core)
+        heads, found = joint_heads(self.core), self.core
+        topics = [
+            f'{one.name}: {one.count} x {one.type_name}'
+            + ' (read)' * (one.name == found.recording.topic)
+            for one in found.topics
+        ]
         return Summary(
-            f'{self.core.recording.source}: {sampling.duration:.1f} s at '
-            f'{plain(sampling.rate_hz, 4)} Hz. {self.core.verdict}',
-            heads=heads[:3] + heads[6:],
-            rows=[row[:3] + row[6:] for row in joint_rows(self.core)],
-            lines=self.remarks,
+            f'{found.recording.source}: {found.verdict}',
+            heads=heads[:4] + heads[7:],
+            rows=[row[:4] + row[7:] for row in joint_rows(found)],
+            lines=(
+                *self.remarks,
+                *(f'{name}: {value}' for name, value in recording_facts(found)),
+                *topics,
+            ),
         )
 
 
@@ -184,6 +185,8 @@ class CheckResult(Shown):
     remarks: tuple[Remark, ...]
     links: LinkCheck | None
 
+    files = ('check.json', 'report.html')
+
     @property
     def finding(self) -> str:
         """Return what was found in one sentence."""
@@ -197,7 +200,7 @@ class CheckResult(Shown):
         impossible = any(one.weight == 'bad' for one in self.remarks)
         return impossible or (self.links is not None and not self.links.agrees)
 
-    def document(self) -> dict[str, Any]:
+    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what ``armid check --json`` prints."""
         links = None if self.links is None else asdict(self.links)
         if links is not None:
@@ -219,13 +222,6 @@ class CheckResult(Shown):
 
         name = origin.of(self.robot).robot
         return description_check_report(name, self.remarks, self.links, origin.provenance)
-
-    def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Write check.json and report.html into a folder."""
-        document = self.document()
-        write_file(folder / 'check.json', json_text(document, indent=1))
-        write_file(folder / 'report.html', self.page(origin))
-        return document
 
     def summary(self) -> Summary:
         """Return the finding, and the links."""

@@ -15,7 +15,7 @@ from armid_ros.api.arguments import source_of
 from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
-from armid_ros.files import result_folder, staged, write_file
+from armid_ros.files import json_text, result_folder, staged, write_file
 from armid_ros.robots import Robot
 
 if TYPE_CHECKING:
@@ -45,6 +45,8 @@ class Summary:
         Cells; the first is a name.
     lines : sequence of str
         What stands below.
+    steps : sequence of str
+        What to do next.
 
     """
 
@@ -53,9 +55,10 @@ class Summary:
     heads: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
     lines: Sequence[str] = ()
+    steps: Sequence[str] = ()
 
     def text(self) -> str:
-        """Return at most ten lines of 80 columns."""
+        """Return at most ten lines of 80 columns, and below them the next steps."""
         title = textwrap.wrap(self._headline, WIDTH, max_lines=3)
         below = [piece for line in self.lines for piece in textwrap.wrap(line, WIDTH)]
         if len(below) > 2:
@@ -65,11 +68,17 @@ class Summary:
         if len(rows) > room:
             hidden = len(rows) - room + 1
             rows = [*rows[: room - 1], (f'... and {hidden} more',)]
-        return '\n'.join([*title, *_aligned(self.heads, rows, WIDTH), *below])
+        steps = [piece for line in self._next for piece in textwrap.wrap(line, WIDTH)]
+        return '\n'.join([*title, *_aligned(self.heads, rows, WIDTH), *below, *steps])
 
     def full_text(self) -> list[str]:
         """Return all of it, as the commands print it."""
-        return [self._headline, *_aligned(self.heads, self.rows), *filter(None, self.lines)]
+        table = _aligned(self.heads, self.rows)
+        return [self._headline, *table, *filter(None, self.lines), *self._next]
+
+    @property
+    def _next(self) -> list[str]:
+        return [f'next: {step}' for step in self.steps]
 
     @property
     def _headline(self) -> str:
@@ -118,12 +127,17 @@ def data_frame(rows: Any) -> pandas.DataFrame:
 class Shown(ABC):
     """A result that prints as its summary and is written as the commands write it."""
 
+    @property
+    @abstractmethod
+    def files(self) -> Sequence[str]:
+        """Return the names of what it writes: the document first, then the page."""
+
     @abstractmethod
     def summary(self) -> Summary:
         """Return the result in short."""
 
     @abstractmethod
-    def document(self) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the result for programs."""
 
     @abstractmethod
@@ -135,9 +149,12 @@ class Shown(ABC):
         write_file(Path(path), self.page())
         return Path(path)
 
-    @abstractmethod
     def fill(self, folder: Path, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Write all files of the result into a folder that exists; return its document."""
+        document = self.document(origin)
+        write_file(folder / self.files[1], self.page(origin))
+        write_file(folder / self.files[0], json_text(document, indent=1))
+        return document
 
     def save(self, folder: str | Path) -> Path:
         """Write the files of the command of the same name; OutputError if others are there."""
@@ -169,7 +186,8 @@ class Shown(ABC):
         blocks: list[PageBlock] = [VerdictSection(said.badge, self.tone(), [said.title])]
         if said.rows:
             blocks.append(DataTable(said.heads, said.rows))
-        blocks += [Paragraph(line, 'hint') for line in said.lines]
+        below = [*said.lines, *(f'next: {step}' for step in said.steps)]
+        blocks += [Paragraph(line, 'hint') for line in below]
         return fragment([ContentSection('', blocks), *self.sections()])
 
 

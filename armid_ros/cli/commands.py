@@ -37,7 +37,6 @@ COMMANDS = {
     'layout': 'layout',
     'robots': 'catalogues',
     'effects': 'catalogues',
-    'completion': 'completion',
 }
 
 

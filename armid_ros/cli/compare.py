@@ -7,7 +7,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from armid_ros.cli import parameters
-from armid_ros.cli.terminal import say
 import click
 
 
@@ -28,20 +27,11 @@ def compare(before: Path, after: Path, out: Path, strict: bool, as_json: bool) -
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.files import json_text
     from armid_ros.identification.assess.comparison import SCHEMA
-    from armid_ros.report.compare_report import tell
 
     staged = options.stage(out, SCHEMA)
     result = run(before, after)
     sources = [Path(one.source) for one in (result.core.before, result.core.after)]
-    document = result.fill(staged.folder, ResultOrigin(provenance=provenance(sources)))
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-    else:
-        for sentence in tell(result.core):
-            say(sentence)
-        say(f'{out}: report.html, comparison.json')
+    options.deliver(result, staged, ResultOrigin(provenance=provenance(sources)), as_json)
     if strict and result.core.unusable:
         click.get_current_context().exit(3)

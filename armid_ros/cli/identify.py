@@ -5,15 +5,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.choices import ESTIMATORS
-from armid_ros.cli.terminal import print_parameters, print_rows, progress, say
+from armid_ros.cli.terminal import progress
 import click
-
-if TYPE_CHECKING:
-    from armid_ros.api.identification import IdentificationResult
 
 
 @click.command(epilog='Example: armid identify run.mcap --robot ur10.urdf --out result')
@@ -69,9 +66,6 @@ if TYPE_CHECKING:
     help='Test for encoder noise and simulate along the held-out bags.',
 )
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
-@click.option(
-    '--verbose', is_flag=True, help='Print every parameter, certificate, note and check too.'
-)
 @columns.options
 @parameters.topic
 @parameters.gravity
@@ -94,7 +88,6 @@ def identify(
     mass_range: float | None,
     boxes: tuple[str, ...],
     strict: bool,
-    verbose: bool,
     seed: int,
     as_json: bool,
     **asked: Any,
@@ -106,7 +99,6 @@ def identify(
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.errors import IdentificationError
-    from armid_ros.files import json_text
     from armid_ros.identification import PhysicalSettings
     from armid_ros.identification.output import SCHEMA
 
@@ -133,67 +125,6 @@ def identify(
             options.kept_source(robot_source, robot, staged.folder),
             provenance([*bags, *validate], result.document()['settings'], seed),
         )
-        document = result.fill(staged.folder, origin)
-    staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-    else:
-        for line in result.summary().full_text():
-            say(line)
-        if verbose:
-            _print_all(document, result)
-        for name, check in document.get('exports', {}).items():
-            say(f'{name}: {_checked(check)}')
-        files = ['report.html', 'model.yaml', 'identification.json', *result.exports]
-        say(f'{out}: {", ".join(files)}')
+        options.deliver(result, staged, origin, as_json)
     if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)
-
-
-def _print_all(document: dict[str, Any], found: IdentificationResult) -> None:
-    """Print every parameter, the certificate, notes, and checks."""
-    result, verification = found.core, found.verification
-    print_parameters(document['parameters'])
-    if result.physical is not None:
-        rows = [
-            {
-                'link': link.link,
-                'mass [kg]': f'{link.mass:.4g}',
-                'eigenvalues of the pseudo-inertia': '  '.join(
-                    f'{v:.3g}' for v in link.eigenvalues
-                ),
-                'constraint': 'active' if link.link in result.physical.active else 'inactive',
-            }
-            for link in result.physical.links
-        ]
-        print_rows(rows, as_json=False, right=('mass [kg]',))
-    for note in (*result.arm.robot.notes, *result.notes):
-        say(f'note: {note}')
-    unseen = [u.parameter for u in result.unidentified if u.reason != 'not told from zero']
-    if unseen:
-        named = ', '.join(f'{p.name} of {p.joint}' if '_' in p.name else p.name for p in unseen)
-        say(f'not identified: {named}')
-    for name, one in found.exports.items():
-        kinds = dict.fromkeys(line.split(':')[0] for line in one.without_place)
-        if kinds:
-            say(f'{name} has no place for {", ".join(kinds)}; a comment in it has the values')
-    if verification is not None:
-        for sentence in (*verification.sentences(), *verification.left_out):
-            say(f'check: {sentence}')
-    fitted = document['training']['relative_error_percent']
-    say(f'torque error {fitted:.2f} % on the data it was fitted to')
-    for entry in document['validation']:
-        say(f'torque error {entry["relative_error_percent"]:.2f} % on {entry["bag"]}, held out')
-
-
-def _checked(check: dict[str, Any]) -> str:
-    """Return in words how an exported file compares with the model."""
-    torque = (
-        f'torque in {check["program"]} differs by {check["difference"]:.1e} N m, '
-        f'{check["share"]:.1e} of the largest, in {check["states"]} random states'
-        if not check.get('not_checked')
-        else f'torque not checked: {check["not_checked"]}'
-    )
-    missing = f'; without {", ".join(check["left_out"])}' if check['left_out'] else ''
-    shapes = f'; shapes {check["shapes"]}' if 'shapes' in check else ''
-    return f'{torque}{missing}{shapes}'

@@ -4,18 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
-from armid_ros.cli.terminal import print_rows, progress, say, wrapped
+from armid_ros.cli.terminal import progress
 import click
-
-if TYPE_CHECKING:
-    from armid_ros.inspection import Inspection, Remark
-
-_SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 
 
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
@@ -27,7 +20,7 @@ _SIGNS = {'bad': 'x', 'doubt': '!', 'note': '-'}
 @click.option(
     '--out',
     type=parameters.OutPath(file_okay=False, path_type=Path),
-    help='Folder to put the page with all curves into.',
+    help='Folder to put inspection.html, with all curves, and inspection.json into.',
 )
 @parameters.force
 @columns.options
@@ -59,7 +52,6 @@ def inspect(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.files import json_text, write_file
     from armid_ros.files.cells import listed
     from armid_ros.inspection.inspect import SCHEMA
 
@@ -83,41 +75,8 @@ def inspect(
             (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
         found = run(recording, robot, topics=topics, rng=seed)
-    if staged is not None:
-        origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
-        page = found.page(origin)
-        write_file(staged.folder / 'inspection.html', page)
-        staged.keep()
-    if as_json:
-        click.echo(json_text(found.document()))
-        return
-    _print(found.core)
-    if out is not None:
-        say(f'{out}: inspection.html')
-
-
-def _print(found: Inspection) -> None:
-    """Print within 80 columns."""
-    from armid_ros.report.sections.inspection import joint_heads, joint_rows, recording_facts
-
-    say(found.recording.source)
-    for topic in found.topics:
-        read = ' <- read' if topic.name == found.recording.topic else ''
-        say(f'  {topic.name}  {topic.count} x {topic.type_name}{read}')
-    for name, value in recording_facts(found):
-        say(wrapped(f'{name}: {value}', '  ', '    '))
-    heads = joint_heads(found)
-    rows = [dict(zip(heads, row, strict=True)) for row in joint_rows(found)]
-    for row in rows:
-        del row['step']
-    print_rows(rows, as_json=False, right=heads[1:], spare=('moving', *heads[6:7], *heads[3:0:-1]))
-    _print_remarks(found.remarks)
-    say(wrapped(found.verdict))
-
-
-def _print_remarks(remarks: Sequence[Remark]) -> None:
-    for remark in remarks:
-        say(wrapped(f'{_SIGNS[remark.weight]} {remark.text}', others='  '))
+    origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
+    options.deliver(found, staged, origin, as_json)
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
@@ -163,30 +122,13 @@ def check(
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.files import json_text
-    from armid_ros.report.inspection_report import headline, HEADS, link_rows
 
     staged = None if out is None else options.stage(out, CHECK, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
         found = run(robot, options.read(bags, robot, topic), rng=seed)
-    if staged is not None:
-        source = [path for path in (Path(robot_source), *bags) if path.exists()]
-        found.fill(staged.folder, ResultOrigin(robot_source, '', provenance(source, seed=seed)))
-        staged.keep()
-    if as_json:
-        click.echo(json_text(found.document()))
-    else:
-        first, *others = headline(found.remarks, found.links)
-        say(wrapped(first))
-        rows = () if found.links is None else link_rows(found.links)
-        if rows:
-            shown = [dict(zip(HEADS, row, strict=True)) for row in rows]
-            print_rows(shown, as_json=False, right=HEADS[1:], spare=HEADS[:2:-1])
-        _print_remarks(found.remarks)
-        for sentence in others:
-            say(wrapped(sentence))
-        if out is not None:
-            say(f'{out}: report.html, check.json')
+    source = [path for path in (Path(robot_source), *bags) if path.exists()]
+    origin = ResultOrigin(robot_source, '', provenance(source, seed=seed))
+    options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
         click.get_current_context().exit(3)

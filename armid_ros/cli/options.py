@@ -7,13 +7,22 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
+from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
+from armid_ros.cli.terminal import say
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, RecordingError, RobotError, visible
-from armid_ros.files import default_memory_limit, result_folder, Staged, staged, write_file
+from armid_ros.files import (
+    default_memory_limit,
+    json_text,
+    result_folder,
+    Staged,
+    staged,
+    write_file,
+)
 from armid_ros.files.cells import listed, parted
 from armid_ros.files.own import written_by
 from armid_ros.motion import FloatArray
@@ -73,6 +82,44 @@ def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -
     replaced = () if context.meta.get(FORCE, False) else written_by(schema, also)
     spared = (out / 'robot.urdf', *(Path(part) for part in (robot, robot.split(' ')[0]) if part))
     return context.with_resource(staged(out, replaced, spared))
+
+
+def deliver(
+    result: Shown,
+    staged: Staged | None,
+    origin: ResultOrigin,
+    as_json: bool,
+    summary: Summary | None = None,
+) -> None:
+    """
+    Write a result to its folder, if it has one, and print it.
+
+    Parameters
+    ----------
+    result : Shown
+        The result.
+    staged : Staged or None
+        Where it goes.
+    origin : ResultOrigin
+        Where it comes from.
+    as_json : bool
+        Whether the document is printed in place of the summary.
+    summary : Summary, optional
+        What is printed; by default that of the result.
+
+    """
+    if staged is None:
+        document = result.document(origin)
+    else:
+        document = result.fill(staged.folder, origin)
+        staged.keep()
+    if as_json:
+        click.echo(json_text(document))
+        return
+    for line in (summary or result.summary()).full_text():
+        say(line)
+    if staged is not None:
+        say(f'{staged.out}: {", ".join(result.files)}')
 
 
 def read_settings() -> ReadSettings:

@@ -116,7 +116,6 @@ def print_rows(
     rows: Sequence[dict[str, Any]],
     as_json: bool,
     right: Sequence[str] = (),
-    spare: Sequence[str] = (),
 ) -> None:
     """
     Print rows as a table, or as JSON.
@@ -129,8 +128,6 @@ def print_rows(
         Whether for programs, with all columns.
     right : sequence of str
         Columns of numbers, which are never broken.
-    spare : sequence of str
-        Columns that are left out, the first one first, where there is no room for all.
 
     """
     from armid_ros.files import json_text
@@ -143,12 +140,6 @@ def print_rows(
         return
     console = Console()
     heads = list(rows[0]) if rows else []
-    left_out = []
-    for head in spare:
-        cells = [[one, *(_cell(row[one]) for row in rows)] for one in heads]
-        if sum(2 + max(map(len, column)) for column in cells) > console.width:
-            heads.remove(head)
-            left_out.append(head)
     table = Table(box=None, header_style='bold')
     for head in heads:
         table.add_column(
@@ -160,8 +151,6 @@ def print_rows(
     for row in rows:
         table.add_row(*(Text(_cell(row[head])) for head in heads))
     console.print(table)
-    if left_out:
-        say(wrapped(f'left out at {console.width} columns: {", ".join(left_out)}', ' ', '   '))
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:

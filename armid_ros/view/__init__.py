@@ -3,6 +3,6 @@
 """
 A recording to look at: the moving arm, measured and predicted torque, what is left of it.
 
-``make_scene`` computes, ``log_scene`` hands it to rerun, which is installed by the extra ``view``.
+``log_recording`` hands it to rerun, which is installed by the extra ``view``.
 
 """

@@ -4,21 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.terminal import say
-from armid_ros.errors import ArmidError
+from armid_ros.errors import OutputError
 import click
-
-if TYPE_CHECKING:
-    from armid_ros.view.scene import Scene
 
 
 @click.command(epilog='Example: armid view run.mcap --model found --out run.rrd')
-@click.argument('bag', required=False, type=click.Path(path_type=Path))
+@click.argument('bag', type=click.Path(path_type=Path))
 @click.option(
     '--model',
     type=click.Path(path_type=Path),
@@ -28,51 +26,27 @@ if TYPE_CHECKING:
 @parameters.robot_described(help='As elsewhere; of the model by default.')
 @click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
 @click.option('--mark', metavar='A,B,...', help='Joints to be coloured.')
-@click.option('--live', is_flag=True, help='Show joint_states as they come; no BAG.')
-@click.option('--namespace', default='', help='With --live: of the nodes, such as left_arm.')
 @columns.options
 @parameters.topic
 @parameters.gravity
 @parameters.joints
 @parameters.reading
 def view(
-    bag: Path | None,
+    bag: Path,
     model: Path | None,
     robot_source: str | None,
     gravity: str,
     joints: str | None,
     out: Path | None,
     mark: str | None,
-    live: bool,
-    namespace: str,
     topic: str | None,
 ) -> None:
-    """
-    Look at a recording in rerun: the moving arm, torques, and what a model does not explain.
-
-    With --live the arm is shown as it moves; the online identifier beside it has the predictions.
-
-    """
+    """Look at a recording in rerun: the moving arm, torques, and what a model leaves."""
     from armid_ros.arm import ArmModel
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
-    from armid_ros.view.rerun_log import log_scene, open_stream, rerun
-    from armid_ros.view.scene import make_scene
+    from armid_ros.view.rerun_log import log_recording, open_stream
 
-    if live == (bag is not None):
-        raise ArmidError('armid view shows a BAG, or with --live what is on the topics: name one')
-    if bag is None:
-        rerun()  # is it there at all?
-        from armid_ros.view.nodes.viewer import show_topics
-
-        parameters_of_viewer = {
-            'robot': robot_source if robot_source != '-' else '',
-            'joints': list(listed(joints)) if joints else [],
-            'mark': list(listed(mark)) if mark else [],
-            'out': str(out or ''),
-        }
-        show_topics(parameters_of_viewer, namespace)
-        return
     robot = None
     if robot_source is not None or model is None:
         robot = options.open_robot(robot_source or '-', gravity, joints, [bag])
@@ -83,33 +57,29 @@ def view(
         arm = ArmModel(robot)
     (recording,) = options.read([bag], arm.robot, topic)
     marked = listed(mark) if mark else _named(model)
-    scene = make_scene(arm, recording, marked)
-    if out is None:
-        stream = open_stream(scene.name)
-        log_scene(scene, stream)
+    with _whole(out) as file:
+        stream = open_stream(Path(recording.source).name or arm.robot.name, file)
+        notes = log_recording(stream, arm, recording, marked)
         stream.disconnect()
-    else:
-        _save(scene, out)
-    for note in scene.notes:
+    for note in notes:
         say(f'note: {note}')
     said = f', coloured: {", ".join(marked)}' if marked else ''
     if out is not None:
         say(f'{out}: {len(recording)} samples of {arm.robot.n_joints} joints{said}; rerun {out}')
 
 
-def _save(scene: Scene, out: Path) -> None:
-    """Write a file beside its place and move it there, so that it is whole or absent."""
-    from armid_ros.errors import OutputError
-    from armid_ros.view.rerun_log import log_scene, open_stream
-
+@contextmanager
+def _whole(out: Path | None) -> Iterator[Path | None]:
+    """Yield a file beside its place and move it there, so that it is whole or absent."""
+    if out is None:
+        yield None
+        return
     beside = out.with_name(f'.{out.name}.part')
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         beside.unlink(missing_ok=True)
         beside.touch(exist_ok=False)
-        stream = open_stream(scene.name, beside)
-        log_scene(scene, stream)
-        stream.disconnect()
+        yield beside
         beside.replace(out)
     except OSError as error:
         raise OutputError(f'{out}: cannot be written: {error.strerror}') from error

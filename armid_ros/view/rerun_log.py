@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A scene in rerun: curves and arm on one time line, in a window or in a file.
+A recording in rerun: curves and arm on one time line, in a window or in a file.
 
 Entities are ``arm/<joint>``, ``torque/<joint>/measured`` and ``predicted``, ``residual/<joint>``,
 ``position/<joint>`` and ``velocity/<joint>``.
@@ -20,11 +20,14 @@ import time
 from types import ModuleType
 from typing import Any
 
+from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
 from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
 from armid_ros.robots import Robot
-from armid_ros.view.bodies import Body
-from armid_ros.view.scene import Scene
+from armid_ros.robots.geometry import LinkShape, shapes_of
+from armid_ros.robots.sticks import sticks
+from armid_ros.view.scene import joint_frames, poses, torques
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -35,9 +38,11 @@ _HOST, _PORT = '127.0.0.1', 9876
 _PATIENCE, _TRY_EVERY = 20.0, 0.1
 #: Colours: of what was measured, predicted, left, of links, and of what is marked.
 _MEASURED, _PREDICTED, _RESIDUAL = (140, 145, 150), (213, 94, 0), (0, 114, 178)
+_LINK, _MARKED = (175, 182, 190), (230, 60, 40)
 #: Later than any recording begins that counts from its own start [s].
 _SINCE_1970 = 1e8
-_LINK, _MARKED = (175, 182, 190), (230, 60, 40)
+#: Radius of a bar of an arm without bodies [m].
+_BAR = 0.02
 
 
 def rerun() -> ModuleType:
@@ -120,69 +125,120 @@ def _started_viewer() -> str:
         time.sleep(_TRY_EVERY)
 
 
-def log_scene(scene: Scene, stream: Any) -> None:
-    """Log arm and curves, and the layout of the window."""
-    rr = rerun()
-    joints = scene.robot.joints
-    log_arm(scene.robot, scene.bodies, scene.marked, stream)
-    for j, joint in enumerate(joints):
-        poses = rr.Transform3D.columns(
-            translation=scene.translations[:, j],
-            quaternion=Rotation.from_matrix(scene.rotations[:, j]).as_quat(),
-        )
-        stream.send_columns(f'arm/{part(joint)}', [_times(rr, scene.pose_t)], poses)
-        for name, values in (('position', scene.recording.q), ('velocity', scene.recording.dq)):
-            if values is not None:
-                _curve(rr, stream, f'{name}/{part(joint)}', scene.recording.t, values[:, j])
-        for entity, values in (
-            (f'torque/{part(joint)}/measured', scene.measured),
-            (f'torque/{part(joint)}/predicted', scene.predicted),
-            (f'residual/{part(joint)}', scene.residual),
-        ):
-            _curve(rr, stream, entity, scene.t, values[:, j])
-    style_curves(joints, stream)
-    stream.send_blueprint(shown(joints, scene.marked))
-    stream.flush()
+def log_recording(
+    stream: Any, arm: ArmModel, recording: Recording, marked: Sequence[str] = ()
+) -> list[str]:
+    """
+    Log the moving arm, its curves, and the layout of the window; return what is not shown.
 
+    Parameters
+    ----------
+    stream : rerun.RecordingStream
+        Where to.
+    arm : ArmModel
+        The model.
+    recording : Recording
+        What the arm did; torque is predicted where it has some.
+    marked : sequence of str
+        Joints to be coloured.
 
-def log_arm(robot: Robot, pieces: Sequence[Body], marked: Sequence[str], stream: Any) -> None:
-    """Log what the arm looks like, each piece below the joint that carries it."""
-    rr = rerun()
-    stream.log('arm', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for number, piece in enumerate(pieces):
-        joint = robot.joints[piece.joint] if piece.joint >= 0 else ''
-        corners = piece.corners.reshape(-1, 3)
-        mesh = rr.Mesh3D(
-            vertex_positions=corners,
-            triangle_indices=np.arange(len(corners)).reshape(-1, 3),
-            vertex_normals=np.repeat(_normals(piece.corners), 3, axis=0),
-            albedo_factor=_MARKED if joint in marked else _LINK,
-        )
-        where = f'arm/{part(joint)}' if joint else 'arm/base'
-        stream.log(f'{where}/{part(piece.link)}_{number}', mesh, static=True)
-
-
-def style_curves(joints: Sequence[str], stream: Any) -> None:
-    """Give curves their names and colours, the same in every plot."""
-    rr = rerun()
-    for joint in joints:
+    """
+    rr, robot = rerun(), arm.robot
+    for joint in marked:
+        robot.index(joint)
+    notes = _log_bodies(stream, robot, marked)
+    t, q = poses(recording)
+    rotations, translations = joint_frames(robot, q)
+    curves = [('position/{}', recording.t, recording.q)]
+    if recording.dq is not None:
+        curves.append(('velocity/{}', recording.t, recording.dq))
+    found = torques(arm, recording)
+    if found is not None:
+        times, measured, predicted = found
+        curves += [
+            ('torque/{}/measured', times, measured),
+            ('torque/{}/predicted', times, predicted),
+            ('residual/{}', times, measured - predicted),
+        ]
+    for j, joint in enumerate(robot.joints):
+        turns = Rotation.from_matrix(rotations[:, j]).as_quat()
+        moved = rr.Transform3D.columns(translation=translations[:, j], quaternion=turns)
+        stream.send_columns(f'arm/{_part(joint)}', [_times(t)], moved)
+        for entity, at, values in curves:
+            known = np.isfinite(values[:, j])
+            if known.any():
+                column = rr.Scalars.columns(scalars=values[known, j])
+                stream.send_columns(entity.format(_part(joint)), [_times(at[known])], column)
         for entity, name, colour in (
-            (f'torque/{part(joint)}/measured', 'measured', _MEASURED),
-            (f'torque/{part(joint)}/predicted', 'predicted', _PREDICTED),
-            (f'residual/{part(joint)}', f'residual {joint}', _RESIDUAL),
+            ('torque/{}/measured', 'measured', _MEASURED),
+            ('torque/{}/predicted', 'predicted', _PREDICTED),
+            ('residual/{}', f'residual {joint}', _RESIDUAL),
         ):
-            stream.log(entity, rr.SeriesLines(colors=colour, names=name), static=True)
+            style = rr.SeriesLines(colors=colour, names=name)
+            stream.log(entity.format(_part(joint)), style, static=True)
+    stream.send_blueprint(_layout(robot.joints, marked))
+    stream.flush()
+    return notes
 
 
-def shown(joints: Sequence[str], marked: Sequence[str] = ()) -> Any:
+def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
+    """Log what an arm looks like: <visual>, <collision> where a link has none, or bars."""
+    rr, notes, drawn = rerun(), [], 0
+    stream.log('arm', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+    def place(joint: int) -> tuple[str, tuple[int, int, int]]:
+        if joint == 0:
+            return 'arm/base', _LINK
+        name = robot.joints[joint - 1]
+        return f'arm/{_part(name)}', _MARKED if name in marked else _LINK
+
+    for shape in shapes_of(robot, 'visual', 'collision'):
+        if shape.kind == 'mesh' and shape.path is None:
+            notes.append(f"link '{shape.link}': its mesh is not found; it is not drawn")
+            continue
+        where, colour = place(int(robot.model.frames[shape.frame].parentJoint))
+        entity = f'{where}/{_part(shape.link)}_{shape.number}'
+        turn = Rotation.from_matrix(np.array(shape.placement.rotation)).as_quat()
+        pose = rr.Transform3D(
+            translation=np.array(shape.placement.translation),
+            quaternion=rr.Quaternion(xyzw=turn),
+            scale=shape.size if shape.kind == 'mesh' else None,
+        )
+        stream.log(entity, pose, static=True)
+        stream.log(entity, _drawn(shape, colour), static=True)
+        drawn += 1
+    for joint, end in () if drawn else sticks(robot.model):
+        where, colour = place(joint)
+        bar = rr.LineStrips3D([[np.zeros(3), end]], radii=_BAR, colors=colour)
+        stream.log(f'{where}/bar', bar, static=True)
+    return notes
+
+
+def _drawn(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
+    """Return a shape in its own frame as rerun draws it."""
+    rr = rerun()
+    if shape.path is not None:
+        return rr.Asset3D(path=shape.path, albedo_factor=colour)
+    look = {'colors': colour, 'fill_mode': 'solid'}
+    if shape.kind == 'box':
+        return rr.Boxes3D(sizes=[shape.size], **look)
+    if shape.kind == 'sphere':
+        return rr.Ellipsoids3D(radii=shape.size, **look)
+    radius, length = shape.size
+    if shape.kind == 'cylinder':
+        return rr.Cylinders3D(lengths=length, radii=radius, **look)
+    begin = [[0.0, 0.0, -0.5 * length]]
+    return rr.Capsules3D(lengths=length, radii=radius, translations=begin, **look)
+
+
+def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
     """Return the layout of the window: the arm, torques of each joint, residuals, positions."""
-    rerun()
     import rerun.blueprint as layout
 
     def plots(kind: str, names: Sequence[str]) -> list[Any]:
         return [
             layout.TimeSeriesView(
-                origin=f'{kind}/{part(joint)}',
+                origin=f'{kind}/{_part(joint)}',
                 name=joint,
                 plot_legend=layout.PlotLegend(visible=number == 0),  # the same in all
             )
@@ -190,40 +246,23 @@ def shown(joints: Sequence[str], marked: Sequence[str] = ()) -> Any:
         ]
 
     first = [*marked, *(joint for joint in joints if joint not in marked)]
+    units = {'torque': 'N m', 'residual': 'N m', 'position': 'rad', 'velocity': 'rad/s'}
     tabs = layout.Tabs(
         *(
             layout.Vertical(*plots(kind, first), name=f'{kind} [{unit}]')
-            for kind, unit in (
-                ('torque', 'N m'),
-                ('residual', 'N m'),
-                ('position', 'rad'),
-                ('velocity', 'rad/s'),
-            )
+            for kind, unit in units.items()
         )
     )
     arm = layout.Spatial3DView(origin='arm', name='arm')
     return layout.Blueprint(layout.Horizontal(arm, tabs), collapse_panels=True)
 
 
-def part(name: str) -> str:
+def _part(name: str) -> str:
     """Return a name as part of an entity's path."""
     return str(rerun().escape_entity_path_part(name))
 
 
-def _curve(rr: Any, stream: Any, entity: str, t: FloatArray, values: FloatArray) -> None:
-    known = np.isfinite(values)
-    if known.any():
-        columns = rr.Scalars.columns(scalars=values[known])
-        stream.send_columns(entity, [_times(rr, t[known])], columns)
-
-
-def _times(rr: Any, t: FloatArray) -> Any:
+def _times(t: FloatArray) -> Any:
     """Return times as dates where they are seconds since 1970."""
     kind = 'timestamp' if t[0] > _SINCE_1970 else 'duration'
-    return rr.TimeColumn(TIMELINE, **{kind: t})
-
-
-def _normals(corners: FloatArray) -> FloatArray:
-    """Return the unit normal of every triangle, shape (T, 3)."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))
+    return rerun().TimeColumn(TIMELINE, **{kind: t})

@@ -146,22 +146,6 @@ def test_a_second_excitation_adds_to_what_a_bag_tells(bags, tmp_path):
     assert json.loads(after)['log_det'] > alone['log_det']
 
 
-@pytest.mark.long
-def test_speed_classes_come_in_folders_each_as_it_is_alone(tmp_path):
-    arguments = ('--robot', ROBOT, '--duration', 8.33, *QUICK, '--json')
-    several = armid('excite', *arguments, '--speed', 'slow,0.6', '--out', tmp_path / 'all').stdout
-    slow, medium = (json.loads(line) for line in several.splitlines())
-    assert (slow['speed'], medium['speed']) == ('slow', 0.6)
-    assert max(slow['limits_used']['velocity']) <= 1.0
-    for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'report.html'):
-        assert (tmp_path / 'all' / 'slow' / name).is_file()
-    page = (tmp_path / 'all' / 'slow' / 'report.html').read_text()
-    nearest = max(max(shares) for shares in slow['limits_used'].values())
-    assert f'at {100.0 * nearest:.0f} %' in page
-    alone = armid('excite', *arguments, '--speed', '0.6', '--out', tmp_path / 'one').stdout
-    assert json.loads(alone)['cost'] == medium['cost']
-
-
 def test_a_run_is_designed_to_tell_two_explanations_apart(tmp_path):
     arguments = ('--robot', ROBOT, '--duration', 8, *QUICK, '--criterion', 'T', '--effects', '')
     size = 'quadratic_friction@elbow_pitch:quadratic_coefficient=0.05'

@@ -73,7 +73,7 @@ def test_a_model_that_describes_no_arm_is_said_first_and_nothing_is_unchanged(tm
     first, second = identified(tmp_path / 'a', 0.08), unusable(tmp_path / 'b', 0.081)
     result = armid('compare', first, second, '--out', tmp_path / 'out')
     said = result.output.splitlines()[0]
-    assert said.startswith(f'{second / "identification.json"} is unusable')
+    assert said.startswith(f'UNUSABLE: {second / "identification.json"} is unusable')
     assert '86.7 % in elbow' in said and 'armid diagnose' in said
     page = (tmp_path / 'out' / 'report.html').read_text()
     assert 'class="verdict bad"' in page and '>unusable<' in page

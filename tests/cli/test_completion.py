@@ -8,9 +8,6 @@ import sys
 
 from armid_ros.cli import main
 from click.shell_completion import ShellComplete
-import pytest
-
-from .conftest import armid
 
 
 def completed(*words):
@@ -23,7 +20,6 @@ def test_commands_and_options_are_completed():
     assert completed('id') == ['identify']
     assert {'robots', 'recover'} <= set(completed('r'))
     assert completed('identify', '--effects') == ['--effects']
-    assert completed('completion', 'f') == ['fish']
     assert '--version' in completed('--v')
 
 
@@ -32,12 +28,6 @@ def test_values_are_completed():
     assert completed('identify', '--effects', 'viscous_friction,stribeck') == [
         'viscous_friction,stribeck_friction'
     ]
-
-
-@pytest.mark.parametrize('shell', ['bash', 'zsh', 'fish'])
-def test_a_script_is_printed_for_each_shell(shell):
-    said = armid('completion', shell).output
-    assert '_ARMID_COMPLETE' in said and f'{shell}_complete' in said
 
 
 def test_names_are_completed_without_importing_what_computes(pytestconfig):

@@ -10,7 +10,7 @@ import time
 import armid_ros.api.excitation as excitation_files
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import check_limits, ClearanceModel, design, Limits, load_excitation
+from armid_ros.excitation import check_limits, ClearanceModel, Limits, load_excitation
 from armid_ros.excitation.geometry.heights import lowest_point
 from armid_ros.motion import Motion
 from armid_ros.recording import read_recording, read_waypoints
@@ -157,26 +157,7 @@ def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):
         assert (tmp_path / 'plan' / name).exists()
 
 
-def test_a_design_that_fails_does_not_cost_the_one_before_it(tmp_path, monkeypatch):
-    """The second of two speeds has no motion; the first one is there, whole."""
-    made = []
-
-    def design_once(*arguments, **settings):
-        made.append(arguments)
-        if len(made) > 1:
-            raise TrajectoryError('nothing moves')
-        return design(*arguments, **settings)
-
-    monkeypatch.setattr('armid_ros.api.excitation.design', design_once)
-    arguments = ('--robot', ROBOT, *QUICK, '--speed', 'slow,fast', '--out', tmp_path / 'plan')
-    armid('excite', *arguments, code=2)
-    assert plan_of(ROBOT, tmp_path / 'plan' / 'slow').t[0] == 0.0
-    assert (tmp_path / 'plan' / 'slow' / 'report.html').is_file()
-
-
 def test_the_design_is_kept_where_no_way_leads_to_it(tmp_path, monkeypatch):
-    from armid_ros.errors import TrajectoryError
-
     def nothing(*_, **__):
         raise TrajectoryError('walled in')
 

@@ -4,7 +4,6 @@
 
 from dataclasses import replace
 import json
-import re
 import shutil
 from unittest.mock import Mock
 
@@ -59,7 +58,7 @@ def test_a_recording_without_motion_is_not_held_out(bags, tmp_path):
 
 
 def test_identify_prints_one_screen(bags, tmp_path):
-    """A row for each joint with its error and friction; the table of parameters on demand."""
+    """A row for each joint with its error and friction."""
     robot = load_robot(ROBOT)
     asked = ('identify', bags[0], '--robot', ROBOT, '--out', tmp_path / 'out')
     lines = armid(*asked).stdout.splitlines()
@@ -70,9 +69,6 @@ def test_identify_prints_one_screen(bags, tmp_path):
         (row,) = (line for line in lines if line.split()[:1] == [joint])
         assert float(row.split()[1]) == pytest.approx(errors[joint], rel=0.05)
         assert row.count('±') == 2
-    everything = armid(*asked, '--verbose').stdout
-    single = [row for row in document['parameters'] if ' ' not in row['name']]
-    assert all(row['name'] in everything for row in single)  # sums are wrapped
 
 
 @pytest.fixture(scope='module')
@@ -94,36 +90,30 @@ def test_physical_identifications_are_bodies_and_can_be_compared(bags, physical,
     assert (tmp_path / 'compared' / 'report.html').is_file()
 
 
-def test_physical_identification_prints_its_certificate_and_its_checks(bags, tmp_path):
+def test_physical_identification_shows_its_certificate_and_its_checks(bags, tmp_path):
     out = tmp_path / 'out'
     arguments = ('--robot', ROBOT, '--physical', '--total-mass', 2.8, '--validate', bags[1])
     box = 'wrist_pitch=-0.1,-0.1,-0.1:0.1,0.1,0.1'
-    text = armid('identify', bags[0], *arguments, '--box', box, '--out', out, '--verbose').stdout
+    armid('identify', bags[0], *arguments, '--box', box, '--out', out)
     document = json.loads((out / 'identification.json').read_text())
     links = document['physical']['links']
     assert len(links) == 6
     assert min(min(link['eigenvalues']) for link in links) > 0.0
     assert sum(link['mass'] for link in links) == pytest.approx(2.8, rel=1e-6)
-    facts = (
-        f'{links[0]["eigenvalues"][0]:.3g}',
-        '2.8 kg',
-        'torque_offset',
-        'Durbin',
-        'includes 0',
-    )
-    assert [fact for fact in facts if fact not in text] == []
     (forward,) = document['verification']['forward']
     assert max(forward['after']['position_rms'].values()) < 0.01
     assert document['verification']['encoder_noise']['p_value'] > 0.0
     page = (out / 'report.html').read_text()
-    assert 'Physical consistency' in page
-    assert 'Forward validation' in page
+    facts = (
+        f'{links[0]["eigenvalues"][0]:.3g}',
+        *('2.8 kg', 'Durbin', 'includes 0', 'Physical consistency', 'Forward validation'),
+    )
+    assert [fact for fact in facts if fact not in page] == []
 
 
 def test_checks_can_be_left_out(bags, tmp_path):
     out = tmp_path / 'out'
-    asked = ('identify', bags[0], '--robot', ROBOT, '--no-verify', '--verbose')
-    assert 'check:' not in armid(*asked, '--out', out).stdout
+    armid('identify', bags[0], '--robot', ROBOT, '--no-verify', '--out', out)
     assert 'verification' not in json.loads((out / 'identification.json').read_text())
 
 
@@ -132,8 +122,7 @@ def test_what_one_moving_joint_does_not_tell_is_nowhere_a_number(tmp_path):
     robot = load_robot(ROBOT)
     arm = ArmModel(robot).with_effect(make_effect('viscous_friction', robot), np.full(6, 0.1))
     bag, out = bag_of(tmp_path / 'bag', arm, 0, moving=3), tmp_path / 'out'
-    text = armid('identify', bag, '--robot', ROBOT, '--out', out, '--verbose').stdout
-    table, said = text.split('not identified: ')
+    armid('identify', bag, '--robot', ROBOT, '--out', out)
     document = json.loads((out / 'identification.json').read_text())
     model = yaml.safe_load((out / 'model.yaml').read_text())
     (viscous,) = (e for e in model['effects'] if e['name'] == 'viscous_friction')
@@ -141,27 +130,9 @@ def test_what_one_moving_joint_does_not_tell_is_nowhere_a_number(tmp_path):
     unseen = page[page.index('This motion does not show it') :]
     shown = [row['joint'] for row in document['parameters'] if row['name'] == VISCOUS]
     assert shown == ['elbow_pitch']
-    assert len(re.findall(rf'{VISCOUS} +elbow_pitch +0\.[0-9]+', table)) == 1
-    assert table.count(VISCOUS) == 1
     for joint in set(robot.joints) - {'elbow_pitch'}:
-        assert f'{VISCOUS} of {joint}' in said
         assert f'of {joint}' in unseen
     assert {row['joint'] for row in viscous['parameters'] if row['std'] is not None} == set(shown)
-
-
-def test_what_is_not_told_from_zero_is_printed_without_a_value(tmp_path):
-    """Offsets that the arm does not have."""
-    arm = ArmModel(load_robot(ROBOT))
-    bag, out = bag_of(tmp_path / 'bag', arm, 0), tmp_path / 'out'
-    text = armid('identify', bag, '--robot', ROBOT, '--out', out, '--verbose').stdout
-    lines = text.splitlines()
-    rows = json.loads((out / 'identification.json').read_text())['not_identified']
-    weak = [(r['name'], r['joint']) for r in rows if r['reason'] == 'not told from zero']
-    single = [key for key in weak if ' ' not in key[0]]
-    assert any(name == 'torque_offset' for name, _ in single)
-    for key in single:
-        (line,) = (line for line in lines if tuple(line.split()[:2]) == key)
-        assert 'includes 0' in line
 
 
 def test_one_robot_by_two_paths_is_one_and_two_robots_are_refused(bags, tmp_path):

@@ -11,7 +11,6 @@ ROW = {
     'joint': 'a_joint_of_a_long_name',
     'from [rad]': '-1.22',
     'to': '0.0396',
-    'moving': '100 %',
     'value, 95 %': '0.20003 ± 0.00011 kg m²',
     'note': 'words that may be broken where there is no room for all of them',
 }
@@ -19,11 +18,10 @@ ROW = {
 
 def test_tables_say_their_units_and_break_no_number(capsys, monkeypatch):
     monkeypatch.setenv('COLUMNS', '80')
-    print_rows([ROW], as_json=False, right=('from [rad]', 'to', 'value, 95 %'), spare=('moving',))
+    print_rows([ROW], as_json=False, right=('from [rad]', 'to', 'value, 95 %'))
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert 'from [rad]' in lines[0]
-    assert 'moving' not in lines[0]
     assert '0.20003 ± 0.00011 kg m²' in lines[1]
 
 

@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.diagnose import partner as partner_options
-from armid_ros.cli.terminal import progress, say, Tick
+from armid_ros.cli.terminal import progress, Tick
 from armid_ros.errors import ArmidError
 import click
 
@@ -142,7 +142,6 @@ def diagnose(
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
     from armid_ros.diagnosis.verdict.document import SCHEMA
-    from armid_ros.files import json_text
     from armid_ros.identification.parameters_file import read_misfit
     from armid_ros.residual import require_libraries
 
@@ -186,16 +185,8 @@ def diagnose(
         staged.keep()
         result = _with_extras(result, residual is not None, seed, tick)
         tick(1.0, 'writing')
-        document = result.fill(staged.folder, origin)
-        staged.keep()
-    if as_json:
-        click.echo(json_text(document))
-    else:
-        for line in result.summary().full_text():
-            say(line)
-        for step in result.extras.steps(result.core, str(out / 'model.yaml')):
-            say(f'next: {step}')
-        say(f'{out}: {", ".join(result.files)}')
+        summary = result.summary(str(out / 'model.yaml'))
+        options.deliver(result, staged, origin, as_json, summary)
     stopped = {'bad_data': 2, **({'unknown': 3, 'not_repeatable': 3} if strict else {})}
     click.get_current_context().exit(stopped.get(result.verdict, 0))
 

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
@@ -19,36 +18,29 @@ from armid_ros.cli.choices import (
     SPEED_CLASSES,
     TARGETS,
 )
-from armid_ros.cli.terminal import progress, say, Tick
+from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import TrajectoryError
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.api.excitation import ExcitationResult
-    from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
-    from armid_ros.excitation import DesignProgress, TransferPlanner
     from armid_ros.files import Staged
-    from armid_ros.motion import FloatArray
     from armid_ros.robots import Robot
 
 
-class Speeds(click.ParamType[tuple[str | float, ...]]):
-    """Speed classes, or shares of the velocity and acceleration limits, with commas."""
+class Speed(click.ParamType[str | float]):
+    """A speed class, or a share of the velocity and acceleration limits."""
 
-    name = 'speeds'
+    name = 'speed'
 
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[str | float, ...]:
-        """Read them."""
-        return tuple(self._one(part.strip()) for part in str(value).split(','))
-
-    def _one(self, text: str) -> str | float:
-        if text in SPEED_CLASSES:
-            return text
+    def convert(self, value: Any, param: Any, ctx: Any) -> str | float:
+        """Read it."""
+        if value in SPEED_CLASSES:
+            return str(value)
         try:
-            return float(text)
+            return float(value)
         except ValueError:
-            self.fail(f"'{text}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
+            self.fail(f"'{value}' is neither one of {', '.join(SPEED_CLASSES)} nor a number")
 
 
 @click.command(epilog='Example: armid excite --robot ur5.urdf --duration 40 --out plan')
@@ -85,12 +77,11 @@ class Speeds(click.ParamType[tuple[str | float, ...]]):
 @click.option('--harmonics', default=5, show_default=True, help='Fourier harmonics per joint.')
 @click.option(
     '--speed',
-    'speeds',
-    type=Speeds(),
-    metavar='S,...',
+    type=Speed(),
+    metavar='S',
     default='fast',
     show_default=True,
-    help=f'{", ".join(SPEED_CLASSES)}, or a share of the limits; several: a folder for each.',
+    help=f'{", ".join(SPEED_CLASSES)}, or a share of the limits.',
 )
 @click.option(
     '--criterion',
@@ -195,8 +186,6 @@ def excite(
     kind: str,
     share: float,
     duration: float,
-    periods: int,
-    speeds: tuple[str | float, ...],
     focus: str,
     effects: str,
     texts: tuple[str, ...],
@@ -216,12 +205,7 @@ def excite(
     **settings: Any,
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
-    from armid_ros.api.excitation import (
-        design_excitation,
-        design_settings,
-        SCHEMA,
-        transfer_planner,
-    )
+    from armid_ros.api.excitation import design_excitation, SCHEMA
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.excite.springs import (
@@ -232,7 +216,6 @@ def excite(
     from armid_ros.cli.origin import provenance
     from armid_ros.excitation import CollisionScene, with_joint_limits
     from armid_ros.excitation.search.local import INTERRUPTED
-    from armid_ros.files import json_text
     from armid_ros.files.cells import parted
 
     refuse_other_options(click.get_current_context())
@@ -246,66 +229,32 @@ def excite(
     arm, other = _arms(robot, model, effects, focus, texts, rival)
     if acceleration is not None:
         limits = options.per_joint(acceleration, robot, '--acceleration')
-    settings = {name: value for name, value in settings.items() if value is not None} | {
-        'focus': tuple(name.partition('@')[0] for name in parted(focus) if name),
-        'acceleration': limits,
-        'noise': options.per_joint(torque_noise, robot, '--torque-noise'),
-        'clearance': clearance,
-    }
-    known = design_settings(duration, periods, **settings)
-    planner = transfer_planner(arm, replace(known, speed=speeds[0]), scene)
-    pose, whose = _start(options.per_joint(start, robot, '--start'), planner)
-    folders = {speed: out if len(speeds) == 1 else out / f'{speed}' for speed in speeds}
-    for folder in folders.values():
-        require_free(folder)
-    staged = {s: options.stage(f, SCHEMA, robot_source) for s, f in folders.items()}
-    recordings = options.read(after, robot, None)
+    require_free(out)
+    staged = options.stage(out, SCHEMA, robot_source)
     beside = [path for path in (model, environment, joint_limits) if path is not None]
     read = [Path(robot_source.split(' ')[0]), *after, *beside]
-    missing = list(folders)
-    for number, (speed, folder) in enumerate(folders.items()):
-        with progress('designing') as tick:
-            result = design_excitation(
-                arm,
-                duration=duration,
-                periods=periods,
-                scene=scene,
-                start=pose,
-                after=recordings,
-                rival=other,
-                rng=seed,
-                progress=_shown(tick, number, len(folders), speed),
-                speed=speed,
-                **settings,
-            )
-            tick((number + 1.0) / len(folders), 'writing')
-            origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
-            document = _written(staged[speed], result, origin)
-        missing.remove(speed)
-        if as_json:
-            click.echo(json_text(document))
-        else:
-            _print(folder, document, result, whose)
-        if result.core.stopped == INTERRUPTED:
-            _interrupted(missing)
-
-
-def _interrupted(missing: list[str | float]) -> None:
-    """End with what is written; name the speeds that are missing."""
-    if missing:
-        click.echo(f'interrupted before {", ".join(map(str, missing))}', err=True)
-    raise KeyboardInterrupt
-
-
-def _shown(
-    tick: Tick, number: int, count: int, speed: str | float
-) -> Callable[[DesignProgress], None]:
-    """Return what shows the progress of one design of several."""
-
-    def shown(now: DesignProgress) -> None:
-        tick((number + now.done) / count, f'designing {speed}, cost {now.cost:.2f}')
-
-    return shown
+    with progress('designing') as tick:
+        result = design_excitation(
+            arm,
+            duration=duration,
+            scene=scene,
+            start=options.per_joint(start, robot, '--start'),
+            after=options.read(after, robot, None),
+            rival=other,
+            focus=[name.partition('@')[0] for name in parted(focus) if name],
+            acceleration=limits,
+            noise=options.per_joint(torque_noise, robot, '--torque-noise'),
+            clearance=clearance,
+            rng=seed,
+            progress=lambda now: tick(now.done, f'designing, cost {now.cost:.2f}'),
+            **settings,
+        )
+        tick(1.0, 'writing')
+        origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
+        with _kept_design(staged):
+            options.deliver(result, staged, origin, as_json)
+    if result.core.stopped == INTERRUPTED:
+        raise KeyboardInterrupt
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
@@ -322,18 +271,6 @@ def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...
         drives = f'{", ".join(others)}; --joints A,B,... drives them'
         say(f'not driven, as they belong to no arm: {drives}', 'yellow')
     return robot
-
-
-def _start(given: FloatArray | None, planner: TransferPlanner) -> tuple[FloatArray, str]:
-    """Return the pose to start from, and what it is in words."""
-    if given is not None:
-        fault = planner.fault(given)
-        if fault:
-            raise TrajectoryError(f'--start: {fault}')
-        return given, 'as given'
-    pose, fault = planner.free_start()
-    zero = 'the zero of the description'
-    return pose, f'{zero} is not free: {fault}' if fault else zero
 
 
 def _arms(
@@ -358,10 +295,11 @@ def _arms(
     return arm, other
 
 
-def _written(staged: Staged, result: ExcitationResult, origin: ResultOrigin) -> dict[str, Any]:
-    """Write a design; where no way leads to it, its coefficients alone, unless one was there."""
+@contextmanager
+def _kept_design(staged: Staged) -> Iterator[None]:
+    """Keep a design that no way leads to, its coefficients alone, unless one was there."""
     try:
-        document = result.fill(staged.folder, origin)
+        yield
     except TrajectoryError as error:
         held = f'{staged.out}: stays as it was'
         if staged.alone:
@@ -370,38 +308,3 @@ def _written(staged: Staged, result: ExcitationResult, origin: ResultOrigin) -> 
         raise TrajectoryError(
             f'{held}, but there is no trajectory: {error}; take another --start, or another --seed'
         ) from error
-    staged.keep()
-    return document
-
-
-def _print(folder: Path, document: dict[str, Any], result: ExcitationResult, whose: str) -> None:
-    from armid_ros.excitation.fitness import FIT
-
-    unseen = sum(row['std'] is None for row in document['parameters'])
-    condition = document['condition_number'] or math.inf
-    say(
-        f'{document["speed"]}: condition number {condition:.1f}, '
-        f'{len(document["parameters"])} parameters' + (f', {unseen} not seen' if unseen else '')
-    )
-    say(str(result.fitness), 'green' if result.fitness.word == FIT else 'yellow')
-    run = result.run
-    say(
-        f'starts at rest at {_pose(result.arm.robot, run.approach.q[0])} ({whose}), is on the '
-        f'trajectory after {run.approach.duration:.1f} s and back after {run.duration:.1f} s'
-    )
-    stopped = result.core.stopped
-    if stopped:
-        say(f'stopped early ({stopped}): the best so far, not what the seed would give')
-    say(f'{folder}: excitation.yaml, excitation.csv, trajectory (a bag), report.html')
-
-
-def _pose(robot: Robot, q: FloatArray) -> str:
-    """Name the joints that are not at zero."""
-    moved = [
-        f'{joint} {value:.3g} {unit}'
-        for joint, value, unit in zip(robot.joints, q, robot.position_units, strict=True)
-        if value != 0.0  # noqa: RUF069 - joints that stay are put to zero
-    ]
-    if not moved:
-        return 'zero'
-    return ', '.join(moved) + (', the others at zero' if len(moved) < len(q) else '')
