@@ -68,21 +68,11 @@ class ComparisonResult(Shown):
 
     def summary(self) -> Summary:
         """Return what changed, the surest first."""
-        from armid_ros.report.compare_report import tell, verdict
+        from armid_ros.report.compare_report import change_rows, HEADS, tell, verdict
 
-        rows = [
-            (
-                change.parameter.name,
-                change.parameter.joint,
-                f'{change.before:.4g}',
-                f'{change.after:.4g}',
-                f'± {change.std:.2g} {change.parameter.unit}',
-            )
-            for change in self.core.changed
-        ]
-        heads = ('parameter', 'joint', 'before', 'after', 'std') if rows else ()
+        rows = change_rows(self.core)
         first, *more = tell(self.core)
-        return Summary(first, verdict(self.core)[0], heads, rows, lines=more)
+        return Summary(first, verdict(self.core)[0], HEADS if rows else (), rows, lines=more)
 
     def tone(self) -> str:
         """Return the colour that stands for a change, or for models that describe no arm."""
@@ -92,7 +82,7 @@ class ComparisonResult(Shown):
 
     def sections(self) -> list[Section]:
         """Return the parameters, those that changed first to be seen."""
-        from armid_ros.report.sections.parameters import changes_section
+        from armid_ros.report.compare_report import changes_section
 
         return [changes_section(self.core)]
 

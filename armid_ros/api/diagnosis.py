@@ -262,7 +262,7 @@ class DiagnosisResult(ShownModel):
 
     def sections(self) -> list[Section]:
         """Return the gap of every joint, before and after."""
-        from armid_ros.report.sections.gap import gap_section
+        from armid_ros.report.sections.diagnosed import gap_section
 
         gap, robot = self.core.gap, self.description.robot
         if gap is None:

@@ -235,7 +235,7 @@ class IdentificationResult(ShownModel):
 
     def summary(self) -> Summary:
         """Return errors and friction of each joint, doubts, and the next step."""
-        from armid_ros.report.joint_table import joint_columns
+        from armid_ros.report.families import joint_columns
         from armid_ros.report.judgement import judge, residual_trends
         from armid_ros.report.notation import counted
 
@@ -275,8 +275,8 @@ class IdentificationResult(ShownModel):
     def sections(self) -> list[Section]:
         """Return the errors of the joints, and all parameters."""
         from armid_ros.report.blocks import ContentSection, Paragraph
+        from armid_ros.report.families import parameter_section
         from armid_ros.report.sections.fit import by_recording, error_bars
-        from armid_ros.report.sections.parameters import parameter_section
 
         described, robot = self.core.base.values(self.description.theta), self.arm.robot
         said = Paragraph(

@@ -89,7 +89,7 @@ class InspectionResult(Shown):
 
     def summary(self) -> Summary:
         """Return the verdict, the joints, what was remarked, and how it was sampled."""
-        from armid_ros.report.sections.inspection import joint_heads, joint_rows, recording_facts
+        from armid_ros.report.inspection_report import joint_heads, joint_rows, recording_facts
 
         heads, found = joint_heads(self.core), self.core
         topics = [

@@ -179,7 +179,7 @@ class Shown(ABC):
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""
         from armid_ros.report.blocks import ContentSection, DataTable, PageBlock, Paragraph
-        from armid_ros.report.fragment import fragment
+        from armid_ros.report.page import fragment
         from armid_ros.report.sections.frame import VerdictSection
 
         said = self.summary()

@@ -15,14 +15,24 @@ from armid_ros.identification.assess.comparison import (
 )
 from armid_ros.identification.fitting.identifiability import excludes_zero, HALF_WIDTH
 from armid_ros.identification.parameters_file import ParameterFile
-from armid_ros.report.blocks import ContentSection, FactList
-from armid_ros.report.families import full_label
+from armid_ros.report.blocks import (
+    Cells,
+    ContentSection,
+    DataTable,
+    FactList,
+    IntervalTrack,
+    Legend,
+    Paragraph,
+    TableCell,
+)
+from armid_ros.report.families import estimate_text, full_label, parameter_folds
 from armid_ros.report.notation import counted, digits, measured, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
-from armid_ros.report.sections.parameters import changes_section
 
+#: Columns of what changed.
+HEADS = ('parameter', 'before', 'after', 'difference, 95 %')
 #: Parameters that a line names.
 _NAMED = 6
 _WHY = {
@@ -31,8 +41,6 @@ _WHY = {
     'deviation': 'the {other} has no standard deviations to make those of {them} from',
     'grouping': 'the data of the {other} group parameters differently',
 }
-#: Changes that get a sentence each; the table has all.
-_TOLD = 8
 
 
 def compare_report(comparison: Comparison, provenance: Provenance | None) -> str:
@@ -59,6 +67,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
         facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
     sections: list[Section] = [
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
+        *_changed_section(comparison),
         changes_section(comparison),
         ContentSection('What was asked', [FactList(facts)]),
         Origin(provenance or Provenance()),
@@ -78,6 +87,26 @@ def verdict(comparison: Comparison) -> tuple[str, str]:
     if comparison.not_compared:
         return 'unchanged in part', 'fair'
     return 'unchanged', 'good'
+
+
+def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
+    """Return a row for each parameter that changed, as `HEADS` has the columns."""
+    rows = []
+    for change in comparison.changed:
+        values = [(change.before, change.before_std), (change.after, change.after_std)]
+        ends = [f'{x:.4g}' if excludes_zero(x, std) else 'includes 0' for x, std in values]
+        number, reach = measured(change.difference, HALF_WIDTH * change.std)
+        share = ''
+        if excludes_zero(change.before, change.before_std):
+            share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
+        by = f'{number} ± {reach} {pretty(change.parameter.unit)}{share}'
+        rows.append((full_label(change.parameter), *ends, by))
+    return rows
+
+
+def _changed_section(comparison: Comparison) -> list[Section]:
+    rows = change_rows(comparison)
+    return [ContentSection('What changed', [DataTable(HEADS, rows)])] if rows else []
 
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
@@ -134,10 +163,6 @@ def _details(comparison: Comparison) -> Sequence[str]:
         return [_least_visible(comparison.changes)]
     changed = comparison.changed
     told = [_together(group) for group in comparison.changed_together]
-    apart = [c for c in changed if comparison.load is None or not c.parameter.rigid]
-    told += [_sentence(change) for change in apart[:_TOLD]]
-    if len(apart) > _TOLD:
-        told.append(f'{len(apart) - _TOLD} more are in the table.')
     rigid = [c for c in changed if c.parameter.rigid]
     if comparison.load is None and len(rigid) >= 3 and len(rigid) > len(changed) - len(rigid):
         last = rigid[0].parameter.joint
@@ -210,24 +235,6 @@ def _together(group: GroupChange) -> str:
     )
 
 
-def _sentence(change: ParameterChange) -> str:
-    verb = 'rose' if change.difference > 0.0 else 'fell'
-    unit = pretty(change.parameter.unit)
-    label = full_label(change.parameter)
-    label = label[0].upper() + label[1:]
-    share = ''
-    ends = [_end(change.before, change.before_std), _end(change.after, change.after_std)]
-    if excludes_zero(change.before, change.before_std):
-        share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
-    sure = f'{abs(change.deviations):.0f} standard deviations' if change.std > 0.0 else 'exactly'
-    by = ' ± '.join(measured(abs(change.difference), HALF_WIDTH * change.std))
-    return f'{label} {verb} from {ends[0]} to {ends[1]}{share}, by {by} {unit}: {sure}.'
-
-
-def _end(value: float, std: float) -> str:
-    return f'{value:.4g}' if excludes_zero(value, std) else 'a value whose interval includes 0'
-
-
 def _least_visible(changes: Sequence[ParameterChange]) -> str:
     """Say how large a change would have had to be, of the kinds that wear changes."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
@@ -289,3 +296,44 @@ def _beware(comparison: Comparison) -> tuple[str, ...]:
             f'{comparison.after.robot}; they may not be the same.'
         )
     return tuple(lines)
+
+
+def changes_section(comparison: Comparison) -> ContentSection:
+    """Return every parameter of two identifications side by side."""
+    changes = comparison.changes
+
+    def cells(k: int) -> Cells:
+        one = changes[k]
+        before, after = (
+            ' ±\N{NO-BREAK SPACE}'.join(estimate_text(value, std)).replace(
+                'includes 0 ', 'includes 0, '
+            )
+            for value, std in ((one.before, one.before_std), (one.after, one.after_std))
+        )
+        return (
+            before,
+            TableCell(after, 'changed' if one.changed else ''),
+            f'{one.deviations:+.1f}',
+            IntervalTrack(one.after, HALF_WIDTH * one.after_std, one.before),
+        )
+
+    def count(members: list[int]) -> int:
+        return sum(changes[k].changed for k in members)
+
+    return ContentSection(
+        'Side by side',
+        [
+            Paragraph(
+                'Significant changes are in bold (5 % family-wise false-alarm rate). Each bar has '
+                'its own axis with zero in the middle.'
+            ),
+            Legend([('after', 'second, with its 95 % interval'), ('tick', 'first')]),
+            *parameter_folds(
+                tuple(one.parameter for one in changes),
+                ('First', 'Second', 'Difference / std', ''),
+                cells,
+                suffix=lambda members: f'{count(members)} of {len(members)} changed',
+                opened=lambda members: count(members) > 0,
+            ),
+        ],
+    )

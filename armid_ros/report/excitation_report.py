@@ -14,6 +14,7 @@ from armid_ros.excitation import (
     CRITERIA,
     Design,
     Fitness,
+    FourierTrajectory,
     Limits,
     Obstacle,
     obstacles_alone,
@@ -23,20 +24,39 @@ from armid_ros.excitation import (
     with_obstacles,
 )
 from armid_ros.excitation.fitness import FIT, UNFIT
-from armid_ros.motion import FloatArray
+from armid_ros.motion import FloatArray, Motion
 from armid_ros.report.arm_drawing import draw_poses, OBSTACLE
-from armid_ros.report.blocks import ContentSection, FactList, Legend
-from armid_ros.report.families import effects_in_words, full_label
+from armid_ros.report.blocks import (
+    BulletList,
+    Cells,
+    ContentSection,
+    DataTable,
+    FactList,
+    Legend,
+    PageBlock,
+    Panels,
+    Paragraph,
+    ShareBar,
+    TableCell,
+)
+from armid_ros.report.charts import Chart, Level, Role, Series
+from armid_ros.report.families import (
+    effects_in_words,
+    full_label,
+    parameter_families,
+    parameter_folds,
+)
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
+from armid_ros.report.sections.fit import ZOOM
 from armid_ros.report.sections.frame import Origin, VerdictSection
-from armid_ros.report.sections.parameters import foreseen_section
-from armid_ros.report.sections.plan import clearance_section, harmonics_section, motion_section
 import numpy as np
 
 _SAMPLES, _POSES, _WAY = 600, 6, 150
+#: Background of the largest harmonic of a joint [%].
+_SHADE = 55.0
 
 
 def excitation_report(
@@ -105,10 +125,10 @@ def excitation_report(
     sections: list[Section] = [
         _verdict(design, arm.robot.links, shares, checked, collision.notes),
         ContentSection('Poses', [poses, Legend(colours)]),
-        foreseen_section(design, arm.robot.links),
-        motion_section(limits, motion, shares),
-        clearance_section(motion.t, curves, design.settings.clearance, said),
-        harmonics_section(excitation.trajectory),
+        _foreseen_section(design, arm.robot.links),
+        _motion_section(limits, motion, shares),
+        _clearance_section(motion.t, curves, design.settings.clearance, said),
+        _harmonics_section(excitation.trajectory),
         _asked(design, arm, robot, obstacles, run),
         Origin(provenance or Provenance()),
     ]
@@ -247,3 +267,136 @@ def _asked(
 
 def _numbers(values: FloatArray) -> str:
     return ', '.join(f'{value:.3g}' for value in values)
+
+
+def _motion_section(
+    limits: Limits, motion: Motion, shares: Mapping[str, FloatArray]
+) -> ContentSection:
+    """Return the joints' paths, rates and torques with the limits in force."""
+    assert motion.tau is not None
+    quantities = (
+        ('position', motion.q, limits.lower, limits.upper),
+        ('velocity', motion.dq, -limits.velocity, limits.velocity),
+        ('acceleration', motion.ddq, -limits.acceleration, limits.acceleration),
+        ('torque', motion.tau, -limits.torque, limits.torque),
+    )
+    rows, panels = [], []
+    for j, joint in enumerate(limits.joints):
+        used = [f'{100.0 * s[j]:.0f} %' if s[j] > 0.0 else 'no limit' for s in shares.values()]
+        rows.append((joint, *used))
+        charts = [
+            Chart(
+                motion.t,
+                [Series(name, values[:, j], 'residual')],
+                'time [s]' if name == 'torque' else '',
+                f'{name} [{pretty(limits.unit(name, j))}]',
+                height=180 if name == 'torque' else 145,
+                link='planned',
+                levels=[Level(float(e[j])) for e in (lower, upper) if np.isfinite(e[j])],
+                legend=False,
+            )
+            for name, values, lower, upper in quantities
+        ]
+        panels.append((joint, '', charts))
+    return ContentSection(
+        'Motion and limits',
+        [
+            Paragraph(
+                'Largest share of each limit that the excitation uses. For positions it is '
+                'measured from the middle of the range. Approach and return may use the whole '
+                'range.'
+            ),
+            DataTable(('Joint', *shares), rows, kind='tight'),
+            Paragraph(f'Horizontal lines are the limits. {ZOOM}', 'hint'),
+            Panels(panels),
+        ],
+    )
+
+
+def _clearance_section(
+    t: FloatArray, curves: Mapping[str, FloatArray], margin: float, notes: Sequence[str]
+) -> ContentSection:
+    """Return how far bodies are apart, from each other and from the environment."""
+    roles: tuple[Role, ...] = ('residual', 'before')
+    blocks: list[PageBlock] = [
+        Chart(
+            t,
+            [
+                Series(name, 100.0 * curve, role)
+                for (name, curve), role in zip(curves.items(), roles, strict=False)
+            ],
+            'time [s]',
+            'distance [cm]',
+            height=240,
+            link='planned',
+            levels=[Level(100.0 * margin, f'{100.0 * margin:g} cm to keep')],
+        )
+    ]
+    if not curves:
+        none = 'the description has no collision bodies that could touch'
+        blocks = [Paragraph(f'Clearance is not checked: {none}.')]
+    if notes:
+        blocks.append(BulletList([(note, 'warn') for note in notes]))
+    return ContentSection('Clearance', blocks)
+
+
+def _harmonics_section(trajectory: FourierTrajectory) -> ContentSection:
+    """Return the velocity amplitude of each harmonic of each joint."""
+    size = np.hypot(trajectory.a, trajectory.b)
+    share = size / np.maximum(size.max(axis=1, keepdims=True), 1e-12)
+    frequencies = np.arange(1, trajectory.harmonics + 1) / trajectory.period
+    rows: list[Cells] = [
+        (
+            joint,
+            *(
+                TableCell(digits(a), shade=round(_SHADE * s))
+                for a, s in zip(size[j], share[j], strict=True)
+            ),
+        )
+        for j, joint in enumerate(trajectory.joints)
+    ]
+    said = (
+        'Velocity amplitude of each harmonic [rad/s or m/s]. The motion has no other frequencies.'
+    )
+    heads = ('Joint', *(f'{frequency:.3g} Hz' for frequency in frequencies))
+    return ContentSection('Spectrum', [Paragraph(said), DataTable(heads, rows)])
+
+
+def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
+    """Return what a planned run will determine of every parameter, the best known first."""
+    information, described = design.information, design.described
+    size = information.std / information.scale
+    longest: dict[int, float] = {}
+    for members in parameter_families(information.parameters).values():
+        own = max((float(size[k]) for k in members if np.isfinite(size[k])), default=1.0)
+        longest.update(dict.fromkeys(members, own))
+
+    def cells(k: int) -> Cells:
+        name, std, value = information.parameters[k], information.std[k], described[k]
+        seen, known = bool(np.isfinite(std)), name.rigid or bool(value)
+        relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
+        share = 100.0 * float(size[k]) / longest[k] if seen else 100.0
+        return (
+            f'{value:.3g}' if known else 'not known',
+            digits(float(std)) if seen else 'not seen',
+            relative if std < abs(value) or not relative else '> 100 %',
+            ShareBar(round(share, 1), 'residual' if seen else 'predicted'),
+        )
+
+    return ContentSection(
+        'Expected accuracy',
+        [
+            Paragraph(
+                'Predicted standard deviation of each parameter after the run, for the stated '
+                'torque noise and a correct model. Bars compare the torque uncertainty within '
+                'each kind.'
+            ),
+            *parameter_folds(
+                information.parameters,
+                ('Prior model', '± 1 \N{GREEK SMALL LETTER SIGMA}', 'Relative', ''),
+                cells,
+                links,
+                order=lambda k: float(size[k]),
+            ),
+        ],
+    )

@@ -7,14 +7,31 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 import re
 
+from armid_ros.arm import ArmModel
 from armid_ros.effects import Effect
-from armid_ros.estimate import ParameterName, symbol_in_words
-from armid_ros.identification.fitting.identifiability import HALF_WIDTH
-from armid_ros.report.blocks import Cells, DataTable, Fold, TableCell
-from armid_ros.report.notation import measured, pretty
+from armid_ros.estimate import Estimate, ParameterName, symbol_in_words
+from armid_ros.identification import Identification, Score
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH, Unidentified
+from armid_ros.motion import FloatArray
+from armid_ros.report.blocks import (
+    Cells,
+    ContentSection,
+    DataTable,
+    FactList,
+    Fold,
+    IntervalTrack,
+    Legend,
+    PageBlock,
+    Paragraph,
+    TableCell,
+)
+from armid_ros.report.notation import counted, digits, measured, pretty
+import numpy as np
 
 #: A parameter of a rigid body, and the number of its link.
 _SYMBOL = re.compile(r'\b(m[xyz]?|I[xyz]{2})(\d+)\b')
+#: Heads of the columns of friction, and the parameters in them.
+_FRICTION = {'viscous': 'viscous_coefficient', 'Coulomb': 'coulomb_torque'}
 
 
 def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str], list[int]]:
@@ -140,3 +157,109 @@ def estimate_text(value: float, std: float) -> tuple[str, str]:
     """Return a value and the half width of its 95 % interval; no number where that has zero."""
     number, reach = measured(value, HALF_WIDTH * std)
     return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach
+
+
+def parameter_section(
+    estimate: Estimate,
+    described: FloatArray,
+    unidentified: Sequence[Unidentified] = (),
+    links: Sequence[str] = (),
+    reference: str = 'description',
+) -> ContentSection:
+    """
+    Return every parameter beside the description's.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        P parameters.
+    described : ndarray, shape (P,)
+        Values of the description; zero for effects that it does not know.
+    unidentified : sequence of Unidentified
+        What the data do not determine.
+    links : sequence of str
+        Names of the links, in the order of their numbers.
+    reference : str
+        What ``described`` is: 'description', or 'truth' of a simulated arm.
+
+    """
+    names, values = estimate.parameters, estimate.values
+    reach = HALF_WIDTH * estimate.std
+    known = [name.rigid or bool(value) for name, value in zip(names, described, strict=True)]
+    changed = np.array(known) & (np.abs(values - described) > reach)
+
+    def cells(k: int) -> Cells:
+        number, half = estimate_text(float(values[k]), float(estimate.std[k]))
+        told = number != 'includes 0'
+        return (
+            TableCell(number, '' if told else 'unknown'),
+            half,
+            f'{digits(100.0 * float(reach[k]) / abs(float(values[k])))} %' if told else '> 100 %',
+            TableCell(f'{described[k]:.3g}' if known[k] else 'none', 'changed' * bool(changed[k])),
+            IntervalTrack(
+                float(values[k]), float(reach[k]), float(described[k]) if known[k] else None
+            ),
+        )
+
+    count = int(changed.sum())
+    blocks: list[PageBlock] = [
+        Paragraph(
+            f'The {reference} has values of {sum(known)} of these '
+            f'{counted(len(names), "parameter")}; {count} of them {"is" if count == 1 else "are"} '
+            'outside the 95 % interval of the estimate (in bold). Each bar has its own axis with '
+            'zero in the middle.'
+        ),
+        Legend([('after', 'estimate with its 95 % interval'), ('tick', reference)]),
+        *parameter_folds(names, ('Estimate', '± 95 %', 'Relative', reference, ''), cells, links),
+    ]
+    lost: dict[str, list[str]] = {}
+    for one in unidentified:
+        if one.parameter not in names:
+            reason = one.reason[:1].upper() + one.reason[1:]
+            lost.setdefault(reason, []).append(full_label(one.parameter, links))
+    if lost:
+        rows = [(reason, ', '.join(some)) for reason, some in lost.items()]
+        blocks.append(Fold('Not identified', [FactList(rows)], opened=True))
+    return ContentSection('Parameters', blocks)
+
+
+def joint_columns(
+    result: Identification, description: ArmModel, held_out: Score | None
+) -> dict[str, list[str]]:
+    """
+    Return the columns of a table with a row for each joint, by their heads.
+
+    Parameters
+    ----------
+    result : Identification
+        The identified model.
+    description : ArmModel
+        The model before.
+    held_out : Score or None
+        Errors on held-out recordings; those of the fit without.
+
+    """
+    estimate, joints = result.estimate, result.arm.robot.joints
+    errors = (held_out or Score.of(result.training)).joint_relative_error_percent
+    head = 'error (fit)' if held_out is None else 'error'
+    columns = {'joint': list(joints), head: [f'{digits(error)} %' for error in errors]}
+    for head, parameter in _FRICTION.items():
+        own = [k for k, one in enumerate(estimate.parameters) if one.name == parameter]
+        units = {estimate.parameters[k].unit for k in own}
+        cells = dict.fromkeys(joints, '-')
+        for k in own:
+            number, reach = estimate_text(float(estimate.values[k]), float(estimate.std[k]))
+            name = estimate.parameters[k]
+            unit = '' if len(units) == 1 else f' {pretty(name.unit)}'
+            cells[name.joint] = f'{number.replace("includes 0", "0")} ± {reach}{unit}'
+        if own:
+            unit = f' [{pretty(units.pop())}]' if len(units) == 1 else ''
+            columns[f'{head}{unit}'] = [cells[joint] for joint in joints]
+    described = result.base.values(description.theta)
+    differs = np.abs(estimate.values - described) > HALF_WIDTH * estimate.std
+    rigid = [
+        [k for k, one in enumerate(estimate.parameters) if one.rigid and one.joint == joint]
+        for joint in joints
+    ]
+    columns['not as URDF'] = [f'{differs[own].sum()} of {len(own)}' for own in rigid]
+    return columns

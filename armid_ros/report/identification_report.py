@@ -4,34 +4,49 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from armid_ros.arm import ArmModel
-from armid_ros.identification import Fit, Grade, Identification, Verification
+from armid_ros.identification import Fit, Grade, Identification, PhysicalCertificate, Verification
 from armid_ros.identification import grade as graded
+from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.identification.fitting.least_squares import IN_WORDS
 from armid_ros.recording import Recording
-from armid_ros.report.blocks import ContentSection, FactList
-from armid_ros.report.families import effects_in_words
+from armid_ros.report.blocks import (
+    BulletList,
+    ContentSection,
+    DataTable,
+    FactList,
+    Fold,
+    Paragraph,
+    TableCell,
+)
+from armid_ros.report.charts import Chart, Series
+from armid_ros.report.families import effects_in_words, full_label, parameter_section
 from armid_ros.report.judgement import judge
-from armid_ros.report.notation import counted, robot_label
+from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Page, Section
 from armid_ros.report.provenance import Provenance
-from armid_ros.report.sections.assessment import (
-    excitation_section,
-    noise_section,
-    physical_section,
-)
 from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
 from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
-from armid_ros.report.sections.parameters import parameter_section
-from armid_ros.report.sections.residuals import residual_section, whiteness_section
-from armid_ros.report.statistics import directions, torque_reach, torque_scale
+from armid_ros.report.statistics import (
+    Direction,
+    directions,
+    residual_section,
+    torque_reach,
+    torque_scale,
+    whiteness_section,
+)
+from armid_ros.robots import Robot
+import numpy as np
 
 #: Colour of each grade.
 TONES = {'good': 'good', 'poor': 'fair', 'unusable': 'bad'}
+#: Parameters and combinations of them that are listed.
+_WORST = 6
 
 
 @dataclass(frozen=True)
@@ -135,10 +150,10 @@ def identification_report(
             described.links,
             assessment.reference,
         ),
-        *([physical_section(result.physical, assessment.exports)] if result.physical else []),
-        excitation_section(result.condition_number, result.base.rank, worst, described.links),
+        *([_physical_section(result.physical, assessment.exports)] if result.physical else []),
+        _excitation_section(result.condition_number, result.base.rank, worst, described.links),
         whiteness_section(described, shown, role),
-        *([] if noise is None else [noise_section(described, noise)]),
+        *([] if noise is None else [_noise_section(described, noise)]),
         *assessment.sections,
         data_quality_section(read, described),
         _asked(result, robot, list(training), list(validation)),
@@ -172,3 +187,150 @@ def _asked(
         ('Held out', ', '.join(validation) or 'nothing'),
     ]
     return ContentSection('What was asked', [FactList(facts)])
+
+
+def _excitation_section(
+    condition_number: float, rank: int, directions: Sequence[Direction], links: Sequence[str]
+) -> ContentSection:
+    """Return how well a motion determines the parameters."""
+    rows = []
+    for direction in directions[:_WORST]:
+        parts = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in direction.parts]
+        rows.append((', '.join(parts), digits(direction.uncertainty)))
+    values = np.array([direction.uncertainty for direction in directions])
+    return ContentSection(
+        'Excitation',
+        [
+            Paragraph(
+                f'This motion identifies {counted(rank, "parameter")}. The condition number of '
+                f'the weighted regressor is {condition_number:.3g}.'
+            ),
+            Paragraph(
+                'The worst-determined combinations are listed first. Each number is the torque '
+                'uncertainty that the combination causes, over the standard deviation of the '
+                'residual.'
+            ),
+            DataTable((), rows),
+            Chart(
+                np.arange(1.0, len(values) + 1.0),
+                [Series('uncertainty', values, 'residual', 'sticks')],
+                'combination of parameters, worst known first',
+                'uncertainty / residual',
+                height=190,
+                legend=False,
+            ),
+        ],
+    )
+
+
+def _noise_section(robot: Robot, check: NoiseCheck) -> ContentSection:
+    """Return the test for errors in variables, and the bias that a simulation finds."""
+    noise = ', '.join(
+        f'{joint} {digits(1e3 * value)} m{unit}'
+        for joint, value, unit in zip(
+            robot.joints, check.position_noise, robot.position_units, strict=True
+        )
+    )
+    names = check.instrumental.parameters
+    rows = [
+        (
+            full_label(names[k], robot.links),
+            f'{check.bias[k]:.2g} {pretty(names[k].unit)}',
+            f'{check.bias_std[k]:.1g}',
+            f'{check.relative_bias[k]:+.2f}',
+        )
+        for k in np.argsort(-np.abs(check.relative_bias))[:_WORST]
+    ]
+    return ContentSection(
+        'Encoder noise',
+        [
+            Paragraph(
+                'Least squares assumes exact positions. The Durbin-Wu-Hausman test compares the '
+                'fit with an instrumental-variable fit, which encoder noise does not bias. The '
+                f'position noise of the recordings is {noise}.'
+            ),
+            BulletList(
+                [
+                    (f'{text[:1].upper()}{text[1:]}.', 'fine' if fine else 'warn')
+                    for text, fine in check.findings()
+                ]
+            ),
+            Fold(
+                'The largest biases', [DataTable(('Parameter', 'Bias', '±', 'Bias / std'), rows)]
+            ),
+        ],
+    )
+
+
+def _physical_section(
+    certificate: PhysicalCertificate, exports: Mapping[str, Sequence[str]]
+) -> ContentSection:
+    """Return the certificate of a fit with physically consistent links."""
+    quantifier = 'Every' if certificate.consistent else 'Not every'
+    training, held_out = (
+        100.0 * (ratio - 1.0) for ratio in (certificate.misfit_ratio, certificate.held_out_ratio)
+    )
+    rows = []
+    for link, share in zip(certificate.links, certificate.shares, strict=True):
+        active = link.link in certificate.active
+        rows.append(
+            (
+                link.link,
+                f'{link.mass:.4g}',
+                TableCell(', '.join(f'{value:.3g}' for value in link.eigenvalues), 'wraps'),
+                ', '.join(f'{value:.3g}' for value in link.moments),
+                digits(float(share)),
+                TableCell('active', 'telling') if active else 'inactive',
+            )
+        )
+    heads = (
+        'Link',
+        'Mass [kg]',
+        'Eigenvalues of the pseudo-inertia',
+        'Principal moments [kg m²]',
+        'Smallest share of prior',
+        'Constraint',
+    )
+    activity = [(line[:1].upper() + line[1:], '') for line in certificate.activity]
+    tried = [
+        tuple(
+            TableCell(text, 'changed' if weight == certificate.weight else '')
+            for text in (f'{weight:g}', f'{100 * (ratio - 1):+.2f} %')
+        )
+        for weight, ratio in certificate.tried
+    ]
+    head = 'Cross-validation error relative to the unconstrained fit'
+    return ContentSection(
+        'Physical consistency',
+        [
+            Paragraph(
+                f'{quantifier} link is physically consistent: all four eigenvalues of the '
+                'pseudo-inertia have to be positive. The constraints change the torque error by '
+                f'{training:.2f} % on the training data and by {held_out:+.2f} % in '
+                'cross-validation.'
+            ),
+            DataTable(heads, rows, (0, 5)),
+            BulletList(activity or [('No constraint is active.', 'fine')]),
+            Fold(
+                f'Weight of the description: {certificate.weight:g}, chosen by cross-validation',
+                [
+                    Paragraph('The largest weight whose error is not above the smallest one.'),
+                    DataTable(('Weight', head), tried, ()),
+                ],
+            ),
+            *_without_place(exports),
+        ],
+    )
+
+
+def _without_place(exports: Mapping[str, Sequence[str]]) -> list[Paragraph]:
+    """Return what each file for other programs has no place for."""
+    homeless = []
+    for file, lines in exports.items():
+        kinds = Counter(line.split(':')[0] for line in lines)
+        if kinds:
+            said = ', '.join(f'{kind} ({counted(n, "value")})' for kind, n in kinds.items())
+            homeless.append(
+                Paragraph(f'{file} has no place for {said}: a comment in it lists them.')
+            )
+    return homeless

@@ -11,10 +11,9 @@ from typing import NamedTuple
 from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.report.notation import counted, digits
-from armid_ros.report.statistics import Trend, Whiteness
+from armid_ros.report.statistics import explained_shares, TELLING_SHARE, Whiteness
 import numpy as np
 
 #: Ratio of the held-out to the training error from which the model is fitted to the noise.
@@ -24,12 +23,8 @@ _OVERFIT = 1.3
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
 #: Joints that a sentence names; more are counted.
 _LISTED = 3
-#: Share of a joint's residual that one variable explains, from which there is something to find.
-TELLING_SHARE = 0.15
 #: Share of the lags outside their 99 % band from which a residual is far from white.
 COLOURED_SHARE = 0.25
-#: Fewer samples of a residual go with nothing.
-_FEWEST = 20
 
 
 class Caution(NamedTuple):
@@ -260,25 +255,3 @@ def _verification_findings(verification: Verification | None) -> list[Caution]:
             )
         )
     return findings
-
-
-def residual_by_variable(
-    fits: Sequence[Fit], joint: int
-) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return a joint's residual, and its speed, position and load in the same samples, (N,)."""
-    used = np.concatenate([fit.informative[:, joint] for fit in fits])
-    parts = {
-        'speed': [fit.motion.dq for fit in fits],
-        'position': [fit.motion.q for fit in fits],
-        'load': [fit.predicted for fit in fits],
-    }
-    residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
-    return residual, {key: np.concatenate(own)[used, joint] for key, own in parts.items()}
-
-
-def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
-    """Return how much of a joint's residual goes with its speed, its position and its load."""
-    residual, axes = residual_by_variable(fits, joint)
-    if len(residual) < _FEWEST:
-        return {}
-    return {name: Trend.of(x, residual).share for name, x in axes.items()}

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 import math
 from pathlib import PurePath
 
@@ -11,6 +12,11 @@ from armid_ros.diagnosis.verdict import words
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+
+#: What is no number, or one that stands for none.
+DASH = '\N{EN DASH}'
+#: No quantity of an arm in SI units is as large.
+_NO_NUMBER = 1e12
 
 
 def pretty(unit: str) -> str:
@@ -21,12 +27,6 @@ def pretty(unit: str) -> str:
 def printed(text: str) -> str:
     """Return a sentence of a document, which is ASCII, as it is printed."""
     return pretty(text.replace('+-', '±'))
-
-
-#: What is no number, or one that stands for none.
-DASH = '\N{EN DASH}'
-#: No quantity of an arm in SI units is as large.
-_NO_NUMBER = 1e12
 
 
 def digits(value: float, count: int = 2) -> str:
@@ -103,3 +103,33 @@ def robot_label(source: str) -> str:
     """Return what a robot is called in a heading: its name, or that of its file."""
     path, *arguments = source.split(' ') if ':=' in source else [source]
     return ' '.join([PurePath(path).name or path, *arguments])
+
+
+def short_names(sources: Sequence[str]) -> dict[str, str]:
+    """
+    Return what each source is called: the end of its path that no other one has.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        Paths, or any other names.
+
+    """
+    every = list(dict.fromkeys(source for source in sources if source))
+    parts = {source: PurePath(source).parts for source in every}
+    names = {}
+    for source in every:
+        own = parts[source]
+        for count in range(1, len(own) + 1):
+            end = own[-count:]
+            if sum(other[-count:] == end for other in parts.values()) == 1:
+                break
+        names[source] = '/'.join(part.strip('/') for part in own[-count:])
+    return names
+
+
+def with_names(text: str, names: Mapping[str, str]) -> str:
+    """Return a text with names in the place of sources, the longest first."""
+    for source in sorted(names, key=len, reverse=True):
+        text = text.replace(source, names[source])
+    return text

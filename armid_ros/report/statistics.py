@@ -11,12 +11,29 @@ from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification import Fit, Identification
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
+from armid_ros.report.blocks import (
+    Cells,
+    ContentSection,
+    DataTable,
+    Fold,
+    Panels,
+    Paragraph,
+    TableCell,
+)
+from armid_ros.report.charts import Chart, Level, Series
+from armid_ros.robots import Robot
 import numpy as np
 
+#: Share of a joint's residual that one variable explains, from which there is something to find.
+TELLING_SHARE = 0.15
+#: Fewer samples of a residual go with nothing.
+_FEWEST = 20
 #: Two-sided 99 % point of the normal distribution.
 POINT_99 = 2.576
 #: Samples of the motion that the sensitivity of the torque is averaged over.
 _SAMPLES = 300
+#: Points of a cloud; more of them hide each other.
+_CLOUD = 500
 
 
 @dataclass(frozen=True)
@@ -153,3 +170,123 @@ def _some_columns(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     motion = max(fits, key=lambda fit: len(fit.motion)).motion
     chosen = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(np.intp))
     return np.asarray(result.arm.columns(motion.select(chosen))[:, :, result.base.independent])
+
+
+def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
+    """
+    Return the residual of each joint against its speed, its position and its load.
+
+    Parameters
+    ----------
+    robot : Robot
+        Gives joints and units.
+    fits : sequence of Fit
+        Held-out data where there are any.
+    role : str
+        'held-out' or 'training'.
+
+    """
+    shares = [list(explained_shares(fits, joint).values()) for joint in range(robot.n_joints)]
+    most = [max(own, default=0.0) for own in shares]
+    rows: list[Cells] = []
+    folds = []
+    for joint, name in enumerate(robot.joints):
+        cells: Cells = [
+            TableCell(f'{100 * share:.0f} %', 'telling' if share > TELLING_SHARE else '')
+            for share in shares[joint]
+        ]
+        rows.append([name, *(cells or ('too few samples in motion', '', ''))])
+        residual, axes = residual_by_variable(fits, joint)
+        torque, length = robot.torque_units[joint], robot.position_units[joint]
+        labels = (
+            f'speed [{length}/s]',
+            f'position [{length}]',
+            f'load: predicted torque [{torque}]',
+        )
+        charts = [
+            _cloud(x, residual, label, f'residual [{torque}]')
+            for x, label in zip(axes.values(), labels, strict=True)
+        ]
+        opened = most[joint] == max(most) or most[joint] > TELLING_SHARE
+        panels = Panels([('', '', [chart]) for chart in charts], three=True)
+        folds.append(Fold(name, [panels], opened))
+    return ContentSection(
+        'Residual by variable',
+        [
+            Paragraph(
+                f'Share of the {role} residual that one variable explains, beyond chance. Noise '
+                'depends on none. Wrong friction depends on speed; wrong gravity or masses on '
+                'position; gears and drives on load.'
+            ),
+            DataTable(('Joint', 'Speed', 'Position', 'Load'), rows),
+            *folds,
+            Paragraph('Dots: samples. Line: their mean in bins.', 'hint'),
+        ],
+    )
+
+
+def _cloud(x: FloatArray, residual: FloatArray, xlabel: str, ylabel: str) -> Chart:
+    """Draw a residual against a variable of the same samples, with its mean in bins."""
+    trend = Trend.of(x, residual)
+    chosen = np.unique(np.linspace(0, max(len(x) - 1, 0), min(_CLOUD, len(x))).astype(np.intp))
+    abscissa = np.concatenate([x[chosen], trend.centre])
+    points = np.concatenate([residual[chosen], np.full(len(trend.centre), np.nan)])
+    means = np.concatenate([np.full(len(chosen), np.nan), trend.mean])
+    order = np.argsort(abscissa, kind='stable')
+    return Chart(
+        abscissa[order],
+        [
+            Series('residual', points[order], 'residual', 'points'),
+            Series('mean', means[order], 'trend', 'trend'),
+        ],
+        xlabel,
+        ylabel,
+        height=190,
+        symmetric=True,
+        legend=False,
+    )
+
+
+def whiteness_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSection:
+    """Return the autocorrelation of the residuals with the band of white noise."""
+    panels = []
+    for joint, name in enumerate(robot.joints):
+        found = Whiteness.of(fits, joint)
+        chart = Chart(
+            found.lag,
+            [Series('autocorrelation', found.correlation, 'residual', 'sticks')],
+            'lag [s]',
+            'autocorrelation',
+            height=150,
+            levels=[Level(found.band, '99 %'), Level(-found.band)],
+            symmetric=True,
+            legend=False,
+        )
+        panels.append((name, f'{100 * found.outside:.0f} % of the lags outside', [chart]))
+    said = (
+        f'Autocorrelation of the {role} residual. Of white noise 1 % of the lags lie outside the '
+        'band; the filters colour the first lag or two.'
+    )
+    return ContentSection('Whiteness', [Paragraph(said), Panels(panels, three=True)])
+
+
+def residual_by_variable(
+    fits: Sequence[Fit], joint: int
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Return a joint's residual, and its speed, position and load in the same samples, (N,)."""
+    used = np.concatenate([fit.informative[:, joint] for fit in fits])
+    parts = {
+        'speed': [fit.motion.dq for fit in fits],
+        'position': [fit.motion.q for fit in fits],
+        'load': [fit.predicted for fit in fits],
+    }
+    residual = np.concatenate([fit.residual[:, joint] for fit in fits])[used]
+    return residual, {key: np.concatenate(own)[used, joint] for key, own in parts.items()}
+
+
+def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
+    """Return how much of a joint's residual goes with its speed, its position and its load."""
+    residual, axes = residual_by_variable(fits, joint)
+    if len(residual) < _FEWEST:
+        return {}
+    return {name: Trend.of(x, residual).share for name, x in axes.items()}

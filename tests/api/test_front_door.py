@@ -11,7 +11,7 @@ import sys
 import armid_ros as ar
 from armid_ros.api.table import LINES, Summary, WIDTH
 from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
-from armid_ros.report.fragment import fragment
+from armid_ros.report.page import fragment
 from armid_ros.report.sections.frame import VerdictSection
 import numpy as np
 import pytest

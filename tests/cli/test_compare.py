@@ -47,7 +47,7 @@ def test_a_change_is_said_in_words_and_on_a_page(tmp_path):
     )
     result = armid('compare', first, second, '--out', tmp_path / 'out')
     assert '1 of 2 parameters' in result.output
-    for fact in ('elbow', '0.08', '0.1', '+25 %', '0.0200 ± 0.0055 N m s/rad'):
+    for fact in ('elbow', '0.08', '0.1', '+25 %', '0.0200 ± 0.0055 N m s/rad (+25 %)'):
         assert fact in result.output
     page = (tmp_path / 'out' / 'report.html').read_text()
     assert '+25 %' in page

@@ -7,7 +7,7 @@ from io import BytesIO
 import json
 import re
 
-from armid_ros.report.bars import Bar, BarChart
+from armid_ros.report.blocks import Bar, BarChart
 from armid_ros.report.charts import (
     Chart,
     image_data,

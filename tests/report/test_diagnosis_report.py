@@ -11,18 +11,25 @@ from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
 from armid_ros.motion import Motion
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
-from armid_ros.report.notation import DASH, digits, percent, plain, with_interval
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras, Story, tone_of
+from armid_ros.report.notation import (
+    DASH,
+    digits,
+    percent,
+    plain,
+    short_names,
+    with_interval,
+    with_names,
+)
 from armid_ros.report.sections.diagnosed import (
     candidates_section,
     evidence_section,
+    gap_section,
     named_section,
+    overlay_section,
     shares_section,
 )
 from armid_ros.report.sections.fit import forward_section
-from armid_ros.report.sections.gap import gap_section, overlay_section
-from armid_ros.report.sections.story import Story
-from armid_ros.report.sources import short_names, with_names
 import numpy as np
 import pytest
 

@@ -3,9 +3,8 @@
 """Parameters that share an axis have one unit, which a heading says once."""
 
 from armid_ros.estimate import Estimate, ParameterName
-from armid_ros.report.families import full_label, grouping, parameter_families
+from armid_ros.report.families import full_label, grouping, parameter_families, parameter_section
 from armid_ros.report.notation import robot_label
-from armid_ros.report.sections.parameters import parameter_section
 import numpy as np
 import pytest
 

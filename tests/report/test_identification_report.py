@@ -17,12 +17,12 @@ from armid_ros.identification import (
 from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
+from armid_ros.report.families import parameter_section
+from armid_ros.report.identification_report import _noise_section as noise_section
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
-from armid_ros.report.sections.assessment import noise_section
 from armid_ros.report.sections.data_quality import data_quality_section, repeatability
 from armid_ros.report.sections.fit import fit_section
-from armid_ros.report.sections.parameters import parameter_section
 import numpy as np
 import pytest
 

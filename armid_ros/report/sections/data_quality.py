@@ -19,8 +19,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.notation import digits, plain
-from armid_ros.report.sources import with_names
+from armid_ros.report.notation import digits, plain, with_names
 from armid_ros.robots import Robot
 import numpy as np
 

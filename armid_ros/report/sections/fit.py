@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from armid_ros.identification import Fit, Score
 from armid_ros.identification.assess.verification import ForwardScore, ForwardValidation
 from armid_ros.motion import FloatArray
-from armid_ros.report.bars import Bar, BarChart
 from armid_ros.report.blocks import (
+    Bar,
+    BarChart,
     ContentSection,
     DataTable,
     Fold,

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.report.bars import BarChart
-from armid_ros.report.blocks import BulletList, ContentSection
+from armid_ros.report.blocks import BarChart, BulletList, ContentSection
 from armid_ros.report.page import Section
 from armid_ros.report.provenance import Provenance
 

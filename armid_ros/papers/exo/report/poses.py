@@ -11,8 +11,8 @@ from typing import ClassVar
 from armid_ros.model import point_motion
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
+from armid_ros.report.arm_drawing import flat, SIDE, Strip, svg_points
 from armid_ros.report.page import Section
-from armid_ros.report.strip import flat, SIDE, Strip, svg_points
 from armid_ros.robots import Robot
 import numpy as np
 
