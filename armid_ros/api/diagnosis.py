@@ -219,7 +219,17 @@ class DiagnosisResult(ShownModel):
             return self._with_notes(*(why or (nothing,)))
         return replace(self, extras=replace(self.extras, residual=found))
 
-    def with_simulations(self, progress: Progress) -> DiagnosisResult:
+    def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
+        """Learn the residual where that is wanted, simulate, and plan the next run."""
+        result = self
+        if residual:
+            progress(1.0, 'learning the residual')
+            result = self.with_residual(seed)
+        result = result._with_simulations(progress)
+        progress(1.0, 'next run')
+        return result._with_next_run(seed)
+
+    def _with_simulations(self, progress: Progress) -> DiagnosisResult:
         """Simulate the held-out recordings, with the model as it was and as it is patched."""
         if not self.held_out or self.core.gap is None:
             return self
@@ -236,7 +246,7 @@ class DiagnosisResult(ShownModel):
         extras = replace(self.extras, forward=forward)
         return replace(self, extras=extras)._with_notes(*left_out, *why)
 
-    def with_next_run(self, seed: int) -> DiagnosisResult:
+    def _with_next_run(self, seed: int) -> DiagnosisResult:
         """Plan a motion that separates names in doubt."""
         run, why = _tried('next run', lambda: next_run(self.core, np.random.default_rng(seed)))
         return replace(self, extras=replace(self.extras, next_run=run, no_run='; '.join(why)))

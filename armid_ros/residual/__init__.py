@@ -8,8 +8,13 @@ residual the map and the law predict, and a table for other programs.
 
 """
 
-from armid_ros.residual.learn import JointResidual, learn_residual, Residual, WORTH_A_MAP
-from armid_ros.residual.libraries import require_libraries
+from armid_ros.residual.learn import (
+    JointResidual,
+    learn_residual,
+    require_libraries,
+    Residual,
+    WORTH_A_MAP,
+)
 from armid_ros.residual.table import lookup_table, TABLE_FILE
 
 __all__ = [

@@ -18,7 +18,6 @@ import warnings
 
 from armid_ros.effects.learned import counted, TorqueMap
 from armid_ros.motion import FloatArray
-from armid_ros.residual.libraries import imported
 from armid_ros.residual.rows import JointRows
 import numpy as np
 import numpy.typing as npt
@@ -64,18 +63,15 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
     predicted : ndarray, shape (N,)
         Torque of each row by maps that were learned from other blocks [N m].
 
-    Raises
-    ------
-    IdentificationError
-        If the library is not installed.
-
     """
+    from sklearn.cluster import MiniBatchKMeans
+
     everywhere = np.ones(len(rows), dtype=bool)
     best: tuple[float, _Scales, _Cells] | None = None
     for share in _KNEES:
         knee = max(share * float(np.abs(rows.inputs[:, 1]).max()), 1e-9)
         count = max(1, min(_POINTS, len(rows) // _ROWS))
-        means = imported('sklearn.cluster').MiniBatchKMeans(
+        means = MiniBatchKMeans(
             count, n_init=1, random_state=int(rng.integers(2**31)), batch_size=1024
         )
         inputs = counted(rows.inputs, knee)
@@ -119,12 +115,12 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     """Return the greatest marginal likelihood, as a logarithm, and what has it."""
-    process = imported('sklearn.gaussian_process')
-    kernels = process.kernels
+    from sklearn.gaussian_process import GaussianProcessRegressor, kernels
+
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)
     amplitudes = tuple(one**2 for one in _AMPLITUDES)
     smooth = kernels.ConstantKernel(1.0, amplitudes) * kernels.RBF([0.3, 0.3, 1.0], _LENGTHS)
-    regressor = process.GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, _NOISES))
+    regressor = GaussianProcessRegressor(smooth + kernels.WhiteKernel(0.1, _NOISES))
     points = counted(cells.points, knee)
     span = _span(points)
     some = slice(None, None, max(1, len(points) // _FOR_SCALES))  # cells are in no order

@@ -13,11 +13,10 @@ Source: Brunton, Proctor and Kutz 2016; Pati, Rezaiifar and Krishnaprasad 1993.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 import warnings
 
 from armid_ros.motion import FloatArray
-from armid_ros.residual.libraries import imported
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 
@@ -29,21 +28,8 @@ _PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
 _LEAST_SHARE = 0.5
 
 
-@dataclass(frozen=True)
-class Term:
-    """
-    One term of a law.
-
-    Attributes
-    ----------
-    text : str
-        Its function of q, dq and the load w, such as 'dq^3'.
-    coefficient : float
-        Its factor.
-    unit : str
-        Unit of the factor.
-
-    """
+class Term(NamedTuple):
+    """A function of q, dq and the load w as text, such as 'dq^3'; its factor, and its unit."""
 
     text: str
     coefficient: float
@@ -147,11 +133,6 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     prismatic : bool
         Whether the joint slides.
 
-    Raises
-    ------
-    IdentificationError
-        If the library is not installed.
-
     """
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = library(rows.inputs, *ends, prismatic)
@@ -185,13 +166,13 @@ def share_of(left: FloatArray, torque: FloatArray) -> float:
 
 def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
     """Return factors, all but so many of them zero, shape (L,)."""
+    from sklearn.linear_model import orthogonal_mp
+
     size = np.sqrt(np.mean(x**2, axis=0))
     scale = np.where(size > 0.0, size, 1.0)
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')  # terms that depend on each other: the first one is taken
-        found = imported('sklearn.linear_model').orthogonal_mp(
-            x / scale, left, n_nonzero_coefs=count
-        )
+        found = orthogonal_mp(x / scale, left, n_nonzero_coefs=count)
     chosen = np.flatnonzero(found)
     factors = np.zeros(x.shape[1])
     factors[chosen] = np.linalg.lstsq(x[:, chosen], left, rcond=None)[0]

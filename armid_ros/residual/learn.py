@@ -12,13 +12,14 @@ from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects.learned import as_effect, TorqueMap
+from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import Law, share_of, suggest_law
-from armid_ros.residual.libraries import one_thread
 from armid_ros.residual.rows import BLOCKS, joint_rows, JointRows
 import numpy as np
 import numpy.typing as npt
+from threadpoolctl import threadpool_limits
 
 #: Verdicts that leave something without a name.
 WORTH_A_MAP = ('partial', 'unknown')
@@ -133,6 +134,30 @@ def percent_of(share: float) -> str:
     return f'{100.0 * share:.0f} %'
 
 
+def require_libraries() -> None:
+    """Raise IdentificationError where what learns is not installed; it says how to do that."""
+    try:
+        import sklearn  # noqa: F401 - is it there?
+    except ImportError:
+        raise IdentificationError(
+            'learning a residual needs scikit-learn, which is not installed: '
+            "pip install 'armid_ros[residual]'"
+        ) from None
+
+
+def _one_thread() -> threadpool_limits:
+    """
+    Return a context in which linear algebra has one thread.
+
+    Learning solves thousands of systems of a hundred rows. Two threads wait for each other
+    fifteen times as long as they compute.
+
+    """
+    import sklearn.linear_model  # noqa: F401
+
+    return threadpool_limits(1)
+
+
 def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:
     """
     Learn a map of the residual that a diagnosis does not explain.
@@ -158,6 +183,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         If a library is not installed.
 
     """
+    require_libraries()
     if diagnosis.verdict not in WORTH_A_MAP or diagnosis.explanation is None:
         return None
     base = diagnosis.arm if diagnosis.findings else diagnosis.explanation.fitted.arm
@@ -167,7 +193,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         validation = [overlay.trajectory for overlay in gap.overlays]
     every = joint_rows(base, diagnosis.data)
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
-    with one_thread():
+    with _one_thread():
         learned = [
             _learned(joint, rows, other, base, rng)
             for joint, rows, other in zip(base.robot.joints, every, unseen, strict=True)

@@ -78,12 +78,6 @@ def test_bars_are_as_long_as_their_values():
     assert '>1/4<' in chart.html()
 
 
-def test_bars_of_nothing_have_no_length():
-    chart = BarChart([('<b>', [Bar(0.0, 'floor', 'none')])])
-    assert 'width: 0.0%' in chart.html()
-    assert '<b>' not in chart.html() and '&lt;b&gt;' in chart.html()
-
-
 def test_an_image_is_a_png_of_its_pixels():
     colour = np.array([[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
     data = image_data(colour, np.array([[1.0, -0.5]]))

@@ -124,13 +124,6 @@ def test_causes_that_are_one_have_one_bar(found):
     assert sum(bar.value for _, bars in rows for bar in bars) == pytest.approx(1.0)
 
 
-def test_the_joint_where_it_lives_is_the_one_with_the_largest_bar(found):
-    gap = found.gap
-    excess = np.maximum(gap.chi2_before - 1.0, 0.0)
-    assert found.where[0].joint == found.arm.robot.joints[int(np.argmax(gap.chi2_before))]
-    assert found.where[0].share_of_gap == pytest.approx(excess.max() / excess.sum(), abs=0.05)
-
-
 def test_a_gap_of_the_fitted_data_alone_is_said_to_be_one(found):
     (_, before), *_ = Story(found).rows
     quiet_there = replace(found.gap, chi2_before=0.9 * np.ones(2), predicted=True)
@@ -161,11 +154,6 @@ def test_values_of_a_body_are_in_words_and_those_told_from_zero_come_first(found
     link = replace(found.findings[0], name='link_inertia', parameters=names, **numbers)
     rows = named_section((link,)).blocks[0].rows
     assert rows[0][1].endswith('of mass') and rows[1][1].endswith('along x')
-
-
-def test_nothing_is_named_and_nothing_patched_where_nothing_is(quiet):
-    assert '>consistent<' in quiet
-    assert '>Patch</h2>' not in quiet
 
 
 def test_a_model_that_simulates_worse_is_not_green(found, recordings, html):

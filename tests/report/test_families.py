@@ -4,7 +4,6 @@
 
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.report.families import full_label, grouping, parameter_families, parameter_section
-from armid_ros.report.notation import robot_label
 import numpy as np
 import pytest
 
@@ -21,12 +20,6 @@ def test_joints_that_slide_and_that_turn_are_kept_apart():
         ('Viscous coefficient', 'N m s/rad'): [1],
         ('Viscous coefficient', 'N s/m'): [2],
     }
-
-
-def test_a_heading_has_its_unit_once():
-    estimate = Estimate(NAMES, np.ones(3), 0.01 * np.eye(3))
-    text = parameter_section(estimate, np.ones(3)).html()
-    assert text.count('[N s/m]') == 1
 
 
 @pytest.mark.parametrize(
@@ -58,16 +51,3 @@ def test_a_group_is_a_sum_over_named_links():
     estimate = Estimate((name,), np.ones(1), 0.01 * np.eye(1))
     page = parameter_section(estimate, np.ones(1), links=links).html()
     assert f'<small>{words}' in page
-
-
-@pytest.mark.parametrize(
-    ('source', 'label'),
-    [
-        ('humanoid_arm', 'humanoid_arm'),
-        ('/a/long path/arm.urdf', 'arm.urdf'),
-        ('../arm.xacro tool:=true side:=/left', 'arm.xacro tool:=true side:=/left'),
-        ('-', '-'),
-    ],
-)
-def test_a_robot_is_called_as_its_file(source, label):
-    assert robot_label(source) == label

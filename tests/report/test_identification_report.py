@@ -14,11 +14,9 @@ from armid_ros.identification import (
     PhysicalSettings,
     verify,
 )
-from armid_ros.identification.assess.consistency import NoiseCheck
 from armid_ros.motion import Motion
 from armid_ros.recording import Recording
 from armid_ros.report.families import parameter_section
-from armid_ros.report.identification_report import _noise_section as noise_section
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
 from armid_ros.report.sections.data_quality import data_quality_section, repeatability
@@ -180,18 +178,6 @@ def test_what_was_put_to_a_test_has_a_section(case, whole):
         assert link in reader.text
     assert 'identified.urdf' in reader.text and 'torque_offset (3 values)' in reader.text
     assert re.search(r'[0-9.]+ mrad, [0-9.]+ N m', reader.text)
-
-
-def test_a_test_that_fires_has_no_tick(case):
-    estimate = case.result.estimate
-    noise = np.full(6, 1e-6)
-    check = NoiseCheck(
-        90.0, 2.0, 1e-9, estimate, noise, 0.01 * estimate.std, 0.0 * estimate.std, estimate.std
-    )
-    for p_value, tick in ((1e-9, 'warn'), (0.5, 'fine')):
-        html = noise_section(case.result.arm.robot, replace(check, p_value=p_value)).html()
-        assert f'class="{tick}">Durbin' in html
-        assert 'class="fine">Position' in html
 
 
 def test_what_the_data_do_not_tell_is_no_number(case):

@@ -3,6 +3,7 @@
 """What is learned of a residual: maps that predict it, nothing of noise, and the law behind it."""
 
 from dataclasses import replace
+import sys
 
 from armid_ros.diagnosis import diagnose
 from armid_ros.errors import IdentificationError
@@ -159,9 +160,6 @@ def test_a_name_is_never_replaced(unknown):
 
 
 def test_a_missing_library_is_said_with_what_to_install(unknown, monkeypatch):
-    def refuse(name, *args, **kwargs):
-        raise ImportError(name)
-
-    monkeypatch.setattr('armid_ros.residual.libraries.import_module', refuse)
+    monkeypatch.setitem(sys.modules, 'sklearn', None)
     with pytest.raises(IdentificationError, match=r'armid_ros\[residual\]'):
         learn_residual(replace(unknown, verdict='unknown'), np.random.default_rng(0))

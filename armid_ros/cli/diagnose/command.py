@@ -10,12 +10,11 @@ from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import columns, parameters
 from armid_ros.cli.diagnose import partner as partner_options
-from armid_ros.cli.terminal import progress, Tick
+from armid_ros.cli.terminal import progress
 from armid_ros.errors import ArmidError
 import click
 
 if TYPE_CHECKING:
-    from armid_ros.api.diagnosis import DiagnosisResult
     from armid_ros.arm import ArmModel
     from armid_ros.robots import Robot
 
@@ -183,24 +182,12 @@ def diagnose(
         )
         result.fill(staged.folder, origin)
         staged.keep()
-        result = _with_extras(result, residual is not None, seed, tick)
+        result = result.with_extras(residual is not None, seed, tick)
         tick(1.0, 'writing')
         summary = result.summary(str(out / 'model.yaml'))
         options.deliver(result, staged, origin, as_json, summary)
     stopped = {'bad_data': 2, **({'unknown': 3, 'not_repeatable': 3} if strict else {})}
     click.get_current_context().exit(stopped.get(result.verdict, 0))
-
-
-def _with_extras(
-    result: DiagnosisResult, residual: bool, seed: int, tick: Tick
-) -> DiagnosisResult:
-    """Learn the residual where that is wanted, simulate, and plan the next run."""
-    if residual:
-        tick(1.0, 'learning the residual')
-        result = result.with_residual(seed)
-    result = result.with_simulations(tick)
-    tick(1.0, 'next run')
-    return result.with_next_run(seed)
 
 
 def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
