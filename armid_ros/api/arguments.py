@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import RecordingError
+from armid_ros.motion import FloatArray
 from armid_ros.recording import ReadSettings, Recording, Topic
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.message_types import JOINT_STATE
@@ -42,6 +43,24 @@ Progress = Callable[..., None]
 
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
+
+
+class DesignKeywords(TypedDict, total=False):
+    """Further keywords of `armid_ros.design_excitation`, which has what they are."""
+
+    speed: str | float
+    criterion: str
+    target: str
+    focus: tuple[str, ...]
+    harmonics: int
+    acceleration: FloatArray | None
+    noise: FloatArray | None
+    clearance: float
+    starts: int
+    iterations: int
+    candidates: int
+    processes: int
+    time_budget: float
 
 
 def robot_of(robot: RobotLike) -> Robot:
@@ -207,16 +226,11 @@ def read_all_joints(
         A bag or a table.
     topics : tuple of Topic
         Topics of the bag.
-    joints : sequence of str, optional
-        Which joints; by default all of the topic, or of the table.
-    topic : str, optional
-        JointState topic; by default the one with the most messages.
-    columns : ColumnSettings, optional
-        What is known of a table and of units.
-    show : callable, optional
-        Is given how a table is read.
-    settings : ReadSettings
-        How a bag is read.
+    joints, topic : optional
+        Which joints, by default all of the topic or table; and which topic, by default the one
+        with the most messages.
+    columns, show, settings : optional
+        What is known of a table and of units; is given how a table is read; how a bag is read.
 
     Raises
     ------

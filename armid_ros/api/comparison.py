@@ -15,7 +15,6 @@ from armid_ros.identification.assess.comparison import Comparison
 from armid_ros.identification.parameters_file import ParameterFile, parameters_of, read_parameters
 
 if TYPE_CHECKING:
-    from armid_ros.report.page import Section
     import pandas
 
 
@@ -73,18 +72,6 @@ class ComparisonResult(Shown):
         rows = change_rows(self.core)
         first, *more = tell(self.core)
         return Summary(first, verdict(self.core)[0], HEADS if rows else (), rows, lines=more)
-
-    def tone(self) -> str:
-        """Return the colour that stands for a change, or for models that describe no arm."""
-        from armid_ros.report.compare_report import verdict
-
-        return verdict(self.core)[1]
-
-    def sections(self) -> list[Section]:
-        """Return the parameters, those that changed first to be seen."""
-        from armid_ros.report.compare_report import changes_section
-
-        return [changes_section(self.core)]
 
 
 def compare(

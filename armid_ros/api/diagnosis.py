@@ -44,7 +44,7 @@ from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
-from armid_ros.report.diagnosis_report import diagnosis_report, Extras, tone_of
+from armid_ros.report.diagnosis_report import diagnosis_report, Extras
 from armid_ros.report.notation import printed
 from armid_ros.report.sections.diagnosed import named_rows
 from armid_ros.residual import (
@@ -60,7 +60,6 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from armid_ros.report.page import Section
     import pandas
 
 _Made = TypeVar('_Made')
@@ -265,19 +264,6 @@ class DiagnosisResult(ShownModel):
             self.extras.sentences(self.core),
             self.extras.steps(self.core, model),
         )
-
-    def tone(self) -> str:
-        """Return the colour of the verdict."""
-        return tone_of(self.core)
-
-    def sections(self) -> list[Section]:
-        """Return the gap of every joint, before and after."""
-        from armid_ros.report.sections.diagnosed import gap_section
-
-        gap, robot = self.core.gap, self.description.robot
-        if gap is None:
-            return []
-        return [gap_section(robot, gap, self.core.baseline, bool(self.core.findings))]
 
 
 def diagnose(

@@ -8,10 +8,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING, Unpack
 
-from armid_ros.api.arguments import arm_of, RecordingLike, recordings_of, Rng, RobotLike
+from armid_ros.api.arguments import (
+    arm_of,
+    DesignKeywords,
+    RecordingLike,
+    recordings_of,
+    Rng,
+    RobotLike,
+)
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
@@ -34,7 +40,7 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
-from armid_ros.files import json_text, settled, write_file
+from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray, Motion
@@ -123,9 +129,8 @@ class ExcitationResult(Shown):
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the waypoints as a pandas table: t, and q, dq, ddq of every joint."""
         motion = self.motion()
-        columns = {'t': motion.t}
+        columns, parts = {'t': motion.t}, {'q': motion.q, 'dq': motion.dq, 'ddq': motion.ddq}
         for k, joint in enumerate(motion.joints):
-            parts = {'q': motion.q, 'dq': motion.dq, 'ddq': motion.ddq}
             columns |= {f'{name}_{joint}': values[:, k] for name, values in parts.items()}
         return data_frame(columns)
 
@@ -225,52 +230,49 @@ class ExcitationResult(Shown):
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
         document = self.document(origin)
         write_file(folder / 'excitation.json', json_text(document, indent=1))
-        path = folder / 'report.html'
-        try:
-            write_file(path, self.page(origin))
-        except Exception as error:  # whatever it is, the trajectory is written and good
-            said = f'{settled(path)}: not written: {type(error).__name__}: {error}'
-            print(said, file=sys.stderr)
+        write_file(folder / 'report.html', self.page(origin))
         return document
 
     def summary(self) -> Summary:
         """Return how much of its limits every joint uses."""
         shares = self.core.limits_used(self.arm)
-        joints = self.arm.robot.joints
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
-            for k, joint in enumerate(joints)
+            for k, joint in enumerate(self.arm.robot.joints)
         ]
-        pose = [
-            f'{joint} {value:.3g} {unit}'
-            for joint, value, unit in zip(
-                joints, self.start, self.arm.robot.position_units, strict=True
-            )
-            if value
-        ]
-        where = f'{", ".join(pose) or "zero"}' + ', the others at zero' * (
-            0 < len(pose) < len(joints)
-        )
-        fault = '' if self.given_start is not None else self.planner.free_start()[1]
-        information = self.core.information
+        information, speed = self.core.information, self.core.settings.speed
         unseen = int(np.sum(~np.isfinite(information.std)))
-        stopped = self.core.stopped
         return Summary(
-            f'{self.core.settings.speed}: condition number {information.condition:.1f}, '
+            f'{speed}: condition number {information.condition:.1f}, '
             f'{len(information.parameters)} parameters' + f', {unseen} not seen' * bool(unseen),
             heads=('joint', *(f'{name} used' for name in shares)),
             rows=rows,
-            lines=(
-                str(self.fitness),
-                f'starts at rest at {where}'
-                + f' (the zero of the description is not free: {fault})' * bool(fault)
-                + f', is on the trajectory after {self.run.approach.duration:.1f} s and back '
-                f'after {self.run.duration:.1f} s',
-                f'stopped early ({stopped}): the best so far, not what the seed would give'
-                if stopped
-                else '',
-            ),
+            lines=self._of_run(),
         )
+
+    def _of_run(self) -> list[str]:
+        """Say whether the run is fit, where it starts, and whether the search was stopped."""
+        try:
+            run, fit = self.run, str(self.fitness)
+        except TrajectoryError as error:
+            return [f'there is no way to the trajectory: {error}']
+        robot = self.arm.robot
+        fault = self.planner.free_start()[1] if self.given_start is None else ''
+        pose = [
+            f'{joint} {value:.3g} {unit}'
+            for joint, value, unit in zip(
+                robot.joints, self.start, robot.position_units, strict=True
+            )
+            if value
+        ]
+        begin = f'starts at rest at {", ".join(pose) or "zero"}'
+        begin += f' (the zero of the description is not free: {fault})' * bool(fault)
+        on = f'is on the trajectory after {run.approach.duration:.1f} s'
+        lines = [fit, f'{begin}, {on} and back after {run.duration:.1f} s']
+        if self.core.stopped:
+            best = 'the best so far, not what the seed would give'
+            lines.append(f'stopped early ({self.core.stopped}): {best}')
+        return lines
 
 
 def design_excitation(
@@ -279,7 +281,6 @@ def design_excitation(
     duration: float = 24.0,
     periods: int = 2,
     rng: Rng = 0,
-    time_budget: float | None = None,
     floor: str | float | None = None,
     environment: str | Path | None = None,
     joint_limits: str | Path | Mapping[str, float] | None = None,
@@ -287,19 +288,8 @@ def design_excitation(
     start: FloatArray | None = None,
     after: RecordingLike | Sequence[RecordingLike] = (),
     rival: ArmModel | None = None,
-    speed: str | float = 'fast',
-    criterion: str = 'D',
-    target: str = 'all',
-    focus: Sequence[str] = (),
-    harmonics: int = 5,
-    acceleration: FloatArray | None = None,
-    noise: FloatArray | None = None,
-    clearance: float = 0.01,
-    starts: int | None = None,
-    iterations: int = 200,
-    candidates: int = 25,
-    processes: int = 2,
     progress: Callable[[DesignProgress], None] | None = None,
+    **settings: Unpack[DesignKeywords],
 ) -> ExcitationResult:
     """
     Find a trajectory that shows the parameters, inside all limits and free of collisions.
@@ -316,8 +306,6 @@ def design_excitation(
         How often the trajectory is run through; two tell noise from what a model lacks.
     rng : int or Generator
         Seed, or source of randomness.
-    time_budget : float, optional
-        Processor time [s]: by default 120, and above 20 joints 25 and one search.
     floor : str or float, optional
         Height of the floor above the origin of the base [m], or 'none'; by default the base plane
         of an arm that stands, or what is shipped with the robot.
@@ -334,26 +322,28 @@ def design_excitation(
         Recordings whose information the trajectory adds to.
     rival : ArmModel, optional
         With ``criterion='T'``: what may be there in place of the effects of ``arm``.
+    progress : callable, optional
+        Called with the progress of the search.
     speed : str or float
         'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
     criterion : {'D', 'A', 'E', 'condition', 'T'}
         What is made best; 'T' tells the arm from ``rival``.
     target : {'all', 'gravity', 'effects'}
         Of which parameters.
-    focus : sequence of str
+    focus : tuple of str
         Names of effects to see best, everything else being fitted too.
     harmonics : int
         Fourier harmonics per joint.
-    acceleration, noise : ndarray, shape (n,), optional
+    acceleration, noise : ndarray, shape (n,)
         Acceleration limits [rad/s^2 or m/s^2], by default the top speed in 0.25 s; standard
         deviation of the torque noise [N m or N], by default 1 % of the torque limits.
     clearance : float
         Distance between bodies that may touch [m].
-    starts, iterations, candidates, processes : int
+    starts, iterations, candidates : int
         Searches, by default 4, and 1 above 20 joints; iterations of each; random trajectories
-        that each begins with; searches at a time.
-    progress : callable, optional
-        Called with the progress of the search.
+        that they begin with.
+    time_budget : float
+        Processor time [s]: by default 120, and above 20 joints 25.
 
     Returns
     -------
@@ -379,40 +369,27 @@ def design_excitation(
         _require_one_arm(model.robot, arm)
     if joint_limits is not None:
         model, known = _limited(model, joint_limits)
-        acceleration = known if acceleration is None else acceleration
+        settings.setdefault('acceleration', known)
     many = model.robot.n_joints > _MANY_JOINTS
+    usual: DesignKeywords = {'time_budget': 25.0, 'starts': 1} if many else {'time_budget': 120.0}
     run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
-    settings = DesignSettings(
-        period=whole_period(duration, periods, run_in, WAYPOINT_RATE),
-        n_periods=periods,
-        run_in=run_in,
-        speed=speed,
-        criterion=criterion,
-        target=target,
-        focus=tuple(focus),
-        harmonics=harmonics,
-        acceleration=acceleration,
-        noise=noise,
-        clearance=clearance,
-        starts=starts or (1 if many else 4),
-        iterations=iterations,
-        candidates=candidates,
-        processes=processes,
-        time_budget=(25.0 if many else 120.0) if time_budget is None else time_budget,
+    period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
+    asked = DesignSettings(
+        period=period, n_periods=periods, run_in=run_in, **{**usual, **settings}
     )
     if scene is None:
         height = None if floor is None else str(floor)
-        scene = CollisionScene.of(model.robot, clearance, height, environment)
-    fault = '' if start is None else _planner(model, settings, scene).fault(start)
+        scene = CollisionScene.of(model.robot, asked.clearance, height, environment)
+    fault = '' if start is None else _planner(model, asked, scene).fault(start)
     if fault:
         raise TrajectoryError(f'--start: {fault}')
     earlier = recordings_of(after, model.robot)
     found = design(
         model,
-        settings,
+        asked,
         np.random.default_rng(rng),
         collision=scene.bodies,
-        prior_information=_information(model, settings, earlier, rng) if earlier else None,
+        prior_information=_information(model, asked, earlier, rng) if earlier else None,
         rival=rival,
         progress=progress,
     )

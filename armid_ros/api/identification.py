@@ -55,7 +55,6 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from armid_ros.report.page import Section
     import pandas
 
 
@@ -265,30 +264,6 @@ class IdentificationResult(ShownModel):
             ),
             steps[:1],
         )
-
-    def tone(self) -> str:
-        """Return the colour of the grade."""
-        from armid_ros.report.identification_report import TONES
-
-        return TONES[self.grade]
-
-    def sections(self) -> list[Section]:
-        """Return the errors of the joints, and all parameters."""
-        from armid_ros.report.blocks import ContentSection, Paragraph
-        from armid_ros.report.families import parameter_section
-        from armid_ros.report.sections.fit import by_recording, error_bars
-
-        described, robot = self.core.base.values(self.description.theta), self.arm.robot
-        said = Paragraph(
-            'Relative error of each joint: rms of the residual over rms of the torque.'
-        )
-        return [
-            ContentSection(
-                'Errors',
-                [said, error_bars(robot, by_recording(self.core.training), self.validation)],
-            ),
-            parameter_section(self.estimate, described, self.core.unidentified, robot.links),
-        ]
 
 
 def identify(

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""How results show themselves: ten lines in a terminal, a table in a notebook."""
+"""How results show themselves: ten lines in a terminal, the report in a notebook."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text, result_folder, staged, write_file
 from armid_ros.robots import Robot
+from markupsafe import escape
 
 if TYPE_CHECKING:
-    from armid_ros.report.page import Section
     from armid_ros.report.provenance import Provenance
     import pandas
 
@@ -168,27 +168,9 @@ class Shown(ABC):
         """Return at most ten lines."""
         return self.summary().text()
 
-    def tone(self) -> str:
-        """Return the colour of the badge in a notebook: good, fair, bad, or none."""
-        return ''
-
-    def sections(self) -> Sequence[Section]:
-        """Return sections of the report that a notebook shows below the summary."""
-        return ()
-
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
-        from armid_ros.report.blocks import ContentSection, DataTable, PageBlock, Paragraph
-        from armid_ros.report.page import fragment
-        from armid_ros.report.sections.frame import VerdictSection
-
-        said = self.summary()
-        blocks: list[PageBlock] = [VerdictSection(said.badge, self.tone(), [said.title])]
-        if said.rows:
-            blocks.append(DataTable(said.heads, said.rows))
-        below = [*said.lines, *(f'next: {step}' for step in said.steps)]
-        blocks += [Paragraph(line, 'hint') for line in below]
-        return fragment([ContentSection('', blocks), *self.sections()])
+        """Return what a notebook shows: the report, in a frame of its own."""
+        return f'<iframe srcdoc="{escape(self.page())}" width="100%" height="640"></iframe>'
 
 
 class ShownModel(Shown):

@@ -21,10 +21,6 @@ from armid_ros.report.notation import counted, digits, plain, pretty
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-CLASS = 'armid-result'
-#: Sections that are unfolded at first.
-_OPEN = 2
-
 
 class Templated:
     """
@@ -130,29 +126,3 @@ def _environment(package: str) -> Environment:
 def asset(name: str) -> Markup:
     """Return a file of assets/, which is part of this package and trusted."""
     return Markup((files('armid_ros.report') / 'assets' / name).read_text(encoding='utf-8'))
-
-
-def fragment(sections: Sequence[Section]) -> str:
-    """
-    Return sections as HTML to be put into another page.
-
-    Parameters
-    ----------
-    sections : sequence of Section
-        In order; those without a title are shown as they are.
-
-    """
-    values = {'class': CLASS, 'style': _style(), 'sections': sections, 'n_open': _OPEN}
-    return str(render('fragment.html', values))
-
-
-@cache
-def _style() -> str:
-    """Return the style of the reports, below one class."""
-    css = str(asset('report.css'))
-    css = css[: css.index('@media print')]
-    css = re.sub(r'/\*.*?\*/', '', css, flags=re.DOTALL)
-    css = re.sub(r'(?m)^html \{.*\}\n', '', css)
-    css = re.sub(r':root(:not\(\.paper\))?(?= \{)', '&', css)
-    css = re.sub(r'(?m)^( *)body(?= \{)', r'\1&', css)
-    return f'.{CLASS} {{{css}& {{ margin: 0; padding: 8px 12px; }}}}'

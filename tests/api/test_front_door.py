@@ -10,9 +10,6 @@ import sys
 
 import armid_ros as ar
 from armid_ros.api.table import LINES, Summary, WIDTH
-from armid_ros.report.blocks import ContentSection, DataTable, Paragraph
-from armid_ros.report.page import fragment
-from armid_ros.report.sections.frame import VerdictSection
 import numpy as np
 import pytest
 
@@ -92,9 +89,7 @@ def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tm
     assert short(model)
     assert repr(model).startswith('GOOD') and 'elbow_pitch' in repr(model)
     html = model._repr_html_()
-    assert html.count('<tr>') > 50
-    assert html.count('bar role-after') == 6
-    assert 'class="badge">good' in html
+    assert html.startswith('<iframe srcdoc="&lt;!doctype html') and html.count('"') == 6
     assert model.report(tmp_path / 'page.html').read_text().startswith('<!')
     table = model.to_dataframe()
     assert list(table.columns) == ['name', 'joint', 'value', 'std', 'unit']
@@ -193,25 +188,6 @@ def test_a_summary_of_many_joints_stays_short_and_says_so():
     assert len(text.splitlines()) <= LINES
     assert max(map(len, text.splitlines())) <= WIDTH
     assert 'more' in text
-
-
-def test_names_are_escaped_in_a_notebook():
-    blocks = [
-        VerdictSection('<em>', '', ['<q>']),
-        DataTable(('<i>',), [('<u>',)]),
-        Paragraph('<s>'),
-    ]
-    html = fragment([ContentSection('', blocks)])
-    assert all(tag not in html for tag in ('<em>', '<q>', '<i>', '<u>', '<s>'))
-
-
-def test_what_a_notebook_shows_keeps_its_style_to_itself(model):
-    """Every rule stands below the class of the result; what is nested is closed."""
-    html = model._repr_html_()
-    style = html[html.index('<style>') + 7 : html.index('</style>')]
-    assert style.startswith('.armid-result {')
-    assert style.count('{') == style.count('}')
-    assert not any(word in style for word in (':root', 'html {', 'body {', '@page'))
 
 
 def test_what_lies_inside_of_results_prints_in_a_few_lines(model, runs):

@@ -241,13 +241,13 @@ def excite(
             start=options.per_joint(start, robot, '--start'),
             after=options.read(after, robot, None),
             rival=other,
-            focus=[name.partition('@')[0] for name in parted(focus) if name],
+            focus=tuple(name.partition('@')[0] for name in parted(focus) if name),
             acceleration=limits,
             noise=options.per_joint(torque_noise, robot, '--torque-noise'),
             clearance=clearance,
             rng=seed,
             progress=lambda now: tick(now.done, f'designing, cost {now.cost:.2f}'),
-            **settings,
+            **{name: value for name, value in settings.items() if value is not None},
         )
         tick(1.0, 'writing')
         origin = ResultOrigin(robot_source, provenance=provenance(read, seed=seed))
