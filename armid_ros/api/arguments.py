@@ -59,7 +59,6 @@ class DesignKeywords(TypedDict, total=False):
     starts: int
     iterations: int
     candidates: int
-    processes: int
     time_budget: float
 
 

@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
@@ -27,11 +26,8 @@ _LISTED = 3
 COLOURED_SHARE = 0.25
 
 
-class Caution(NamedTuple):
-    """Something to beware of, and what to do about it, if anything."""
-
-    text: str
-    step: str = ''
+#: Something to beware of, and what to do about it; either may be empty.
+Caution = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -79,27 +75,23 @@ def judge(
     training = Score.of(result.training)
     fits = [fit for part in validation.values() for fit in part]
     held_out = Score.of(fits) if fits else None
-    findings = [
-        *[
-            Caution(f'{recording.source or "A recording"}: {recording.report.describe()}')
+    findings: list[Caution] = [
+        *(
+            (f'{recording.source or "A recording"}: {recording.report.describe()}', '')
             for recording in recordings
             if not recording.report.unharmed
-        ],
-        *_error_findings(result, training, held_out),
-        *_residual_findings(result, fits or result.training),
-        *_excitation_findings(result),
-        *_verification_findings(verification),
-        *(Caution(note[0].upper() + note[1:] + '.') for note in _notes(result)),
+        ),
+        *_of_errors(result, training, held_out),
+        *_of_residuals(result, fits or result.training),
+        *([] if verification is None else _of_verification(verification)),
+        *((note[0].upper() + note[1:] + '.', '') for note in _notes(result)),
     ]
-    steps = [finding.step for finding in findings if finding.step]
+    steps = [step for _, step in findings if step]
     if held_out is not None and not steps:
         steps = ['The model can be used within the range of the held-out data.']
     return Judgement(
-        sentences=(
-            _what(result),
-            *_simulated(verification),
-        ),
-        beware=tuple(finding.text for finding in findings if finding.text),
+        sentences=(_what(result), *_simulated(verification)),
+        beware=tuple(text for text, _ in findings if text),
         next_steps=tuple(dict.fromkeys(steps)),
     )
 
@@ -142,35 +134,30 @@ def _simulated(verification: Verification | None) -> list[str]:
     ]
 
 
-def _error_findings(
+def _of_errors(
     result: Identification, training: Score, held_out: Score | None
-) -> list[Caution]:
-    findings = []
+) -> Iterator[Caution]:
+    """Yield what the errors on training and on held-out data mean."""
     if held_out is None:
-        findings.append(Caution('', 'Record another motion and validate with it.'))
+        yield '', 'Record another motion and validate with it.'
     else:
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         if ratio > _OVERFIT:
-            findings.append(
-                Caution(
-                    f'The held-out error is {digits(ratio)} times the training error: the model '
-                    'overfits, the held-out motion leaves its range, or the arm has changed.',
-                    'Train on more recordings, over all poses and speeds that matter. If the arm '
-                    'may have changed, run armid diagnose.',
-                )
+            yield (
+                f'The held-out error is {digits(ratio)} times the training error: the model '
+                'overfits, the held-out motion leaves its range, or the arm has changed.',
+                'Train on more recordings, over all poses and speeds that matter. If the arm '
+                'may have changed, run armid diagnose.',
             )
     errors = (held_out or training).joint_relative_error_percent
     joints = result.arm.robot.joints
     bad = [(joint, e) for joint, e in zip(joints, errors, strict=True) if e > LIMITS.poor]
     if bad:
-        findings.append(
-            Caution(
-                'Poorly predicted: ' + ', '.join(f'{j} ({digits(e)} %)' for j, e in bad) + '.',
-                f'Compare the residual of {", ".join(joint for joint, _ in bad)} with its torque '
-                'noise, and run armid diagnose.',
-            )
+        yield (
+            'Poorly predicted: ' + ', '.join(f'{j} ({digits(e)} %)' for j, e in bad) + '.',
+            f'Compare the residual of {", ".join(joint for joint, _ in bad)} with its torque '
+            'noise, and run armid diagnose.',
         )
-    return findings
 
 
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ...]:
@@ -188,70 +175,53 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
     return (text,) if parts else ()
 
 
-def _residual_findings(result: Identification, fits: Sequence[Fit]) -> list[Caution]:
-    findings = []
-    coloured = []
+def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Caution]:
+    """Yield what residuals and excitation mean."""
     joints = result.arm.robot.joints
     for sentence in residual_trends(joints, fits):
-        step = 'Run armid diagnose to find the missing effect, and add it with --effects.'
-        findings.append(Caution(sentence, step))
-    for joint, name in enumerate(joints):
-        if Whiteness.of(fits, joint).outside > COLOURED_SHARE:
-            coloured.append(name)
+        yield sentence, 'Run armid diagnose to find the missing effect, and add it with --effects.'
+    coloured = [
+        name
+        for joint, name in enumerate(joints)
+        if Whiteness.of(fits, joint).outside > COLOURED_SHARE
+    ]
     if coloured:
-        findings.append(
-            Caution(
-                f'The residual of {", ".join(coloured)} is far from white: the model lacks an '
-                'effect. The intervals account for autocorrelation, not for bias.'
-            )
+        yield (
+            f'The residual of {", ".join(coloured)} is far from white: the model lacks an '
+            'effect. The intervals account for autocorrelation, not for bias.',
+            '',
         )
-    return findings
-
-
-def _excitation_findings(result: Identification) -> list[Caution]:
-    findings = []
-    estimate = result.estimate
-    known = excludes_zero(estimate.values, estimate.std)
-    lost = int(np.sum(~known))
-    if lost:
-        findings.append(
-            Caution(
-                f'{lost} of {len(known)} parameters are not distinguishable from zero: do not use '
-                'their single values.'
-            )
+    known = excludes_zero(result.estimate.values, result.estimate.std)
+    if not known.all():
+        yield (
+            f'{int(np.sum(~known))} of {len(known)} parameters are not distinguishable from '
+            'zero: do not use their single values.',
+            '',
         )
     if result.condition_number > WEAK_CONDITION:
-        findings.append(
-            Caution(
-                f'The excitation is weak (condition number {result.condition_number:.3g}). '
-                'Errors on other motions may be large.',
-                'Design an excitation with armid excite and record it. With these recordings, '
-                '--physical keeps undetermined links near their description.',
-            )
+        yield (
+            f'The excitation is weak (condition number {result.condition_number:.3g}). '
+            'Errors on other motions may be large.',
+            'Design an excitation with armid excite and record it. With these recordings, '
+            '--physical keeps undetermined links near their description.',
         )
-    return findings
 
 
-def _verification_findings(verification: Verification | None) -> list[Caution]:
-    if verification is None:
-        return []
-    findings = [Caution(text[0].upper() + text[1:] + '.') for text in verification.left_out]
+def _of_verification(verification: Verification) -> Iterator[Caution]:
+    """Yield what simulations and the test for encoder noise mean."""
+    for text in verification.left_out:
+        yield text[0].upper() + text[1:] + '.', ''
     worse = ', '.join(sorted({name for pair in verification.forward for name in pair.worse}))
     if worse:
-        findings.append(
-            Caution(
-                'Driven by the recorded torques, the identified arm has larger position errors '
-                f'than the description in {worse}.',
-                f'Check the residual of {worse} before you simulate with the model.',
-            )
+        yield (
+            'Driven by the recorded torques, the identified arm has larger position errors '
+            f'than the description in {worse}.',
+            f'Check the residual of {worse} before you simulate with the model.',
         )
     if verification.noise is not None and not verification.noise.harmless:
         size = float(np.max(np.abs(verification.noise.relative_bias)))
-        findings.append(
-            Caution(
-                'Encoder noise biases parameters by up to '
-                f'{digits(size)} standard deviations, which the intervals do not include.',
-                'Lower the cut-off of the position filter (--cutoff), or move faster.',
-            )
+        yield (
+            'Encoder noise biases parameters by up to '
+            f'{digits(size)} standard deviations, which the intervals do not include.',
+            'Lower the cut-off of the position filter (--cutoff), or move faster.',
         )
-    return findings
