@@ -99,14 +99,15 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
         share = ''
         if excludes_zero(change.before, change.before_std):
             share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
-        by = f'{number} ± {reach} {pretty(change.parameter.unit)}{share}'
+        sign = '+' * (change.difference > 0.0)
+        by = f'{sign}{number} ± {reach} {pretty(change.parameter.unit)}{share}'
         rows.append((full_label(change.parameter), *ends, by))
     return rows
 
 
 def _changed_section(comparison: Comparison) -> list[Section]:
     rows = change_rows(comparison)
-    return [ContentSection('What changed', [DataTable(HEADS, rows)])] if rows else []
+    return [ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []
 
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
