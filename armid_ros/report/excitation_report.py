@@ -166,7 +166,14 @@ def _verdict(
             f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
             f'{pretty(names[worst].unit)}.'
         )
-    sentences.insert(0, _kept(shares, design.limits, checked))
+    found = str(checked).removeprefix(f'{checked.word}: ')
+    sentences.insert(0, f'{found[0].upper()}{found[1:]}.')
+    quantity, share = max(shares.items(), key=lambda item: float(item[1].max()))
+    sentences.insert(
+        1,
+        f'The closest limit is the {quantity} of {design.limits.joints[int(share.argmax())]} at '
+        f'{100.0 * share.max():.0f} %.',
+    )
     beware = []
     if unseen:
         beware.append(f'Not identifiable from this run: {", ".join(unseen)}.')
@@ -198,28 +205,6 @@ def _conditioning(condition: float) -> str:
     if GOOD_CONDITION <= condition < WEAK_CONDITION:
         word = 'fair'
     return word if word == 'good' else f'{word}; below {GOOD_CONDITION:g} is good'
-
-
-def _kept(shares: Mapping[str, FloatArray], limits: Limits, checked: Fitness) -> str:
-    """Say that limits and clearance are kept, where it is tightest, and what was not checked."""
-    name, share = max(shares.items(), key=lambda item: float(item[1].max()))
-    joint = limits.joints[int(share.argmax())]
-    text = (
-        f'All limits are kept; the closest is the {name} of {joint} at {100.0 * share.max():.0f} %'
-    )
-    nearest = checked.nearest
-    if nearest is not None:
-        text += (
-            f'. The smallest clearance is {100.0 * nearest.distance:.1f} cm, between '
-            f'{nearest.first} and {nearest.second} at {nearest.time:.1f} s'
-        )
-    near = () if nearest is None else (nearest.first, nearest.second)
-    if checked.lowest.link and 'floor' not in near:
-        text += f'; {checked.height()} at {checked.lowest.time:.1f} s'
-    if checked.unchecked:
-        missing = '; '.join(checked.unchecked)
-        text += f'. Before the run, check yourself what was not checked: {missing}'
-    return f'{text}.'
 
 
 def _asked(
