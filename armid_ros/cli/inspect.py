@@ -111,7 +111,7 @@ def check(
     """
     Check a URDF: alone, or against recordings.
 
-    R is a URDF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name.
+    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name.
 
     Without a recording: impossible inertias, densities of links with shapes, units of limits. With
     one: mass and centre of each link as described and as measured.

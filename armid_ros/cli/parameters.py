@@ -160,7 +160,7 @@ def with_packages(context: click.Context, _: click.Parameter, source: str | None
 
 robot = robot_described(
     required=True,
-    help='Shipped name, path of a URDF or xacro ("arm.xacro tool:=true" with '
+    help='Shipped name, path of a URDF, MJCF or xacro ("arm.xacro tool:=true" with '
     'arguments), or - for the /robot_description in the bag. '
     'A xacro is a program, which can read any file: name only one that you trust.',
 )

@@ -134,7 +134,9 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
             f'{source}: malformed XML at line {error.lineno}, column {error.offset + 1}: {reason}'
         ) from None
     if root.tag != 'robot':
-        hint = '; convert an MJCF to a URDF first' if root.tag.startswith('mujoco') else ''
+        hints = {'mujoco': 'an MJCF is loaded by its path'}
+        hints['mujocoinclude'] = 'load the MJCF that includes it'
+        hint = f'; {hints[root.tag]}' if root.tag in hints else ''
         raise RobotError(
             f'{source}: not a URDF: its root element is <{root.tag}>, not <robot>{hint}'
         )

@@ -18,6 +18,7 @@ from armid_ros.files import read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots.description import Description, Joint, parse_description, parse_xml, Vector
 from armid_ros.robots.gravity import parse_gravity
+from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
 from armid_ros.robots.robot import Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.shipped import shipped_path, shipped_robots
@@ -43,8 +44,8 @@ def load_robot(
     Parameters
     ----------
     source : str or Path
-        A shipped name (see `shipped_robots`), the path of a URDF or xacro file, or the text of a
-        URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program,
+        A shipped name (see `shipped_robots`), the path of a URDF, xacro or MJCF file, or the text
+        of a URDF, such as a /robot_description. Meshes need not exist. A xacro file is a program,
         which can read any file and the environment, so name only one that you trust. It is
         expanded in a process of its own, for 20 s of processor time at most; a text never is.
         Packages that it refers to are looked for around it, in ROS_PACKAGE_PATH and in
@@ -90,13 +91,17 @@ def load_robot(
             f'{", ".join(shipped_robots())}'
         )
     text = read_text(path, RobotError)
-    if path.suffix == '.xacro' or '<xacro:' in text:
+    notes: tuple[str, ...] = ()
+    if is_mjcf(text) and not xacro_arguments:
+        text, notes = urdf_of_mjcf(path)
+    elif path.suffix == '.xacro' or '<xacro:' in text:
         text = expand_xacro(path, xacro_arguments, packages)
     elif xacro_arguments:
         raise RobotError(f'{path}: not a xacro file, so it takes no arguments')
     for name, folder in packages.items():
         text = text.replace(f'package://{name}/', f'file://{escape(folder)}/')
-    return robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
+    robot = robot_from_urdf(text, gravity=gravity, joints=joints, source=str(source), path=path)
+    return replace(robot, notes=notes + robot.notes)
 
 
 def robot_from_urdf(

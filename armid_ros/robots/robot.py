@@ -60,7 +60,7 @@ class Robot:
         The description, xacro expanded.
     urdf_damping, urdf_friction, urdf_armature : ndarray, shape (n,)
         What the description says in ``<dynamics>`` [N m s/rad, N m, kg m^2]; zero where it says
-        nothing.
+        nothing. A URDF of an MJCF has the armature there too.
     notes : tuple of str
         What was assumed or is doubtful in the description, for a person to read.
     path : Path or None

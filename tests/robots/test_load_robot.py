@@ -178,7 +178,8 @@ class TestRefused:
         ('text', 'message'),
         [
             ('<robot name="r">\n<link name="a">\n</robot>', 'malformed XML at line 3'),
-            ('<mujoco/>', 'root element is <mujoco>, not <robot>; convert an MJCF'),
+            ('<mujoco/>', 'root element is <mujoco>, not <robot>'),
+            ('<mujocoinclude/>', 'load the MJCF that includes it'),
             ('<robot name="r"/>', 'it has no links'),
             (robot(link('base', ''), link('base', '')), "two links are named 'base'"),
             (robot(ARM, joint('shoulder', 'base', 'upper')), "two joints are named 'shoulder'"),
