@@ -14,8 +14,9 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import is_plain
 from armid_ros.recording.mcap.source import McapSource
-from armid_ros.recording.message_types import is_standard, JOINT_STATE
+from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import Topic
 from armid_ros.recording.tables.settings import renamed
@@ -158,10 +159,10 @@ def copy_bag(
                 f'{"; ".join(left_out) or "it is empty"}'
             )
         for topic in topics:
-            plain = topic.encoding == 'cdr' and is_standard(topic.message_type)
-            if rename and topic.type_name == JOINT_STATE and not plain:
+            if rename and topic.type_name == JOINT_STATE and not is_plain(topic):
                 raise RecordingError(
-                    f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can change'
+                    f'{path}: {topic.name} is no {JOINT_STATE} of ROS 2, whose names can be '
+                    'changed; give --rename to the command that reads the bag'
                 )
         with whole_bag(out) as writer:
             writer.copy(bag, change)

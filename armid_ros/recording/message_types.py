@@ -12,7 +12,6 @@ this Python, or given as text.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 import os
 from pathlib import Path
 import struct
@@ -96,15 +95,6 @@ def store_for(described: MessageType) -> Typestore:
     else:
         _register(store, described.name, described.definition)
     return store
-
-
-@cache
-def is_standard(described: MessageType) -> bool:
-    """Whether a bag describes a type, and what it consists of, as ROS 2 does, or not at all."""
-    if not described.definition:
-        return True
-    standard, store = get_typestore(Stores.ROS2_JAZZY), store_for(described)
-    return store.hash_rihs01(described.name) == standard.hash_rihs01(described.name)
 
 
 def _register(store: Typestore, name: str, definition: str | None) -> None:

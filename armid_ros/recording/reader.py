@@ -13,12 +13,13 @@ import struct
 from armid_ros.errors import nearest, RecordingError
 from armid_ros.files import reading
 from armid_ros.recording.bag import Bag
+from armid_ros.recording.joint_state.conversion import holds_joint_state, joint_state_blocks
 from armid_ros.recording.joint_state.decoder import JointSamples, JointStateDecoder
-from armid_ros.recording.message_types import BYTE_ORDERS, is_standard, JOINT_STATE, STRING
+from armid_ros.recording.message_types import BYTE_ORDERS, JOINT_STATE, STRING
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import MessageBlock, Topic
+from armid_ros.recording.source import Topic
 import numpy as np
 
 #: This many messages tell which joints a topic names.
@@ -75,7 +76,7 @@ def read_recording(
         with reading(path, RecordingError):
             pieces, size = [], 0
             for one in chosen:
-                for block in joint_states(bag, one):
+                for block in joint_state_blocks(bag, one):
                     for piece in decoder.decode(block):
                         size += piece.nbytes
                         settings.require(size, f'{where}: the recording')
@@ -178,7 +179,7 @@ def _parts(
 ) -> Iterator[JointSamples]:
     """Yield the messages of a topic, so many at a time at most."""
     with reading(bag.path, RecordingError):
-        for block in joint_states(bag, topic):
+        for block in joint_state_blocks(bag, topic):
             for states in decoder.decode(block):
                 for start in range(0, len(states), most):
                     yield states.select(slice(start, start + most))
@@ -198,13 +199,14 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     """Return the topic to read, or the topics that name the joints between them."""
     topics = bag.topics()
     candidates = [topic for topic in topics if topic.type_name == JOINT_STATE]
+    candidates = candidates or [topic for topic in topics if holds_joint_state(topic)]
     available = ', '.join(f'{topic.name} ({topic.count} messages)' for topic in candidates)
     if wanted is not None:
         name = '/' + wanted.lstrip('/')
         for topic in topics:
             if '/' + topic.name.lstrip('/') != name:
                 continue
-            if topic.type_name != JOINT_STATE:
+            if not holds_joint_state(topic):
                 raise RecordingError(
                     f'{bag.path}: {topic.name} is a topic of {topic.type_name}, not of '
                     f'{JOINT_STATE}; of that type there are: {available or "none"}'
@@ -240,31 +242,10 @@ def choose_topics(bag: Bag, joints: Sequence[str], wanted: str | None) -> tuple[
     )
 
 
-def joint_states(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
-    """
-    Yield the messages of a JointState topic, in the order they are stored.
-
-    Raises
-    ------
-    RecordingError
-        They are not those of ROS 2, by the encoding or the schema that the bag states.
-
-    """
-    other = '' if is_standard(topic.message_type) else 'with a schema of its own'
-    if topic.encoding != 'cdr':
-        other = f"serialised as '{topic.encoding}'"
-    if other:
-        raise RecordingError(
-            f'{bag.path}: {topic.name} is a {JOINT_STATE} {other}; the one of ROS 2 in CDR can be '
-            'read: record it with ros2 bag record'
-        )
-    return bag.blocks(topic.name)
-
-
 def named_joints(bag: Bag, topic: Topic) -> tuple[str, ...]:
     """Return the joints that the first messages of a topic name."""
     decoder = JointStateDecoder(())
-    for block in joint_states(bag, topic):
+    for block in joint_state_blocks(bag, topic):
         for _ in decoder.decode(block):
             pass
         if decoder.messages >= _PEEK_MESSAGES:
@@ -284,9 +265,7 @@ def bag_contents(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[To
     """
     with Bag(path, settings) as bag:
         return tuple(
-            replace(topic, joints=named_joints(bag, topic))
-            if topic.type_name == JOINT_STATE
-            else topic
+            replace(topic, joints=named_joints(bag, topic)) if holds_joint_state(topic) else topic
             for topic in bag.topics()
         )
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A JointState in another form is unpacked, or refused; all of it is read, or it is said."""
+"""What holds a JointState in another form is read by its schema, or refused; all of it or said."""
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording import read_recording
@@ -66,6 +66,25 @@ def one_more_field(path, recording, stamps):
     return by_schema(path, recording, stamps, lines, mode='position control')
 
 
+def inside_another_type(path, recording, stamps):
+    name = 'franka_msgs/msg/FrankaRobotState'
+    own = 'sensor_msgs/JointState desired_joint_state\nsensor_msgs/JointState measured_joint_state'
+    split = '\n' + '=' * 80 + '\n'
+    definition = f'{own}{split}MSG: sensor_msgs/JointState\n{STANDARD}'
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(definition, name))
+    types, messages = store.types, []
+    for (sec, nanosec), q, dq, tau in fields_of(recording, stamps):
+        header = types['std_msgs/msg/Header'](
+            types['builtin_interfaces/msg/Time'](sec, nanosec), ''
+        )
+        state = types[JOINT_STATE](header, list(JOINTS), q, dq, tau)
+        desired = types[JOINT_STATE](header, list(JOINTS), 0 * q, dq, tau)
+        message = types[name](desired_joint_state=desired, measured_joint_state=state)
+        messages.append(bytes(store.serialize_cdr(message, name)))
+    return write(path, name, 'ros2msg', definition, 'cdr', messages, stamps, '/robot_state')
+
+
 def messages_packed_by_zstd(path, recording, stamps):
     messages = joint_state_cdr(JOINTS, stamps, recording.q, recording.dq, recording.tau)
     packed = [zstandard.compress(message) for message in messages]
@@ -80,8 +99,14 @@ def file_packed_by_zstd(path, recording, stamps):
     return packed
 
 
-@pytest.mark.parametrize('made', [messages_packed_by_zstd, file_packed_by_zstd])
-def test_what_is_packed_is_read(made, swinging, stamps, tmp_path, assert_same):
+@pytest.mark.parametrize(
+    'made',
+    [
+        exchanged_fields, one_more_field, inside_another_type,
+        messages_packed_by_zstd, file_packed_by_zstd,
+    ],
+)  # fmt: skip
+def test_what_holds_a_joint_state_is_read(made, swinging, stamps, tmp_path, assert_same):
     path = made(tmp_path / 'bag.mcap', swinging, stamps)
     read = read_recording(path, joints=JOINTS)
     assert_same(read, swinging)
@@ -89,20 +114,25 @@ def test_what_is_packed_is_read(made, swinging, stamps, tmp_path, assert_same):
     assert any(topic.joints == JOINTS for topic in bag_contents(path))
 
 
-@pytest.mark.parametrize('made', [exchanged_fields, one_more_field])
-def test_another_schema_of_the_name_is_refused(made, swinging, stamps, tmp_path):
-    path = made(tmp_path / 'bag.mcap', swinging, stamps)
-    with pytest.raises(RecordingError, match=r'bag.mcap: /joint_states is .* schema of its own'):
-        read_recording(path, joints=JOINTS)
+def test_joints_of_another_schema_are_not_renamed(swinging, stamps, tmp_path):
+    path = exchanged_fields(tmp_path / 'bag.mcap', swinging, stamps)
     with pytest.raises(RecordingError, match='/joint_states is no'):
         copy_bag(path, tmp_path / 'out', [('elbow', 'knee')])
     assert not (tmp_path / 'out').exists()
 
 
+@pytest.mark.parametrize('lacking', ['name', 'position'])
+def test_a_schema_without_names_or_positions_is_refused(lacking, swinging, stamps, tmp_path):
+    lines = [line for line in STATE if not line.endswith(lacking)]
+    path = by_schema(tmp_path / 'bag.mcap', swinging, stamps, lines)
+    with pytest.raises(RecordingError, match=rf'/joint_states: its schema .* no {lacking}'):
+        read_recording(path, joints=JOINTS)
+
+
 def test_an_encoding_that_nobody_reads_is_named(swinging, stamps, tmp_path):
     path = tmp_path / 'bag.mcap'
     write(path, JOINT_STATE, 'protobuf', '', 'protobuf', [b'\x01'] * len(stamps), stamps)
-    with pytest.raises(RecordingError, match="serialised as 'protobuf'; the one of ROS 2"):
+    with pytest.raises(RecordingError, match="serialised as 'protobuf'; CDR of ROS 2"):
         read_recording(path, joints=JOINTS)
 
 

@@ -1,0 +1,117 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+Messages that hold a JointState, in the CDR of sensor_msgs/JointState.
+
+Those of a schema with other fields, or of a type with a JointState inside, as
+franka_msgs/FrankaRobotState, are read by the schema that the bag has of them.
+
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache
+import re
+from typing import Any
+
+from armid_ros.errors import RecordingError
+from armid_ros.recording.bag import Bag
+from armid_ros.recording.message_types import JOINT_STATE, MessageType, store_for
+from armid_ros.recording.source import MessageBlock, Topic
+import numpy as np
+from rosbags.typesys import get_typestore, Stores
+
+_INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
+_FIELDS = ('position', 'velocity', 'effort')
+Convert = Callable[[bytes], Any]
+
+
+def holds_joint_state(topic: Topic) -> bool:
+    """Whether the messages of a topic are a JointState, or have one inside."""
+    return topic.type_name == JOINT_STATE or bool(_inside(topic.message_type))
+
+
+def is_plain(topic: Topic) -> bool:
+    """Whether the messages of a topic are a JointState of ROS 2 in CDR."""
+    described = topic.message_type
+    return topic.encoding == 'cdr' and described.name == JOINT_STATE and _standard(described)
+
+
+def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
+    """
+    Yield the messages of a topic as JointState in CDR, in the order they are stored.
+
+    Raises
+    ------
+    RecordingError
+        The bag's schema of them has no names or positions, or they are not in CDR.
+
+    """
+    where = f'{bag.path}: {topic.name}'
+    convert = _converter(where, topic)
+    for block in bag.blocks(topic.name):
+        yield block if convert is None else _converted(block, convert)
+
+
+def _converter(where: str, topic: Topic) -> Convert | None:
+    """Return what makes an object with the fields of a JointState; None where CDR is one."""
+    described = topic.message_type
+    path = [] if described.name == JOINT_STATE else [_inside(described)]
+    if topic.encoding != 'cdr':
+        raise RecordingError(
+            f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
+            'with ros2 bag record'
+        )
+    if is_plain(topic):
+        return None
+    store = store_for(described)
+    fields = {name for name, _ in store.fielddefs[JOINT_STATE][1]}
+    lacking = {'header', 'name', 'position'} - fields
+    if lacking:
+        raise RecordingError(
+            f'{where}: its schema of {JOINT_STATE} has {", ".join(sorted(fields))}, and no '
+            f'{", ".join(sorted(lacking))}; record the type of sensor_msgs'
+        )
+    return lambda data: _part(store.deserialize_cdr(data, described.name), path)
+
+
+def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
+    """Return a block with other messages; one that cannot be read stays unreadable."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types, messages = store.types, []
+    for at in range(len(block)):
+        try:
+            found = convert(block.message(at))
+            stamp = found.header.stamp
+            header = types['std_msgs/msg/Header'](
+                types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
+            )
+            values = [np.array(getattr(found, name, []), np.float64) for name in _FIELDS]
+            state = types[JOINT_STATE](header, list(found.name), *values)
+            messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
+        except Exception:  # the decoder counts it as malformed
+            messages.append(bytes(4))
+    return MessageBlock.joined(messages, block.log_time, block.publish_time)
+
+
+def _part(message: Any, path: list[str]) -> Any:
+    for name in path:
+        message = getattr(message, name)
+    return message
+
+
+def _inside(described: MessageType) -> str:
+    """Return the field of a type that is a JointState, the measured one of several; '' if none."""
+    own = described.definition.split('\n===', 1)[0]
+    found = _INSIDE.findall(own)
+    return next((name for name in found if 'measured' in name), found[0] if found else '')
+
+
+@cache
+def _standard(described: MessageType) -> bool:
+    """Whether a bag describes JointState, and what it consists of, as ROS 2 does."""
+    if not described.definition:
+        return True
+    standard, store = get_typestore(Stores.ROS2_JAZZY), store_for(described)
+    return store.hash_rihs01(JOINT_STATE) == standard.hash_rihs01(JOINT_STATE)
