@@ -374,9 +374,8 @@ def design_excitation(
     usual: DesignKeywords = {'time_budget': 25.0, 'starts': 1} if many else {'time_budget': 120.0}
     run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
     period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
-    asked = DesignSettings(
-        period=period, n_periods=periods, run_in=run_in, **{**usual, **settings}
-    )
+    usual.update(settings)
+    asked = DesignSettings(period=period, n_periods=periods, run_in=run_in, **usual)
     if scene is None:
         height = None if floor is None else str(floor)
         scene = CollisionScene.of(model.robot, asked.clearance, height, environment)

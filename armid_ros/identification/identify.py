@@ -255,7 +255,7 @@ def identify(
             'change one another too much in these data; leave some out, or record more',
         )
     spread = base_spread(whole, fit.base) if settings.holds_description else None
-    described = fit.base.values(whole.theta)
+    nominal = fit.base.values(whole.theta)
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -267,7 +267,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes,
-        halves=halves_error(fit.problem, fit.solution.weights, described, spread),
+        halves=halves_error(fit.problem, fit.solution.weights, nominal, spread),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
 
 from armid_ros.arm import ArmModel
 from armid_ros.motion import FloatArray, Motion, read_only
@@ -97,6 +97,14 @@ class LinearFeedback:
             model.gravity.linear = np.zeros(3)
         object.__setattr__(self, '_model', model)
         object.__setattr__(self, '_data', model.createData())
+
+    @classmethod
+    def of(cls, arm: ArmModel, **terms: Any) -> LinearFeedback:
+        """Return the feedback with the body of an arm and the inertia that its effects add."""
+        action = arm.action()
+        robot = action.robot or arm.robot
+        none = np.zeros((robot.n_joints, robot.n_joints))
+        return cls(robot, none if action.inertia is None else action.inertia, **terms)
 
     def torque(
         self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
@@ -197,8 +205,7 @@ class ComputedTorque(Controller):
 
     def __post_init__(self) -> None:
         """Collect what the effects of the nominal arm do."""
-        robot, inertia = _body(self.arm)
-        feedback = LinearFeedback(robot, inertia, self.bandwidth, follows=True)
+        feedback = LinearFeedback.of(self.arm, bandwidth=self.bandwidth, follows=True)
         object.__setattr__(self, 'feedback', feedback)
 
     def feedforward(self, desired: Motion) -> FloatArray:
@@ -234,20 +241,13 @@ class GravityPD(Controller):
 
     def __post_init__(self) -> None:
         """Choose the gains."""
-        robot, added = _body(self.arm)
+        body = LinearFeedback.of(self.arm)
+        robot = body.robot
         inertia = np.diag(pin.crba(robot.model, robot.model.createData(), robot.middle_pose))
-        inertia = inertia + np.diag(added)
+        inertia = inertia + np.diag(body.added_inertia)
         stiffness = read_only(inertia * BANDWIDTH**2)
         damping = read_only(2.0 * np.sqrt(inertia * stiffness))
-        feedback = LinearFeedback(robot, added, stiffness=stiffness, damping=damping)
+        feedback = replace(body, stiffness=stiffness, damping=damping)
         object.__setattr__(self, 'stiffness', stiffness)
         object.__setattr__(self, 'damping', damping)
         object.__setattr__(self, 'feedback', feedback)
-
-
-def _body(arm: ArmModel) -> tuple[Robot, FloatArray]:
-    """Return the rigid body of an arm with its effects, and the inertia they add, (n, n)."""
-    action = arm.action()
-    robot = action.robot or arm.robot
-    n = robot.n_joints
-    return robot, np.zeros((n, n)) if action.inertia is None else action.inertia

@@ -172,8 +172,6 @@ def next_run(
             harmonics=kind.harmonics,
             speed=kind.speed,
             clearance=CLEARANCE,
-            samples=max(100, 10 * kind.harmonics),
-            processes=1,
         )
         problem = DesignProblem.of(arm, settings, rng)
         try:

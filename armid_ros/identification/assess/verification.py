@@ -27,10 +27,9 @@ from armid_ros.identification.identify import Identification
 from armid_ros.identification.rows.signals import Conditioning, decimate, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording
-from armid_ros.simulation import ComputedTorque, Plant, simulate
-from armid_ros.simulation.controller import Desired
+from armid_ros.simulation import Controller, Plant, simulate
+from armid_ros.simulation.controller import LinearFeedback
 import numpy as np
-import pinocchio as pin
 
 #: Motion that is simulated, shared by the held-out recordings, which takes a tenth of that; and at
 #: most this much of one recording [s].
@@ -104,25 +103,18 @@ class ForwardScore:
         }
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _RecordedTorque(ComputedTorque):
+@dataclass(frozen=True, eq=False)
+class _RecordedTorque(Controller):
     """The recorded torque, and a feedback of the inertia of an arm that holds it to its motion."""
 
     motion: Motion
+    feedback: LinearFeedback
 
     def feedforward(self, desired: Motion) -> FloatArray:
         """Return the recorded torque at the times of a reference, shape (N, n) [N m]."""
         assert self.motion.tau is not None
         t = self.motion.t
         return np.column_stack([np.interp(desired.t, t, column) for column in self.motion.tau.T])
-
-    def torque(
-        self, q: FloatArray, dq: FloatArray, desired: Desired, feedforward: FloatArray
-    ) -> FloatArray:
-        """Return the recorded torque and the feedback, shape (n,)."""
-        pull = self.bandwidth**2 * (desired[0] - q) + 2.0 * self.bandwidth * (desired[1] - dq)
-        tau = feedforward + pin.crba(self._robot.model, self._data, q) @ pull
-        return np.asarray(tau if self._inertia is None else tau + self._inertia @ pull)
 
 
 def forward_validation(
@@ -168,7 +160,8 @@ def forward_validation(
         raise IdentificationError(f'{recording.source}: no stretch is long enough to be filtered')
     motion = motion.select(motion.t <= motion.t[0] + duration)
     reference = replace(motion, t=motion.t - motion.t[0])
-    controller = _RecordedTorque(arm=nominal or arm, bandwidth=_BANDWIDTH, motion=reference)
+    feedback = LinearFeedback.of(nominal or arm, bandwidth=_BANDWIDTH, weighs=False)
+    controller = _RecordedTorque(reference, feedback)
     plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
     run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
     t = run.truth.t

@@ -108,7 +108,7 @@ class NormalEquations:
     def squares(self, values: FloatArray) -> FloatArray:
         """Return the sum of the squared residuals of each joint, shape (n,) [(N m)^2]."""
         ends = np.append(values, -1.0)
-        return np.maximum(self.products @ ends @ ends, _ROUNDING * self.target_squares)
+        return np.asarray(np.maximum(self.products @ ends @ ends, _ROUNDING * self.target_squares))
 
     def joint_std(self, values: FloatArray) -> FloatArray:
         """Return the standard deviation of the residual of each joint, shape (n,) [N m]."""
