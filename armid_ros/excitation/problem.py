@@ -106,15 +106,13 @@ class DesignProblem:
     def _require_visible(self, matrix: FloatArray) -> None:
         """Raise a TrajectoryError where random motions tell nothing of what is wanted."""
         criterion = self.criterion
-        if criterion.name != 'T' and not criterion.wanted.any():
-            raise TrajectoryError(
-                f'focus: no motion tells {", ".join(self.settings.focus)} from the rigid body; '
-                "take target 'effects', where the rigid body counts as known"
-            )
         if criterion.name != 'T':
-            return
-        whole = float(criterion.values @ matrix @ criterion.values)
-        if criterion.cost(matrix) >= -np.log(max(1e-18 * whole, 1e-300)):
+            if not criterion.wanted.any():
+                raise TrajectoryError(
+                    f'focus: no motion tells {", ".join(self.settings.focus)} from the rigid '
+                    "body; take target 'effects', where the rigid body counts as known"
+                )
+        elif not np.isfinite(criterion.cost(matrix)):
             names = ', '.join(effect.name for effect in self.arm.effects) or 'nothing'
             raise TrajectoryError(
                 f'no motion can tell the two models apart, which have {names} between them: the '

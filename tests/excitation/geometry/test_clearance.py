@@ -93,7 +93,7 @@ def test_near_pairs_are_all_pairs_within_reach(clearance, poses):
     expected = np.minimum(clearance.smallest(poses), 0.2)
     found = np.full(len(poses), 0.2)
     np.minimum.at(found, near.sample, near.distance)
-    np.testing.assert_allclose(found, expected, atol=1e-9)
+    np.testing.assert_allclose(found, expected, atol=1e-6)  # what coal measures to
 
 
 def test_derivative_of_the_distance(clearance, poses):
