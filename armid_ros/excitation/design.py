@@ -155,7 +155,7 @@ def design(
         if progress is not None:
             progress(DesignProgress(done, cost))
 
-    search = Search(problem, clearance, prior, rng, watch)
+    search = Search(problem, clearance, prior, rng.spawn(1)[0], watch)
     stopped = search.run()
     assert search.trajectory is not None
     excitation = placed(problem, search.trajectory)

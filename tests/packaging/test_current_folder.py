@@ -24,16 +24,6 @@ STARTS = {
         assert assistant.poll().text == 'nothing has been diagnosed so far'
         assistant.close()
         """,
-    'the searches of excite': """
-        import multiprocessing
-        from armid_ros.excitation.search import parallel
-        context = multiprocessing.get_context('spawn')
-        with parallel._undisturbed_children(), parallel._nameless_main():
-            process = context.Process(target=print)
-            process.start()
-        process.join(60)
-        assert process.exitcode == 0
-        """,
     'the workers of a fleet': """
         from armid_ros.fleet.cluster import connected
         if __name__ == '__main__':

@@ -90,13 +90,6 @@ class TestDistances:
         model = collision_model(robot_from_urdf(arm()))
         assert distance(model, 0.3, 0.0) == pytest.approx(0.2 - np.sin(0.3) - 0.05, abs=1e-4)
 
-    def test_progress_is_said_link_by_link(self) -> None:
-        shares: list[float] = []
-        collision_model(load_robot('humanoid_arm'), progress=shares.append)
-        assert shares == sorted(shares)
-        assert shares[0] == 0.0
-        assert len(shares) > 6
-
     def test_a_robot_without_collision_bodies_is_always_free(self) -> None:
         bare = arm(base='').replace(f'<collision>{at_tip(BALL)}</collision>', '')
         model = collision_model(robot_from_urdf(bare))
@@ -156,25 +149,6 @@ class TestMeshes:
         assert model.notes == ()
         # the ball at x = 1, z = 0 is 0.15 above the bar; the hull would be 0.05 below it
         assert distance(model, 0.0, 0.0) == pytest.approx(0.1, abs=1e-3)
-
-    def test_packages_are_found_where_ros_has_them(
-        self, dumbbell: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        mesh = '<mesh filename="package://swing_description/meshes/dumbbell.stl"/>'
-        robot = robot_from_urdf(arm(hand=mesh))
-        monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
-        monkeypatch.delenv('ROS_PACKAGE_PATH', raising=False)
-        missing = collision_model(robot)
-        assert missing.pairs == ()
-        assert "link 'lower'" in missing.notes[0]
-        assert 'dumbbell.stl not found' in missing.notes[0]
-        monkeypatch.setenv('ROS_PACKAGE_PATH', str(tmp_path))
-        assert collision_model(robot).notes == missing.notes[:0]
-        (tmp_path / 'install').mkdir()
-        (tmp_path / 'install' / 'share').symlink_to(tmp_path)
-        monkeypatch.delenv('ROS_PACKAGE_PATH')
-        monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'install'))
-        assert collision_model(robot).pairs == (('base', 'lower'),)
 
     def test_a_scale_is_applied(self, dumbbell: Path) -> None:
         whole = sum(body.computeVolume() for body in convex_bodies(dumbbell, np.ones(3)))

@@ -230,12 +230,6 @@ class TestSources:
         with pytest.raises(RobotError, match=r'humanoid.*shipped are humanoid_arm, '):
             load_robot('humanoid')
 
-    def test_a_file_that_is_no_text(self, tmp_path: Path) -> None:
-        path = tmp_path / 'arm.urdf'
-        path.write_bytes(b'\xff\xfe\x00\x9d')
-        with pytest.raises(RobotError, match='cannot be read as text'):
-            load_robot(path)
-
     def test_xacro_that_does_not_expand(self, tmp_path: Path) -> None:
         path = tmp_path / 'arm.xacro'
         path.write_text(robot(ARM).replace('"1.5"', '"${mass}"'))
