@@ -21,9 +21,8 @@ ROOT = Path(__file__).parents[1]
 #: What explains gaps, finds faults of data and plans motions for a diagnosis, below armid_ros.
 BESIDE_THE_DIAGNOSIS = (
     'identification/assess/data_faults.py',
-    'identification/assess/dead_sensors.py',
     'identification/assess/joint_units.py',
-    'identification/assess/velocities.py',
+    'identification/assess/sensor_faults.py',
     'identification/rows/stamps.py',
     'excitation/templates.py',
 )

@@ -44,11 +44,3 @@ def test_a_covariance_from_few_values_widens_the_range():
 
 def test_deviations_that_are_a_third_too_small_are_noticed():
     assert np.mean([one.holds for one in experiments(500, scale=1.5)]) < 0.3
-
-
-def test_numbers_and_what_is_expected_of_them_are_in_the_sentence():
-    one = next(experiments(1))
-    said = one.sentence()
-    assert f'{one.within} of 20' in said
-    assert '(19 expected)' in said
-    assert f'{one.lower:.0f} to {one.upper:.0f}' in said

@@ -5,7 +5,6 @@
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.diagnosis import diagnose
 from armid_ros.identification import grade, identify
 from armid_ros.identification.assess.sensor_faults import encoder_faults
 from armid_ros.inspection import inspect
@@ -140,12 +139,3 @@ def test_inspection_says_so_with_and_without_a_robot(arm, blind, locked):
         assert 'encoder is dead' in found.remarks[0].text
         sound = inspect(locked, robot, rng=np.random.default_rng(0))
         assert not any(remark.weight == 'bad' for remark in sound.remarks)
-
-
-def test_a_diagnosis_calls_it_bad_data(arm, blind, locked):
-    before = [record(arm, 2, source='before')]
-    found = diagnose(arm, [blind], baseline=before, rng=np.random.default_rng(0))
-    assert found.verdict == 'bad_data'
-    assert 'in run the position of wrist_pitch stays' in found.summary
-    sound = diagnose(arm, [locked], baseline=before, rng=np.random.default_rng(0))
-    assert sound.verdict != 'bad_data'

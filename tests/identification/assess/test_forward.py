@@ -37,12 +37,6 @@ def test_missing_friction_moves_the_arm_by_its_torque_over_the_stiffness(arm, re
     assert 0.02 < scores[1].feedback_torque[0] < 0.2
 
 
-def test_it_is_worse_without_effects(arm, recording):
-    bare = ArmModel(arm.robot)
-    scores = [forward_validation(a, recording, USED, nominal=arm) for a in (arm, bare)]
-    assert np.all(scores[1].position_error > scores[0].position_error)
-
-
 def test_a_recording_too_short_is_refused(arm, recording):
     part = slice(0, 20)
     short = replace(recording, t=recording.t[part], q=recording.q[part], tau=recording.tau[part])

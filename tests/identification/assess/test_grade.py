@@ -7,7 +7,7 @@ import re
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification import grade, identification_document, identify, Score
+from armid_ros.identification import grade, identify, Score
 from armid_ros.identification.assess.grade import beyond_noise, torque_noise
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.recording import read_recording, ReadReport
@@ -53,13 +53,6 @@ def test_a_sound_recording_is_good_with_its_held_out_error(sound):
     assert found.word == 'good'
     assert len(found.reasons) == 1
     assert 'Torque error on other, held out: ' in found.reasons[0]
-
-
-def test_the_document_has_the_grade_and_the_reasons(sound):
-    found, result = sound
-    document = identification_document(result, 'humanoid_arm', {}, grade=found)
-    assert document['grade'] == 'good'
-    assert document['reasons'] == list(found.reasons)
 
 
 @pytest.mark.parametrize(

@@ -45,19 +45,6 @@ def test_identified_arm_moves_more_like_the_recorded_one_than_the_description(
     assert any('mrad' in sentence and 'held_out' in sentence for sentence in found.sentences())
 
 
-def test_progress_reaches_the_end_of_each_part(result, structure, recordings):
-    told = []
-    verify(
-        result,
-        structure,
-        recordings[:1],
-        (),
-        rng=np.random.default_rng(0),
-        progress=lambda share, what: told.append((share, what)),
-    )
-    assert told[-1] == (1.0, 'testing for encoder noise')
-
-
 def test_what_is_not_done_is_said(result, recordings):
     bare = ArmModel(result.arm.robot.with_inertias(0.0 * result.arm.robot.rigid_parameters))
     assert verified(result, bare, recordings[:1], ()).left_out == (
