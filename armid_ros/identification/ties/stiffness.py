@@ -17,6 +17,7 @@ Source: Van Huffel and Vandewalle 1991; the leg pair's equations (16), (18), (23
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
@@ -28,8 +29,6 @@ from scipy.optimize import minimize
 
 #: Steps of the quasi-Newton method.
 _ITERATIONS = 300
-#: Solutions of linear equations that lead to where the iteration begins.
-_LINEAR = 4
 #: Gradients below this share of a standard deviation end the iteration.
 _CONVERGED = 1e-3
 #: Share of the residuals' mean square that is noise of torques where none was measured.
@@ -122,42 +121,21 @@ def identify_interaction(
     noise = problem.torque_noise if torque_noise is None else np.asarray(torque_noise)
     least = _LEAST_SHARE * np.mean(problem.residual(theta) ** 2, axis=0) + 1e-18
     used = np.where(noise > 0.0, noise**2, least)
-    for _ in range(_LINEAR):
-        theta = _compensated(problem, theta, used)
     theta = _most_likely(problem, theta, used)
-    freedom = max(1, problem.tau.size - len(theta))
-    misfit = _misfit(problem, theta, used)
-    excess = max(1.0, misfit / freedom)
+    step = _gauss_newton(problem, theta, used)
+    excess = max(1.0, step.misfit / max(1, problem.tau.size - len(theta)))
     names = tuple(
         ParameterName('interaction_stiffness', joint, 'N/m') for joint in problem.spring_joints
     )
     return Interaction(
-        Estimate(names + problem.rigid, theta, _covariance(problem, theta, used, excess)),
+        Estimate(names + problem.rigid, theta, _covariance(problem, theta, used, step, excess)),
         read_only(uncorrected),
         problem.segments,
         read_only(np.sqrt(used)),
         problem.position_noise,
         read_only(problem.residual(theta)),
-        misfit,
+        step.misfit,
     )
-
-
-def _compensated(
-    problem: InteractionProblem, theta: FloatArray, variance: FloatArray
-) -> FloatArray:
-    """Solve the normal equations less what noise adds to them on average."""
-    # Linear, so that it leads from anywhere to near the solution; weights are those at theta.
-    weight = np.linalg.inv(_noise(problem, problem.sensitivity(theta), variance))
-    weighted = np.einsum('nij,njp->nip', weight, problem.columns)
-    each = np.einsum('nij,njpx->nipx', weight, problem.columns_by_motion @ problem.motion_noise)
-    matrix = np.einsum('nip,niq->pq', problem.columns, weighted)
-    matrix -= np.einsum('nipx,niqx->pq', problem.columns_by_motion, each)
-    aim = np.einsum('nip,ni->p', weighted, problem.tau - problem.known)
-    aim += np.einsum('nipx,nix->p', each, problem.known_by_motion)
-    matrix += problem.precision
-    aim += problem.precision @ problem.described
-    size = np.sqrt(np.abs(np.diag(matrix)))
-    return np.asarray(np.linalg.solve(matrix / np.outer(size, size), aim / size) / size)
 
 
 def _most_likely(
@@ -167,17 +145,17 @@ def _most_likely(
     # where noise makes most of a column the loss is a valley much flatter than the information
     # says, in which steps of Gauss and Newton go to and fro; the curvature is learned from the
     # gradients, beginning with the information
-    _, information, _, _ = _gauss_newton(problem, theta, variance)
+    information = _gauss_newton(problem, theta, variance).information
     size = np.sqrt(np.diag(information))
     root = np.linalg.cholesky(information / np.outer(size, size))
     unit = np.linalg.inv(root).T / size[:, np.newaxis]  # of one standard deviation each
 
     def half_loss(z: FloatArray) -> tuple[float, FloatArray]:
         here = theta + unit @ z
-        gradient, _, _, _ = _gauss_newton(problem, here, variance)
+        step = _gauss_newton(problem, here, variance)
         away = here - problem.described
-        loss = _misfit(problem, here, variance) + float(away @ problem.precision @ away)
-        return 0.5 * loss, -unit.T @ gradient
+        loss = step.misfit + float(away @ problem.precision @ away)
+        return 0.5 * loss, -unit.T @ step.gradient
 
     found = minimize(
         half_loss,
@@ -194,13 +172,6 @@ def _most_likely(
     return np.asarray(theta + unit @ found.x)
 
 
-def _misfit(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> float:
-    covariance = _noise(problem, problem.sensitivity(theta), variance)
-    residual = problem.residual(theta)
-    pull = np.linalg.solve(covariance, residual[..., np.newaxis])[..., 0]
-    return float(np.sum(residual * pull))
-
-
 def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArray:
     w = columns.reshape(-1, columns.shape[2])
     scale = np.linalg.norm(w, axis=0)
@@ -212,22 +183,29 @@ def _least_squares(problem: InteractionProblem, columns: FloatArray) -> FloatArr
     return np.asarray(np.linalg.lstsq(w / scale, y.ravel(), rcond=None)[0] / scale)
 
 
-def _gauss_newton(
-    problem: InteractionProblem, theta: FloatArray, variance: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return minus the gradient of half the loss, the information, and what both are made of."""
-    # These are the columns at the motion that the residuals make likely, shape (N, n, P), and the
-    # residuals over their covariance, shape (N, n).
+class _Step(NamedTuple):
+    """A linearisation: columns (N, n, P), and the residuals over their covariance (N, n)."""
+
+    gradient: FloatArray  # minus that of half the loss
+    information: FloatArray
+    columns: FloatArray
+    pull: FloatArray
+    misfit: float
+
+
+def _gauss_newton(problem: InteractionProblem, theta: FloatArray, variance: FloatArray) -> _Step:
+    """Linearise at the motion that the residuals make likely."""
     by_motion = problem.sensitivity(theta)
     covariance = _noise(problem, by_motion, variance)
-    pull = np.linalg.solve(covariance, problem.residual(theta)[..., np.newaxis])[..., 0]
+    residual = problem.residual(theta)
+    pull = np.linalg.solve(covariance, residual[..., np.newaxis])[..., 0]
     correction = np.einsum('nij,ni->nj', by_motion @ problem.motion_noise, pull)
     columns = problem.columns + np.einsum('nipj,nj->nip', problem.columns_by_motion, correction)
     information = np.einsum('nip,niq->pq', columns, np.linalg.solve(covariance, columns))
     information += problem.precision
     gradient = np.einsum('nip,ni->p', columns, pull)
     gradient += problem.precision @ (problem.described - theta)
-    return np.asarray(gradient), np.asarray(information), np.asarray(columns), np.asarray(pull)
+    return _Step(gradient, information, columns, pull, float(np.sum(residual * pull)))
 
 
 def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatArray) -> FloatArray:
@@ -237,22 +215,26 @@ def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatAr
 
 
 def _covariance(
-    problem: InteractionProblem, theta: FloatArray, variance: FloatArray, excess: float
+    problem: InteractionProblem,
+    theta: FloatArray,
+    variance: FloatArray,
+    step: _Step,
+    excess: float,
 ) -> FloatArray:
     """Return the covariance of the parameters at the solution, H^-1 B H^-1."""
     # B is that of the scores. Filters make neighbours alike, by how much is known; where the
     # scores add up to more, as of noise that was not white before, deviations are widened. Poses
     # are independent, and B is H.
-    _, information, columns, pull = _gauss_newton(problem, theta, variance)
+    information = step.information
     size = np.sqrt(np.diag(information))
     scaled = np.linalg.inv(information / np.outer(size, size))
     inverse = scaled / np.outer(size, size)
     if len(problem.torque_lags) == 1:
         return np.asarray(excess * inverse)
     by_motion = problem.sensitivity(theta)
-    weighted = np.linalg.solve(_noise(problem, by_motion, variance), columns)
+    weighted = np.linalg.solve(_noise(problem, by_motion, variance), step.columns)
     moved = np.einsum('nij,nip->npj', by_motion, weighted)
-    scores = np.einsum('nip,ni->np', columns, pull)
+    scores = np.einsum('nip,ni->np', step.columns, step.pull)
     known = information
     lags = len(problem.torque_lags)
     for lag in range(1, lags):
