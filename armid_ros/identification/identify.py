@@ -236,24 +236,12 @@ def identify(
         theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
     if settings.method == 'iv':
         fit = fit_by_instruments(fit, recordings, used)
-    if fit.base.rank < theory.rank:
-        notes += (
-            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
-            'the others are grouped, or stay as described',
-        )
-    if fit.solution.outliers:
-        notes += (f'{fit.solution.outliers} torque samples were weighted down as outliers',)
     certificate = None
     if settings.physical is not None:
         fit, certificate = fit_to_bodies(
             arm, fit, recordings, used, settings.least_squares, settings.physical, rng
         )
         notes += certificate.sentences()
-    if not fit.settled:
-        notes += (
-            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
-            'change one another too much in these data; leave some out, or record more',
-        )
     spread = base_spread(whole, fit.base) if settings.holds_description else None
     nominal = fit.base.values(whole.theta)
     return Identification(
@@ -266,7 +254,7 @@ def identify(
         training=fit.fits,
         used=used,
         settings=settings,
-        notes=notes,
+        notes=notes + _remarks(fit, theory),
         halves=halves_error(fit.problem, fit.solution.weights, nominal, spread),
         physical=certificate,
         passes=fit.passes,
@@ -310,6 +298,24 @@ def _require_samples(
             f'{used.cutoff_hz:g} Hz and decimation by {used.decimation}; {theory.rank} parameters '
             'need more: record longer, or lower --decimation'
         )
+
+
+def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
+    """Say what the data group, what they were weighted down for, and whether the fit settled."""
+    remarks = []
+    if fit.base.rank < theory.rank:
+        remarks.append(
+            f'the motion tells {fit.base.rank} of {theory.rank} parameters apart; '
+            'the others are grouped, or stay as described'
+        )
+    if fit.solution.outliers:
+        remarks.append(f'{fit.solution.outliers} torque samples were weighted down as outliers')
+    if not fit.settled:
+        remarks.append(
+            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
+            'change one another too much in these data; leave some out, or record more'
+        )
+    return tuple(remarks)
 
 
 def _with_what_shows_now(

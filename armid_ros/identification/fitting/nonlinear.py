@@ -285,7 +285,8 @@ def _iterate(
         promised = tuple(part.torque(solution.values) for part in now.problem)
         if passes > 1 and abs(now.gain(promised)) < _NOTHING:
             break
-        trial, vain = None, 0.0
+        trial: _State | None = None
+        vain = 0.0
         # straight to a solution that keeps its promise, else the best of damped steps
         for damping in (0.0, *_DAMPINGS):
             values = now.damped(damping, limits) if damping else solution.values
