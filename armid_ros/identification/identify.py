@@ -243,7 +243,7 @@ def identify(
         )
         notes += certificate.sentences()
     spread = base_spread(whole, fit.base) if settings.holds_description else None
-    nominal = fit.base.values(whole.theta)
+    prior = fit.base.values(whole.theta)
     return Identification(
         arm=fit.arm,
         theory=theory,
@@ -255,7 +255,7 @@ def identify(
         used=used,
         settings=settings,
         notes=notes + _remarks(fit, theory),
-        halves=halves_error(fit.problem, fit.solution.weights, nominal, spread),
+        halves=halves_error(fit.problem, fit.solution.weights, prior, spread),
         physical=certificate,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
