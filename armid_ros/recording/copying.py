@@ -152,7 +152,7 @@ def copy_bag(
 
     with Bag(path, settings) as bag:
         topics = bag.topics()
-        left_out = [f'{one.name} ({one.type_name})' for one in topics if one.encoding == 'ros1']
+        left_out = [f'{one.name} ({one.type_name})' for one in topics if not one.encoding]
         if len(left_out) == len(topics):
             raise RecordingError(
                 f'{path}: nothing in it has a type that ROS 2 has; left out: '

@@ -27,7 +27,7 @@ _BLOCK_MESSAGES = 4096
 
 
 class Ros1Source:
-    """One .bag file; topics whose types ROS 2 has not are listed, as of encoding 'ros1'."""
+    """One .bag file; topics whose types ROS 2 has not are listed, without messages."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """
@@ -78,7 +78,7 @@ class Ros1Source:
             known = self._is_known(one)
             described = message_type(one.msgtype) if known else MessageType(one.msgtype)
             count = one.msgcount + (found[one.topic].count if one.topic in found else 0)
-            encoding = 'cdr' if known else 'ros1'
+            encoding = 'cdr' if known else ''
             found[one.topic] = Topic(one.topic, described, (), count, encoding)
         return tuple(found.values())
 

@@ -41,7 +41,7 @@ class Topic:
     count : int
         Number of messages.
     encoding : str
-        How messages are serialised: 'cdr' in ROS 2.
+        How messages are serialised: 'cdr' in ROS 2; empty where they cannot be given.
     joints : tuple of str
         Joints that its first messages name, as far as `bag_contents` has looked.
 

@@ -338,7 +338,7 @@ class BagWriter:
         """
         Write all topics and messages of a source, with types, QoS and times as they are.
 
-        Topics whose messages are those of ROS 1 are left out.
+        Topics whose messages the source cannot give are left out.
 
         Parameters
         ----------
@@ -348,7 +348,7 @@ class BagWriter:
             Returns what is written in place of a message, given its topic and CDR.
 
         """
-        topics = {one.name: one for one in source.topics() if one.encoding != 'ros1'}
+        topics = {one.name: one for one in source.topics() if one.encoding}
         for topic in topics.values():
             kept = topic.message_type
             add = partial(
@@ -360,8 +360,6 @@ class BagWriter:
             except RecordingError:
                 add(definition=text, type_hash=digest)
         for message in source.messages():
-            if message.topic not in topics:
-                continue
             cdr = message.cdr if change is None else change(topics[message.topic], message.cdr)
             self.write(message.topic, cdr, message.log_time_ns, message.publish_time_ns)
 
