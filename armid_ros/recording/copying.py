@@ -18,7 +18,7 @@ from armid_ros.recording.joint_state.conversion import is_plain
 from armid_ros.recording.mcap.source import McapSource
 from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Topic
+from armid_ros.recording.source import Topic, UNREADABLE
 from armid_ros.recording.tables.settings import renamed
 from armid_ros.recording.writer import BagWriter, whole_bag
 from rosbags.typesys import get_typestore, Stores
@@ -152,7 +152,9 @@ def copy_bag(
 
     with Bag(path, settings) as bag:
         topics = bag.topics()
-        left_out = [f'{one.name} ({one.type_name})' for one in topics if not one.encoding]
+        left_out = [
+            f'{one.name} ({one.type_name})' for one in topics if one.encoding == UNREADABLE
+        ]
         if len(left_out) == len(topics):
             raise RecordingError(
                 f'{path}: nothing in it has a type that ROS 2 has; left out: '

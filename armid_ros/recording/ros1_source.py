@@ -14,7 +14,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.files import open_regular
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Topic
+from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Topic, UNREADABLE
 import numpy as np
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.interfaces import Connection
@@ -78,7 +78,7 @@ class Ros1Source:
             known = self._is_known(one)
             described = message_type(one.msgtype) if known else MessageType(one.msgtype)
             count = one.msgcount + (found[one.topic].count if one.topic in found else 0)
-            encoding = 'cdr' if known else ''
+            encoding = 'cdr' if known else UNREADABLE
             found[one.topic] = Topic(one.topic, described, (), count, encoding)
         return tuple(found.values())
 

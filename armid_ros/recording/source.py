@@ -21,6 +21,8 @@ import numpy.typing as npt
 from rosbags.interfaces import Qos
 
 IntArray = npt.NDArray[np.int64]
+#: Encoding of topics that are listed, and whose messages a source cannot give.
+UNREADABLE = 'unreadable'
 #: Problems said one by one; a file that is damaged all over is not described byte by byte.
 _SAID = 8
 
@@ -41,7 +43,7 @@ class Topic:
     count : int
         Number of messages.
     encoding : str
-        How messages are serialised: 'cdr' in ROS 2; empty where they cannot be given.
+        How messages are serialised: 'cdr' in ROS 2, `UNREADABLE` where the source has none.
     joints : tuple of str
         Joints that its first messages name, as far as `bag_contents` has looked.
 

@@ -26,7 +26,7 @@ from armid_ros.recording.mcap.writer import Compression, McapWriter, message_rec
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
 from armid_ros.recording.qos import dump_qos, VOLATILE
-from armid_ros.recording.source import IntArray, Source, Topic
+from armid_ros.recording.source import IntArray, Source, Topic, UNREADABLE
 from armid_ros.version import __version__
 from mcap.opcode import Opcode
 import numpy as np
@@ -348,7 +348,7 @@ class BagWriter:
             Returns what is written in place of a message, given its topic and CDR.
 
         """
-        topics = {one.name: one for one in source.topics() if one.encoding}
+        topics = {one.name: one for one in source.topics() if one.encoding != UNREADABLE}
         for topic in topics.values():
             kept = topic.message_type
             add = partial(
