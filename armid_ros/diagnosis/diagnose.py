@@ -149,9 +149,9 @@ def diagnose(
         tell(0.2, f'ties to {settings.partner.source}')
         tied = diagnose_ties(explainer, recordings, settings.partner)
         if tied is not None:
-            return _said(tied, notes, explainer, doubt)
+            return _said(tied, notes, explainer, doubt, given)
     chosen = explainer.chosen()
-    result = _said(chosen, notes, explainer, doubt)
+    result = _said(chosen, notes, explainer, doubt, given)
     return _within(result, chosen, explainer, (recordings, validate, baseline)) or _each_alone(
         result, ([*recordings, *validate], baseline), used, explainer
     )
@@ -240,7 +240,9 @@ def _apart(
             yield one, own
 
 
-def _said(chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str) -> Diagnosis:
+def _said(
+    chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
+) -> Diagnosis:
     """Return the diagnosis of an explanation, measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
@@ -287,7 +289,7 @@ def _said(chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str
         left=where_left(explanation, patched, open_in, settings),
         gap=measure_gap(explanation, unseen),
         explanation=explanation.forgetting(),
-        arm=plain_arm(patched if found and not worse else arm),
+        arm=plain_arm(patched) if found and not worse else given,
         data=tuple(evidence.data),
         not_visible=tuple(kind.name for kind in settings.kinds if kind.name in hidden),
         refitted=explanation.refitted,
