@@ -54,11 +54,6 @@ def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) 
     return _kept(ctx, parameter, ())
 
 
-def _couplings(ctx: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> Any:
-    """Keep motor, joint and ratio of each coupling."""
-    return _kept(ctx, parameter, tuple(_coupling(text) for text in value))
-
-
 _OPTIONS = (
     _option('--time', metavar='C', help='Column of time of a table; guessed by default.'),
     _option(
@@ -112,7 +107,7 @@ _OPTIONS = (
     _option(
         '--coupling',
         multiple=True,
-        callback=_couplings,
+        callback=lambda ctx, one, texts: _kept(ctx, one, tuple(map(_coupling, texts))),
         metavar='I,J=X',
         help='With --gear: motor I turns X times for a turn of joint J, too.',
     ),

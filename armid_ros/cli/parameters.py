@@ -29,26 +29,14 @@ class OutPath(click.Path):
         return super().convert(value, param, ctx)
 
 
-def _robots() -> list[str]:
+def _completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete the last name of a list with commas: of a shipped robot, or of an effect."""
+    from armid_ros.effects import CATALOGUE
     from armid_ros.robots import shipped_robots
 
-    return list(shipped_robots())
-
-
-def _effects() -> list[str]:
-    from armid_ros.effects import CATALOGUE
-
-    return list(CATALOGUE)
-
-
-def _completed(names: Callable[[], list[str]]) -> Callable[..., list[str]]:
-    """Return what completes the last name of a list with commas."""
-
-    def complete(ctx: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-        before, comma, last = incomplete.rpartition(',')
-        return [f'{before}{comma}{name}' for name in names() if name.startswith(last)]
-
-    return complete
+    names = CATALOGUE if parameter.name == 'effects' else shipped_robots()
+    before, comma, last = incomplete.rpartition(',')
+    return [f'{before}{comma}{name}' for name in names if name.startswith(last)]
 
 
 gravity = click.option(
@@ -65,7 +53,7 @@ effects = click.option(
     default=','.join(USUAL_EFFECTS),
     show_default=True,
     metavar='E,...',
-    shell_complete=_completed(_effects),
+    shell_complete=_completed,
     help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
@@ -137,7 +125,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         '--robot',
         'robot_source',
         metavar='R',
-        shell_complete=_completed(_robots),
+        shell_complete=_completed,
         callback=with_packages,
         **values,
     )

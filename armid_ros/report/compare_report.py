@@ -65,9 +65,10 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
         error = side.error_percent
         said = '' if error is None else f'; relative torque error {error:.2f} %'
         facts.append((heading, f'{side.source}: {robot_label(side.robot)}{said}'))
+    rows = change_rows(comparison)
     sections: list[Section] = [
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
-        *_changed_section(comparison),
+        *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
         ContentSection('What was asked', [FactList(facts)]),
         Origin(provenance or Provenance()),
@@ -103,11 +104,6 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
         by = f'{sign}{number} ± {reach} {pretty(change.parameter.unit)}{share}'
         rows.append((full_label(change.parameter), *ends, by))
     return rows
-
-
-def _changed_section(comparison: Comparison) -> list[Section]:
-    rows = change_rows(comparison)
-    return [ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []
 
 
 def tell(comparison: Comparison) -> tuple[str, ...]:

@@ -109,18 +109,6 @@ def test_what_a_model_leaves_is_a_change_where_no_parameter_is(tmp_path):
     assert document['unusable'] == []
 
 
-def test_models_of_other_effects_leave_other_residuals(tmp_path):
-    first = identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0))
-    second = identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0))
-    file = second / 'identification.json'
-    file.write_text(file.read_text().replace(FRICTION[0], 'spring_stiffness'))
-    document = json.loads(file.read_text())
-    document['parameters'][1]['value'] = 0.501
-    file.write_text(json.dumps(document))
-    result = armid('compare', first, second, '--out', tmp_path / 'out')
-    assert '30 times' in result.output and 'different effects' in result.output
-
-
 def test_what_is_not_compared_is_counted(tmp_path):
     first = identified(tmp_path / 'a', 0.08)
     lost = {'name': FRICTION[0], 'joint': FRICTION[1], 'unit': FRICTION[2]}

@@ -23,20 +23,6 @@ pytestmark = pytest.mark.slow
 VISCOUS = 'viscous_coefficient'
 
 
-def test_identify_writes_model_numbers_and_page(bags, tmp_path):
-    out = tmp_path / 'out'
-    result = armid('identify', bags[0], '--robot', '-', '--validate', bags[1], '--out', out)
-    assert 'held out' in result.output
-    document = json.loads((out / 'identification.json').read_text())
-    assert document['schema'] == 'armid/identification/1'
-    assert document['validation'][0]['relative_error_percent'] < 3.0
-    assert {'name', 'joint', 'value', 'std', 'unit'} == set(document['parameters'][0])
-    arm = load_model(out / 'model.yaml')  # its robot came with the bag and lies beside it
-    viscous = arm.values[arm.effects.index(make_effect('viscous_friction', arm.robot))]
-    np.testing.assert_allclose(viscous, 0.1, atol=0.01)
-    assert (out / 'report.html').stat().st_size > 10_000
-
-
 @pytest.mark.parametrize('again', [(), ('--validate',)])
 def test_a_recording_is_fitted_once_and_not_held_out_as_well(bags, tmp_path, again):
     arguments = ('identify', bags[0], *again, bags[0], '--robot', ROBOT, '--out', tmp_path / 'o')
@@ -109,12 +95,6 @@ def test_physical_identification_shows_its_certificate_and_its_checks(bags, tmp_
         *('2.8 kg', 'Durbin', 'includes 0', 'Physical consistency', 'Forward validation'),
     )
     assert [fact for fact in facts if fact not in page] == []
-
-
-def test_checks_can_be_left_out(bags, tmp_path):
-    out = tmp_path / 'out'
-    armid('identify', bags[0], '--robot', ROBOT, '--no-verify', '--out', out)
-    assert 'verification' not in json.loads((out / 'identification.json').read_text())
 
 
 def test_what_one_moving_joint_does_not_tell_is_nowhere_a_number(tmp_path):
