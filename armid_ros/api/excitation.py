@@ -253,7 +253,7 @@ class ExcitationResult(Shown):
     def _of_run(self) -> list[str]:
         """Say whether the run is fit, where it starts, and whether the search was stopped."""
         try:
-            run, fit = self.run, str(self.fitness)
+            run, fit = self.run, self.fitness
         except TrajectoryError as error:
             return [f'there is no way to the trajectory: {error}']
         robot = self.arm.robot
@@ -265,14 +265,14 @@ class ExcitationResult(Shown):
             )
             if value
         ]
-        begin = f'starts at rest at {", ".join(pose) or "zero"}'
-        begin += f' (the zero of the description is not free: {fault})' * bool(fault)
+        why = f' (the zero of the description is not free: {fault})' if fault else ''
+        begin = f'starts at rest at {", ".join(pose) or "zero"}{why}'
         on = f'is on the trajectory after {run.approach.duration:.1f} s'
-        lines = [fit, f'{begin}, {on} and back after {run.duration:.1f} s']
-        if self.core.stopped:
-            best = 'the best so far, not what the seed would give'
-            lines.append(f'stopped early ({self.core.stopped}): {best}')
-        return lines
+        lines = ['not checked: ' + '; '.join(fit.unchecked)] if fit.unchecked else []
+        lines.append(str(fit).partition('; not checked: ')[0])
+        lines.append(f'{begin}, {on} and back after {run.duration:.1f} s')
+        early = f'stopped early ({self.core.stopped}): not what the seed would give'
+        return [*lines, early] if self.core.stopped else lines
 
 
 def design_excitation(
