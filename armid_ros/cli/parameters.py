@@ -34,7 +34,7 @@ def _completed(_: click.Context, parameter: click.Parameter, incomplete: str) ->
     from armid_ros.effects import CATALOGUE
     from armid_ros.robots import shipped_robots
 
-    names = CATALOGUE if parameter.name == 'effects' else shipped_robots()
+    names = list(CATALOGUE) if parameter.name == 'effects' else list(shipped_robots())
     before, comma, last = incomplete.rpartition(',')
     return [f'{before}{comma}{name}' for name in names if name.startswith(last)]
 

@@ -183,7 +183,8 @@ def log_recording(
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
     """Log what an arm looks like: <visual>, <collision> where a link has none, or bars."""
-    rr, notes, drawn = rerun(), [], 0
+    rr, drawn = rerun(), 0
+    notes: list[str] = []
     stream.log('arm', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def place(joint: int) -> tuple[str, tuple[int, int, int]]:
@@ -207,7 +208,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
         stream.log(entity, pose, static=True)
         stream.log(entity, _drawn(shape, colour), static=True)
         drawn += 1
-    for joint, end in () if drawn else sticks(robot.model):
+    for joint, end in [] if drawn else sticks(robot.model):
         where, colour = place(joint)
         bar = rr.LineStrips3D([[np.zeros(3), end]], radii=_BAR, colors=colour)
         stream.log(f'{where}/bar', bar, static=True)
