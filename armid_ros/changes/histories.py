@@ -22,7 +22,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from armid_ros.changes.scatter import (
-    by_parameter,
     FEWEST,
     line,
     ParameterHistory,
@@ -158,23 +157,6 @@ def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
     """Return the slope of a series and its standard deviation, in a month."""
     slope, std, _ = line(series.days, series.values, 1.0 / variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
-
-
-def unlike_siblings(series: Sequence[ParameterHistory]) -> dict[tuple[str, str, str], float]:
-    """
-    Return how far each arm is from its siblings, by arm, name and joint.
-
-    Distance of its median from that of all arms, over the spread of arms, both robust.
-
-    """
-    found = {}
-    for parameter, group in by_parameter(series).items():
-        levels = np.array([np.median(one.values) for one in group])
-        middle = np.median(levels)
-        size = 1.4826 * float(np.median(np.abs(levels - middle)))
-        for one, level in zip(group, levels, strict=True):
-            found[one.arm, *parameter] = float((level - middle) / size) if size > 0.0 else 0.0
-    return found
 
 
 def _p(score: float, freedom: float, tried: int) -> float:

@@ -19,8 +19,6 @@ from distributed import Client, LocalCluster
 WORKER_MEMORY = 1_200_000_000
 #: How long a cluster may take to answer [s].
 ANSWER = 30.0
-#: How long one that was lost may take to come back [s].
-PATIENCE = 120.0
 #: How often is looked whether all workers of this machine are there.
 _LOOK_EVERY = '2s'
 
@@ -66,7 +64,6 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
     except (OSError, ValueError, TimeoutError) as error:
         raise FleetError(f'--scheduler {scheduler}: does not answer: {error}') from error
     with client:
-        client._timeout = PATIENCE  # there is no public name for it
         _check_versions(client, scheduler)
         yield client
 

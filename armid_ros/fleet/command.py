@@ -282,34 +282,3 @@ def diagnose(
     for row in rows:
         say(f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}')
     say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')
-
-
-@fleet.command(epilog='Example: armid fleet report --out results --arm arm_7 --bag 2026-01-31')
-@_out
-@click.option('--arm', required=True, help='Which arm.')
-@click.option(
-    '--bag',
-    'bags',
-    multiple=True,
-    metavar='NAME',
-    help='As on the page of the arm, or a URL; those around its change and the latest, if none.',
-)
-@options.as_json
-def report(out: str, arm: str, bags: tuple[str, ...], as_json: bool) -> None:
-    """Make the reports of bags of an arm, and link them on its page."""
-    from armid_ros.fleet.bag_reports import bags_to_report, write_reports
-    from armid_ros.fleet.pages import write_pages
-    from armid_ros.fleet.watch import watch_fleet
-
-    with _results(out, 'reading results') as (store, tick):
-        found = watch_fleet(store)
-        watched, urls = bags_to_report(found, arm, bags)
-        written = write_reports(
-            store, watched, urls, lambda ended, of: tick(ended / of, f'{ended} of {of} bags')
-        )
-        write_pages(store, found, [watched])
-    if as_json:
-        _print_json('fleet-reports', reports=written)
-        return
-    for name in written:
-        say(f'{out}/{name}')

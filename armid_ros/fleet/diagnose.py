@@ -8,7 +8,6 @@ looks at the first bags after it and is judged by one more that it only predicts
 
     watch/diagnoses.parquet              one row an arm: verdict, summary, causes
     reports/arm=A/diagnosis/             diagnosis.json, model.yaml, report.html
-    reports/arm=A/BAG/                   identification.json, model.yaml, report.html of each bag
 
 """
 
@@ -16,14 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from armid_ros.api.diagnosis import diagnose
 from armid_ros.api.identification import identify
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
-from armid_ros.fleet.bag_reports import keep, write_report
 from armid_ros.fleet.bags import folder_of
 from armid_ros.fleet.kinds import document
 from armid_ros.fleet.plan import kind_arm
@@ -35,6 +33,8 @@ from armid_ros.recording import read_recording
 from distributed import as_completed, Client
 import pyarrow as pa
 
+#: An arm to be diagnosed, as of ``cases``.
+Case = dict[str, Any]
 #: Bags before a change that the arm is identified from, and bags after it that are diagnosed.
 BEFORE, AFTER = 3, 3
 
@@ -52,26 +52,7 @@ DIAGNOSES = pa.schema(
 )
 
 
-@dataclass(frozen=True)
-class ArmCase:
-    """
-    An arm to be diagnosed.
-
-    Attributes
-    ----------
-    arm : str
-        Its name.
-    before, after : tuple of str
-        URLs of its bags before and after its change; the last one after is only predicted.
-
-    """
-
-    arm: str
-    before: tuple[str, ...]
-    after: tuple[str, ...]
-
-
-def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[ArmCase]:
+def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
     """
     Choose the bags by which arms are diagnosed.
 
@@ -83,6 +64,12 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
         Which arms; by default those that are named.
     everyone : bool
         Whether all arms are.
+
+    Returns
+    -------
+    list of dict
+        ``arm``, and as ``baseline`` and ``bags`` the URLs of its bags before and after its
+        change; of the latter the last one is only predicted.
 
     Raises
     ------
@@ -104,14 +91,14 @@ def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> lis
             cut = max(1, urls.index(arm.bag_at(arm.named[0])['bag']))
             before, after = urls[:cut], urls[cut:]
         if len(urls) >= 2:
-            some.append(ArmCase(arm.arm, tuple(before[-BEFORE:]), tuple(after[:AFTER])))
+            some.append({'arm': arm.arm, 'baseline': before[-BEFORE:], 'bags': after[:AFTER]})
     return some
 
 
 def diagnose_fleet(
     client: Client,
     store: Store,
-    chosen: Sequence[ArmCase],
+    chosen: Sequence[Case],
     found: Watch,
     tell: Callable[[int, int], None] = lambda ended, of: None,
 ) -> list[dict[str, Any]]:
@@ -126,20 +113,18 @@ def diagnose_fleet(
     model_of = {key: kind_arm(store, facts, key) for key, facts in kinds.items()}
     futures = {}
     for case in chosen:
-        facts = kinds[kind_of[case.arm]]
+        kind = kind_of[case['arm']]
+        facts, model = kinds[kind], model_of[kind]
         filters = Conditioning(**facts['filters'])
-        model = model_of[kind_of[case.arm]]
         future = client.submit(
             one_arm, case, model, filters, facts['topic'], store.url, retries=RETRIES, pure=False
         )
         futures[future] = case
     rows: list[dict[str, Any]] = []
     for future in as_completed(list(futures), raise_errors=False):
-        case = futures[future]
-        if future.status == 'finished':
-            rows.append(future.result())
-        else:
-            rows.append(_row(case, 'failed', str(future.exception())))
+        done = future.status == 'finished'
+        found_of_arm = future.result() if done else _failed(future.exception())
+        rows.append(futures[future] | found_of_arm)
         tell(len(rows), len(futures))
     rows.sort(key=lambda row: str(row['arm']))
     table = store.read_table('watch/diagnoses.parquet')
@@ -151,9 +136,9 @@ def diagnose_fleet(
 
 
 def one_arm(
-    case: ArmCase, model: ArmModel, filters: Conditioning, topic: str | None, out: str
+    case: Case, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Task: identify what an arm was, diagnose what it is, and draw the bags around the change."""
+    """Task: identify what an arm was, and diagnose what it is; return what is found of it."""
     store = Store(out)
     try:
         with ExitStack() as stack:
@@ -164,52 +149,39 @@ def one_arm(
                     )
                     for url in urls
                 ]
-                for urls in (case.before, case.after)
+                for urls in (case['baseline'], case['bags'])
             )
-            for url, recording in zip(
-                (*case.before[-1:], *case.after[:1]), (*before[-1:], *after[:1]), strict=True
-            ):
-                write_report(store, case.arm, url, recording, model, filters)
             past = identify(model, before, cutoff=filters.cutoff_hz, decimation=filters.decimation)
-            held_out = after[2:] if len(after) > 2 else []
             result = diagnose(
                 past.arm,
                 after[:2],
-                validate=held_out,
+                validate=after[2:],
                 baseline=before,
                 cutoff=filters.cutoff_hz,
                 decimation=filters.decimation,
             )
-            report = f'reports/{folder_of(case.arm)}/diagnosis'
-            keep(store, result.save, report)
+            report = f'reports/{folder_of(str(case["arm"]))}/diagnosis'
+            folder = result.save(stack.enter_context(TemporaryDirectory(prefix='armid-report-')))
+            # report.html last: it is what the pages link
+            for file in sorted(folder.iterdir(), key=lambda file: file.name == 'report.html'):
+                store.write(f'{report}/{file.name}', file.read_bytes())
     except ArmidError as error:
-        return _row(case, 'failed', str(error))
+        return _failed(error)
     gap = result.core.gap
-    return _row(
-        case,
-        result.verdict,
-        result.core.summary,
-        list(dict.fromkeys(result.names)),
-        None if gap is None else float(gap.closed),
-        f'{report}/report.html',
-    )
-
-
-def _row(
-    case: ArmCase,
-    verdict: str,
-    summary: str,
-    effects: Sequence[str] = (),
-    closed: float | None = None,
-    report: str = '',
-) -> dict[str, Any]:
     return {
-        'arm': case.arm,
-        'verdict': verdict,
-        'summary': summary,
-        'effects': list(effects),
-        'closed': closed,
-        'baseline': list(case.before),
-        'bags': list(case.after),
-        'report': report,
+        'verdict': result.verdict,
+        'summary': result.core.summary,
+        'effects': list(dict.fromkeys(result.names)),
+        'closed': None if gap is None else float(gap.closed),
+        'report': f'{report}/report.html',
+    }
+
+
+def _failed(error: BaseException | None) -> dict[str, Any]:
+    return {
+        'verdict': 'failed',
+        'summary': str(error),
+        'effects': [],
+        'closed': None,
+        'report': '',
     }

@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from armid_ros.changes.histories import HistoryChange
 from armid_ros.changes.scatter import ParameterHistory
-from armid_ros.fleet.bags import BagFile, DAY_NS, file_name, folder_of
+from armid_ros.fleet.bags import BagFile, DAY_NS, file_name
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import (
     change_rows,
@@ -37,52 +36,31 @@ import numpy as np
 
 #: Characters of the names of arms that the first sentence lists.
 _LISTED = 60
-#: Parameters that have a column of curves in the overview.
-_COLUMNS = 9
 #: Refused bags that the overview lists.
 _SHOWN = 50
-#: Robust deviations of the fleet by which an arm is unlike its siblings.
-_UNLIKE = 3.5
 #: Size of a small curve, and of a larger one with intervals [px].
 _SMALL, _LARGE = (84, 20), (250, 74)
 
 Diagnoses = Mapping[str, Mapping[str, Any]]
 
 
-def write_pages(store: Store, found: Watch, arms: Sequence[WatchedArm] | None = None) -> None:
-    """Write the pages of some arms, as when a bag has got a report; of all, and index.html."""
-    reports = set(store.names('reports/arm=*/*/report.html'))
+def write_pages(store: Store, found: Watch) -> None:
+    """Write the pages of all arms, and index.html."""
     table = store.read_table('watch/diagnoses.parquet')
     diagnoses = {} if table is None else {row['arm']: row for row in table.to_pylist()}
-    for arm in found.arms if arms is None else arms:
-        page = _arm_page(found, arm, reports, diagnoses)
-        store.write(f'pages/{file_name(arm.arm)}.html', page)
-    if arms is None:
-        store.write('index.html', _overview(found, diagnoses))
+    for arm in found.arms:
+        store.write(f'pages/{file_name(arm.arm)}.html', _arm_page(found, arm, diagnoses))
+    store.write('index.html', _overview(found, diagnoses))
 
 
 def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     """Return the page with all arms, and the diagnoses of some."""
-    # a column for the parameters that arms are named for most often, then for those of effects
-    named = Counter(one.series.parameter for arm in found.arms for one in arm.named[:1])
-    order = [parameter for parameter, _ in named.most_common()]
-    for arm in found.arms[:1]:
-        order += [one.parameter for one in arm.series if one.name in found.wearing]
-    columns = list(dict.fromkeys(order))[:_COLUMNS]
-    heads = (
-        'Arm',
-        'Health',
-        'What',
-        'Bags',
-        'Refused',
-        'Error',
-        *(parameter_label(*one) for one in columns),
-    )
-    rows = [_arm_row(arm, columns, diagnoses.get(arm.arm)) for arm in found.arms]
+    heads = ('Arm', 'Health', 'What', 'Bags', 'Refused', 'Error')
+    rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
-        'Small curves: one parameter over time, each in its own range, at least six deviations '
-        'high; a dashed line is where it changed. Error: median of 100 |residual torque| / '
-        '|torque| over the bags of an arm, each fitted by itself.'
+        'Small curves: the parameter that changed over time, at least six deviations high; a '
+        'dashed line is where it changed. Error: median of 100 |residual torque| / |torque| '
+        'over the bags of an arm, each fitted by itself.'
     )
     sections: list[Section] = [_verdict(found), _table('Arms', heads, rows, (3, 4, 5), hint)]
     refused = [row for arm in found.arms for row in arm.refused]
@@ -99,20 +77,14 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
     return Page('A fleet over time', subtitle, sections, charts=False).html()
 
 
-def _arm_page(found: Watch, arm: WatchedArm, reports: set[str], diagnoses: Diagnoses) -> str:
-    """Return the page of an arm; reports are the files that bags and diagnosis have."""
+def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
+    """Return the page of an arm."""
     texts = [row['text'] for row in change_rows(arm)]
     tone = {'changed': 'bad', 'wearing': 'fair', 'healthy': 'good'}.get(arm.health, 'fair')
     first = (texts or ['No parameter has changed more than noise and other bags explain.'])[0]
     beware = [*texts[1:6]]
     if len(texts) > 6:
         beware.append(f'... and {len(texts) - 6} more')
-    name, distance = arm.unlike
-    if abs(distance) > _UNLIKE:
-        beware.append(
-            f'{name} is {abs(distance):.1f} deviations of the fleet '
-            f'{"above" if distance > 0 else "below"} that of its siblings'
-        )
     diagnosis = diagnoses.get(arm.arm)
     step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'
     sections: list[Section] = [
@@ -144,7 +116,7 @@ def _arm_page(found: Watch, arm: WatchedArm, reports: set[str], diagnoses: Diagn
     hint = 'Slope of a straight line through all bags with its 95 % interval, each by itself.'
     sections += [
         _table('Wear', ('Parameter', 'Trend'), rows, (1,), hint),
-        _bags(arm, reports),
+        _bags(arm),
     ]
     if arm.refused:
         sections.append(_refused(arm.refused))
@@ -174,11 +146,8 @@ def _verdict(found: Watch) -> VerdictSection:
     return VerdictSection(grade, tone, sentences, beware, step=step)
 
 
-def _arm_row(
-    arm: WatchedArm, columns: Sequence[tuple[str, str]], diagnosis: Mapping[str, Any] | None
-) -> list[str]:
+def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
     """Return the cells of an arm in the overview."""
-    by_parameter = {one.parameter: one for one in arm.series}
     page = f'pages/{quote(file_name(arm.arm))}.html'
     what = Markup('')
     for row in change_rows(arm)[:1]:
@@ -188,7 +157,11 @@ def _arm_row(
         report = _link(diagnosis['report'], 'Diagnosis')
         what += Markup('<br>{}: {}').format(report, diagnosis['summary'])
     for first in arm.named[:1]:
-        what += _spark(first.series, arm.named)
+        series = first.series
+        label, last = parameter_label(*series.parameter), digits(series.values[-1], 3)
+        order = np.arange(len(series.values), dtype=float)
+        title = f'{label}: {last} {series.unit}'
+        what += _drawing(order, series.values, series.std, first.index, title=title)[0]
     errors = sorted(e for row in arm.bags if (e := row['relative_error_percent']) is not None)
     mark = Markup('<span class="mark {}">{}</span>').format(arm.health.split(' ')[0], arm.health)
     return [
@@ -198,20 +171,7 @@ def _arm_row(
         str(len(arm.bags)),
         str(len(arm.refused) or ''),
         f'{digits(errors[len(errors) // 2])} %' if errors else '',
-        *(_spark(by_parameter.get(parameter), arm.named) for parameter in columns),
     ]
-
-
-def _spark(series: ParameterHistory | None, named: Sequence[HistoryChange]) -> Markup:
-    if series is None or len(series.values) < 2:
-        return Markup('')
-    title = f'{parameter_label(*series.parameter)}: {digits(series.values[-1], 3)} {series.unit}'
-    order = np.arange(len(series.values), dtype=float)
-    return _drawing(order, series.values, series.std, _cut(series, named), title=title)[0]
-
-
-def _cut(series: ParameterHistory, named: Sequence[HistoryChange]) -> int:
-    return next((one.index for one in named if one.series.parameter == series.parameter), 0)
 
 
 def _curve(arm: WatchedArm, series: ParameterHistory) -> tuple[str, str, Markup, str]:
@@ -219,18 +179,16 @@ def _curve(arm: WatchedArm, series: ParameterHistory) -> tuple[str, str, Markup,
     for day in series.days:
         nearest = min(arm.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
         links.append(f'#{BagFile(arm.arm, nearest["bag"]).name}')
-    cut = _cut(series, arm.named)
-    svg, ends = _drawing(series.days, series.values, series.std, cut, links)
+    cuts = [one.index for one in arm.named if one.series.parameter == series.parameter]
+    svg, ends = _drawing(series.days, series.values, series.std, sum(cuts), links)
     shown = f'{digits(ends[0], 3)} to {digits(ends[1], 3)} {series.unit}'.rstrip()
-    changed = any(one.series.parameter == series.parameter for one in arm.named)
-    return parameter_label(*series.parameter), shown, svg, 'changed' * changed
+    return parameter_label(*series.parameter), shown, svg, 'changed' if cuts else ''
 
 
-def _bags(arm: WatchedArm, reports: set[str]) -> Section:
+def _bags(arm: WatchedArm) -> Section:
     rows = []
     for row in arm.bags:
         name = BagFile(arm.arm, row['bag']).name
-        report = f'reports/{folder_of(arm.arm)}/{name}/report.html'
         worst = ''
         if row['residual_std']:
             size, joint = max(zip(row['residual_std'], row['joints'], strict=True))
@@ -240,10 +198,7 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Section:
         rows.append(
             (
                 Markup('<span id="{}">{}</span>').format(name, start),
-                _link(
-                    f'../{quote(report)}' if report in reports else '',
-                    row['bag'].rstrip('/').rsplit('/', 1)[-1],
-                ),
+                row['bag'].rstrip('/').rsplit('/', 1)[-1],
                 f'{row["seconds"]:.0f} s',
                 '' if error is None else f'{digits(error)} %',
                 worst,
@@ -251,12 +206,7 @@ def _bags(arm: WatchedArm, reports: set[str]) -> Section:
             )
         )
     heads = ('Start (UTC)', 'Bag', 'Length', 'Error', 'Largest residual [N m]', 'Notes')
-    hint = (
-        'A bag with a link has a report of its own. That of any other is made by '
-        f'`armid fleet report --out RESULTS --arm {arm.arm} --bag NAME`; without --bag, those '
-        'around its change and the latest.'
-    )
-    return _table('Bags', heads, rows, (2, 3, 4), hint)
+    return _table('Bags', heads, rows, (2, 3, 4))
 
 
 def _refused(rows: Sequence[Mapping[str, Any]], hint: str = '') -> Section:

@@ -8,7 +8,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 import itertools
-import time
 from typing import Any
 
 from armid_ros.errors import ArmidError, FleetError
@@ -38,10 +37,6 @@ RETRIES = 3
 TASK_BYTES, TASK_BAGS = 16_000_000, 16
 #: Groups of bags under way: so many, and so many more for every thread of the cluster.
 _UNDER_WAY, _MORE = 2, 3
-#: Times that a scheduler may be lost.
-_LOST = 5
-#: How often is looked whether it is back [s].
-_LOOK_EVERY = 0.1
 #: What tasks are called whose scheduler is gone.
 _BROKEN = ('cancelled', 'lost')
 
@@ -209,23 +204,14 @@ def identify_fleet(
     Raises
     ------
     FleetError
-        The scheduler was lost and did not come back.
+        The scheduler was lost; what is done is kept for a run with `resume`.
 
     """
     run = _Run(client, bags, job_of, tell)
-    for _ in range(_LOST):
-        if run.work():
-            outcomes = sorted(run.outcomes, key=lambda one: one.arm)
-            filters = {job.arm.robot.name: job.filters for job in job_of.values()}
-            return FleetOutcome(tuple(outcomes), filters)
-        while client.status == 'connecting':
-            time.sleep(_LOOK_EVERY)
-        if client.status != 'running':
-            break
-    raise FleetError(
-        'the scheduler was lost, and with it the tasks; what is done is kept: run the same '
-        'command again with --resume'
-    )
+    run.work()
+    outcomes = sorted(run.outcomes, key=lambda one: one.arm)
+    filters = {job.arm.robot.name: job.filters for job in job_of.values()}
+    return FleetOutcome(tuple(outcomes), filters)
 
 
 @dataclass(frozen=True)
@@ -280,11 +266,10 @@ class _Run:
                 self.outcomes.append(ArmOutcome(arm, done, done, tuple(refused)))
                 self._count(own)
 
-    def work(self) -> bool:
-        """Keep so many arms under way that no worker waits; return False when all were lost."""
+    def work(self) -> None:
+        """Keep so many arms under way that no worker waits, until all have ended."""
         limit = _UNDER_WAY + _MORE * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
-        self._jobs = {}
         ended = as_completed(raise_errors=False)
         while self._waiting or under_way:
             while self._waiting and sum(len(one.prepared) for one in under_way.values()) < limit:
@@ -299,15 +284,16 @@ class _Run:
                 # done again.
                 outcome = None
             if future.status in _BROKEN:
-                self._waiting.extendleft(one.arm for one in under_way.values())
-                return False
+                raise FleetError(
+                    'the scheduler was lost, and with it the tasks; what is done is kept: run '
+                    'the same command again with --resume'
+                )
             tasks = under_way.pop(future.key)
             if outcome is None:
                 self._begin_again(tasks)
             else:
                 refused = (*tasks.arm.refused, *outcome.refused)
                 self.outcomes.append(replace(outcome, refused=refused))
-        return True
 
     def _count(self, bags: Sequence[BagFile]) -> None:
         """Count bags that have ended."""

@@ -12,10 +12,9 @@ A fleet over time: series of its results, changes and alarms.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 import datetime
-import itertools
 import json
 from typing import Any
 
@@ -24,7 +23,6 @@ from armid_ros.changes.histories import (
     judge,
     Judged,
     named,
-    unlike_siblings,
     wear,
 )
 from armid_ros.changes.scatter import ParameterHistory, Spread, spreads, without_days
@@ -35,8 +33,6 @@ from armid_ros.fleet.kinds import document
 from armid_ros.fleet.plan import kind_arm
 from armid_ros.fleet.results import table_of
 from armid_ros.fleet.store import Store
-from armid_ros.identification.assess.comparison import ParameterChange, unit_factors
-from armid_ros.report.compare_report import tell_units
 from armid_ros.report.families import full_label
 import numpy as np
 import pyarrow as pa
@@ -52,7 +48,7 @@ RESIDUAL = 'residual'
 CHANGES = pa.schema(
     [
         ('arm', pa.string()),
-        ('kind', pa.string()),  # step, trend or units
+        ('kind', pa.string()),  # step or trend
         ('name', pa.string()),
         ('joint', pa.string()),
         ('unit', pa.string()),
@@ -86,8 +82,6 @@ ARMS = pa.schema(
         ('refused', pa.int64()),
         ('adjusted_p', pa.float64()),
         ('relative_error_percent', pa.float64()),  # median of its bags
-        ('unlike', pa.string()),  # the parameter furthest from that of its siblings
-        ('unlike_by', pa.float64()),  # in robust standard deviations of the arms
     ]
 )
 
@@ -113,13 +107,8 @@ class WatchedArm:
         Results of the tests.
     named : tuple of HistoryChange
         What it is named for.
-    unlike : tuple of str and float
-        Parameter furthest from that of its siblings, and by how much.
     refused : tuple of dict
         Rows of the table ``refused``.
-    units : dict or None
-        A row of ``changes`` where torques of a bag are in another unit than those before; its
-        size is the median factor less 1.
 
     """
 
@@ -130,23 +119,18 @@ class WatchedArm:
     bags: tuple[dict[str, Any], ...]
     judged: Judged
     named: tuple[HistoryChange, ...]
-    unlike: tuple[str, float]
     refused: tuple[dict[str, Any], ...]
-    units: dict[str, Any] | None = None
 
     @property
     def health(self) -> str:
         """One word or two."""
-        if self.units is not None:
-            return 'changed'
         if self.named:
             return 'changed' if self.named[0].kind == 'step' else 'wearing'
         return 'healthy' if self.judged.changes else 'too few bags'
 
-    def bag_at(self, change: HistoryChange, offset: int = 0) -> dict[str, Any]:
-        """Return the row of the bag at a change: the first one after it, or so many from it."""
-        at = change.index if change.kind == 'step' else len(change.series.days) - 1
-        day = change.series.days[min(max(0, at + offset), len(change.series.days) - 1)]
+    def bag_at(self, change: HistoryChange) -> dict[str, Any]:
+        """Return the row of the bag at a change: the first one after a step, or the last one."""
+        day = change.series.days[change.index if change.kind == 'step' else -1]
         return min(self.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
 
 
@@ -208,21 +192,15 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     kinds, arms = [], []
     own: dict[str, list[ParameterHistory]] = {}
     compared: dict[str, list[ParameterHistory]] = {}
-    unlike: dict[tuple[str, str, str], float] = {}
     for key, group in by_kind.items():
         without = without_days(group)
         spread[key] = spreads(without)
         kinds.append((without, spread[key]))
-        unlike |= unlike_siblings(group)
         for one, other in zip(group, without, strict=True):
             own.setdefault(one.arm, []).append(one)
             compared.setdefault(one.arm, []).append(other)
     for judged in judge(kinds):
         name = judged.arm
-        distances = {
-            one: unlike[name, *one.parameter] for one in own[name] if one.name != RESIDUAL
-        }
-        furthest = max(distances, key=lambda one: abs(distances[one]), default=None)
         arms.append(
             WatchedArm(
                 name,
@@ -232,14 +210,9 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
                 tuple(bags.get(name, ())),
                 judged,
                 named(judged, alpha),
-                ('', 0.0)
-                if furthest is None
-                else (parameter_label(*furthest.parameter), distances[furthest]),
                 tuple(refused.get(name, ())),
-                _units(own[name], bags.get(name, ())),
             )
         )
-    arms.sort(key=lambda arm: arm.units is None)
     return Watch(tuple(arms), spread, frozenset(wearing), alpha)
 
 
@@ -274,8 +247,6 @@ def write_watch(store: Store, found: Watch) -> None:
                 'refused': len(arm.refused),
                 'adjusted_p': arm.judged.adjusted,
                 'relative_error_percent': float(np.median(errors)) if errors else None,
-                'unlike': arm.unlike[0],
-                'unlike_by': arm.unlike[1],
             }
         )
     wear = [row for arm in found.arms for row in wear_rows(found, arm)]
@@ -289,9 +260,7 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """Return the changes that an arm is named for, the least probable first; units alone."""
-    if arm.units is not None:
-        return [arm.units]
+    """Return the changes that an arm is named for, the least probable first."""
     rows = []
     for change in arm.named:
         series = change.series
@@ -365,41 +334,6 @@ def parameter_label(name: str, joint: str) -> str:
     if name.isidentifier() and '_' in name:
         return f'{name.replace("_", " ")} of {joint}'
     return full_label(ParameterName(name, joint, ''))
-
-
-def _units(
-    series: Sequence[ParameterHistory], bags: Sequence[dict[str, Any]]
-) -> dict[str, Any] | None:
-    """Return the first change of the unit of torques, as a row of the table ``changes``."""
-    of_bag: dict[float, dict[ParameterName, tuple[float, float]]] = {}
-    for one in (s for s in series if s.name != RESIDUAL):
-        parameter = ParameterName(one.name, one.joint, one.unit)
-        for day, value, std in zip(one.days, one.values, one.std, strict=True):
-            of_bag.setdefault(float(day), {})[parameter] = value, std
-    for before, after in itertools.pairwise(bags):
-        first, then = (of_bag.get(row['start_ns'] / DAY_NS, {}) for row in (before, after))
-        factors = unit_factors(
-            [
-                ParameterChange(name, first[name][0], then[name][0], first[name][1], then[name][1])
-                for name in first
-                if name in then
-            ]
-        )
-        if factors:
-            return dict.fromkeys(CHANGES.names, 0.0) | {
-                'arm': after['arm'],
-                'kind': 'units',
-                'name': 'torque',
-                'joint': '',
-                'unit': '',
-                'last_day': day_text(before['start_ns'] / DAY_NS),
-                'first_day': day_text(after['start_ns'] / DAY_NS),
-                'bag': after['bag'],
-                'level': 1.0,
-                'size': float(np.median(list(factors.values()))) - 1.0,
-                'text': tell_units(before['bag'], after['bag'], factors),
-            }
-    return None
 
 
 def _series(

@@ -46,7 +46,6 @@ def test_identify_then_watch(bags, tmp_path):
             'no bag of humanoid_arm can be read',
         ),
         (('identify', '{bags}/*/*', '--robot', ROBOT, '--out', ROBOT), '--out is a folder'),
-        (('report', '--out', '{out}', '--arm', 'a'), 'run `armid fleet identify` first'),
         (('watch', '--out', '{out}'), 'run `armid fleet identify` first'),
         (('diagnose', '--out', '{out}'), 'run `armid fleet identify` first'),
     ],
