@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 from armid_ros.changes.statistic import quadratic_form
 from armid_ros.identification.online.background import Pieces
@@ -51,6 +50,12 @@ class Block:
         M = W^T W.
     right : ndarray, shape (P,)
         c = W^T tau.
+    moved : ndarray, shape (P, Q)
+        M D, along the changes that are looked for.
+    known : ndarray, shape (P, P)
+        Information before it, A = R^T R.
+    known_along : ndarray, shape (P, Q)
+        A D.
     before : Learned
         What was known when it began.
     narrow : Learned
@@ -64,44 +69,12 @@ class Block:
     end: float
     information: FloatArray
     right: FloatArray
+    moved: FloatArray
+    known: FloatArray
+    known_along: FloatArray
     before: Learned
     narrow: Learned
     samples: tuple[WeightedSample, ...]
-
-    @cached_property
-    def known(self) -> FloatArray:
-        """Information before it, A = R^T R, shape (P, P)."""
-        return np.asarray(self.before.root.T @ self.before.root)
-
-
-@dataclass(frozen=True, eq=False)
-class Projected:
-    """
-    A block along the changes that are looked for; it is part of several windows.
-
-    Attributes
-    ----------
-    block : Block
-        Rows, and what was known before them.
-    moved : ndarray, shape (P, Q)
-        M D.
-    known : ndarray, shape (P, Q)
-        A D.
-
-    """
-
-    block: Block
-    moved: FloatArray
-    known: FloatArray
-
-
-def projecting(block: Block, directions: FloatArray) -> Pieces[Projected]:
-    """Project a block on what the changes do to the parameters, shape (P, Q)."""
-    moved = block.information @ directions
-    yield
-    known = block.known
-    yield
-    return Projected(block, moved, known @ directions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +120,8 @@ class ScoreStatistics:
 
 
 def weighing(
-    window: Sequence[Projected],
-    before: Projected,
+    window: Sequence[Block],
+    before: Block,
     directions: FloatArray,
     residual_scale: float = 1.0,
 ) -> Pieces[ScoreStatistics]:
@@ -157,9 +130,9 @@ def weighing(
 
     Parameters
     ----------
-    window : sequence of Projected
+    window : sequence of Block
         Its blocks.
-    before : Projected
+    before : Block
         What was known when this one began is compared with the window.
     directions : ndarray, shape (P, Q)
         What the changes do to the parameters.
@@ -168,23 +141,23 @@ def weighing(
 
     """
     first = window[0]
-    information, right, moved = first.block.information, first.block.right, first.moved
+    information, right, moved = first.information, first.right, first.moved
     for one in window[1:]:
-        information = information + one.block.information
-        right, moved = right + one.block.right, moved + one.moved
+        information = information + one.information
+        right, moved = right + one.right, moved + one.moved
     yield
-    both = before.block.known / residual_scale**2 + information
+    both = before.known / residual_scale**2 + information
     scale = 1.0 / np.sqrt(np.diag(both))
     both *= scale * scale[:, np.newaxis]
     np.fill_diagonal(both, 1.0 + _NOTHING)
     yield
     factor, _ = lapack.dpotrf(both, lower=1, clean=0)
-    score = right - information @ before.block.before.values
+    score = right - information @ before.before.values
     scaled = np.asfortranarray(np.column_stack([moved, score]) * scale[:, np.newaxis])
     yield
     solved, _ = lapack.dpotrs(factor, scaled, lower=1, overwrite_b=1)
     yield
-    along = scale[:, np.newaxis] * before.known / residual_scale**2
+    along = scale[:, np.newaxis] * before.known_along / residual_scale**2
     shared = along.T @ solved
     strength = np.einsum('pq,pq->q', directions, moved)
     return ScoreStatistics((shared[:, :-1] + shared[:, :-1].T) / 2.0, shared[:, -1], strength)

@@ -18,13 +18,7 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.identification.online.background import Background, Pieces
 from armid_ros.identification.online.change import ChangeCandidate
-from armid_ros.identification.online.change_score import (
-    Block,
-    Projected,
-    projecting,
-    ScoreStatistics,
-    weighing,
-)
+from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.motion import FloatArray
 import numpy as np
@@ -127,6 +121,11 @@ class ChangeSearch:
     work : Background
         Learns what statistics usually are.
 
+    Attributes
+    ----------
+    directions : ndarray, shape (P, Q)
+        As given.
+
     """
 
     def __init__(
@@ -137,7 +136,7 @@ class ChangeSearch:
         work: Background,
     ) -> None:
         self._candidates = tuple(candidates)
-        self._directions = directions
+        self.directions = directions
         self._work = work
         sizes = [len(c.parameters) for c in self._candidates]
         self._sizes, ends = np.array(sizes), np.cumsum(sizes)
@@ -164,7 +163,7 @@ class ChangeSearch:
 
     def interrupt(self) -> None:
         """Begin a new stretch of blocks, which does not continue the one before."""
-        self._blocks: deque[Projected] = deque(maxlen=_KEPT)
+        self._blocks: deque[Block] = deque(maxlen=_KEPT)
         self._waiting: deque[dict[int, tuple[FloatArray, FloatArray]]] = deque()
 
     def take(self, block: Block, residual_scale: float) -> Pieces[FoundChange | None]:
@@ -179,9 +178,7 @@ class ChangeSearch:
             That noise over the one of what was learned before.
 
         """
-        projected = yield from projecting(block, self._directions)
-        yield
-        self._blocks.append(projected)
+        self._blocks.append(block)
         lengths = [m for m in _LENGTHS if m <= len(self._blocks)]
         weighed, positive = {}, False
         for m in lengths:
@@ -208,11 +205,8 @@ class ChangeSearch:
         self, found: FoundChange, residual_scale: float
     ) -> Pieces[tuple[FloatArray, FloatArray]]:
         """Return by how much a candidate has changed, and the covariance of that."""
-        blocks = []
-        for block in (found.blocks[found.before], *found.blocks[found.after :]):
-            blocks.append((yield from projecting(block, self._directions)))
-            yield
-        window = yield from weighing(blocks[1:], blocks[0], self._directions, residual_scale)
+        before, after = found.blocks[found.before], found.blocks[found.after :]
+        window = yield from weighing(after, before, self.directions, residual_scale)
         yield
         number = self._candidates.index(found.best)
         values, covariance = window.size(self._slices[number])
@@ -222,7 +216,7 @@ class ChangeSearch:
     def _window(self, first: int, residual_scale: float) -> Pieces[ScoreStatistics]:
         """Weigh the blocks from one on against what was known before it."""
         blocks = list(self._blocks)[first:]
-        return weighing(blocks, blocks[0], self._directions, residual_scale)
+        return weighing(blocks, blocks[0], self.directions, residual_scale)
 
     def _ratios(self, window: ScoreStatistics) -> FloatArray:
         ratios = np.empty(len(self._candidates))
@@ -244,14 +238,14 @@ class ChangeSearch:
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
         # the blocks from one on in which the torque of the candidate shows
         some = self._slices[best]
-        directions = self._directions[:, some]
+        directions = self.directions[:, some]
         moved = [one.moved[:, some] for one in self._blocks]
         strength = np.array([np.einsum('pq,pq->q', directions, one) for one in moved])
         shows = np.any(strength > _SHOWS * strength.max(axis=0), axis=1)
         seen = int(np.count_nonzero(shows[first:]))
         # soon after a change, no mere correction of its size counts as another
         t, before = self._fresh
-        soon = self._blocks[-1].block.end - t < _LEARNING
+        soon = self._blocks[-1].end - t < _LEARNING
         least = max(_CLEAR, _CORRECTION * before) if soon else _CLEAR
         if not (at[best] > least and seen >= _EARLIEST):
             return None
@@ -261,12 +255,11 @@ class ChangeSearch:
         rivals = tuple(c for c in alike if not (c.includes(named) or named.includes(c)))
         if rivals and seen < _LATEST:
             return None
-        blocks = tuple(projected.block for projected in self._blocks)
-        return FoundChange(blocks, first, named, rivals, float(at[best]))
+        return FoundChange(tuple(self._blocks), first, named, rivals, float(at[best]))
 
     def _likelihood(self, ratios: FloatArray) -> FloatArray:
         """Return logarithms of likelihoods, each free parameter being charged for."""
         factors = np.concatenate([u.factors for u in self._usual.values()])
         usual = float(np.nanmedian(factors))
-        observations = sum(len(one.block.samples) for one in self._blocks)
+        observations = sum(len(block.samples) for block in self._blocks)
         return np.asarray(ratios / (2.0 * usual) - 0.5 * self._sizes * np.log(observations))

@@ -245,7 +245,7 @@ class ChangeWatch:
     def _summed(
         self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
     ) -> Pieces[Block]:
-        """Sum up the rows of a block."""
+        """Sum up the rows of a block, and project them on the changes that are looked for."""
         residual_scale, residuals, squares = self._residual_scale.value, [], 0.0
         size = len(self._wider.parameters)
         information, right = np.zeros((size, size)), np.zeros(size)
@@ -263,8 +263,21 @@ class ChangeWatch:
         if weights.any():
             self._left.append(squares / float(np.sum(weights)))
         yield
+        moved = information @ self._search.directions
+        yield
+        known = before.root.T @ before.root
+        yield
         return Block(
-            stretch.begin, end, information, right, before, stretch.narrow, tuple(samples)
+            begin=stretch.begin,
+            end=end,
+            information=information,
+            right=right,
+            moved=moved,
+            known=known,
+            known_along=known @ self._search.directions,
+            before=before,
+            narrow=stretch.narrow,
+            samples=tuple(samples),
         )
 
     @property

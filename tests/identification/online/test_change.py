@@ -4,17 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
-from armid_ros.identification.online.change_score import (
-    Block,
-    projecting,
-    ScoreStatistics,
-    weighing,
-)
+from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
@@ -37,7 +30,7 @@ def watching(estimator, candidate):
 
 
 def learned_and_block(
-    rng, delta: float, seen: int = 4
+    rng, delta: float, seen: int = 4, directions=CHANGED, noise=1.0
 ) -> tuple[RecursiveLeastSquares, Block, np.ndarray, np.ndarray]:
     """Learn from 400 rows of `seen` parameters, then take in 60 rows after a change."""
     estimator = RecursiveLeastSquares(NAMES, [1.0])
@@ -46,15 +39,17 @@ def learned_and_block(
         estimator.update(row[np.newaxis], np.atleast_1d(row @ TRUTH + rng.normal()))
     w = rng.normal(size=(60, 5))
     tau = w @ (TRUTH + delta * CHANGED[:, 0]) + rng.normal(size=60)
-    known = estimator.learned()
-    block = Block(0.0, 1.0, w.T @ w, w.T @ tau, known, known, ())
+    learned = estimator.learned()
+    products, right = w.T @ w / noise**2, w.T @ tau / noise**2
+    known = learned.root.T @ learned.root
+    along = products @ directions, known, known @ directions
+    block = Block(0.0, 1.0, products, right, *along, learned, learned, ())
     return estimator, block, w, tau
 
 
 def score_statistics(block, directions, residual_scale=1.0):
     """Weigh possible changes by a block, against what was known when it began."""
-    projected = at_once(projecting(block, directions))
-    return at_once(weighing([projected], projected, directions, residual_scale))
+    return at_once(weighing([block], block, directions, residual_scale))
 
 
 def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
@@ -71,9 +66,8 @@ def test_the_size_of_a_change_is_that_of_least_squares_over_all_rows():
 
 
 def test_what_was_learned_in_another_unit_of_noise_is_as_certain():
-    rng = np.random.default_rng(6)
-    _, block, w, tau = learned_and_block(rng, 0.7, seen=5)
-    loud = replace(block, information=w.T @ w / 9.0, right=w.T @ tau / 9.0)
+    _, block, _, _ = learned_and_block(np.random.default_rng(6), 0.7, seen=5)
+    _, loud, _, _ = learned_and_block(np.random.default_rng(6), 0.7, seen=5, noise=3.0)
     found, covariance = score_statistics(loud, CHANGED, 3.0).size(slice(0, 1))
     expected, certain = score_statistics(block, CHANGED).size(slice(0, 1))
     assert found[0] == pytest.approx(expected[0], rel=1e-6)
@@ -90,9 +84,8 @@ def test_without_a_change_the_ratio_is_chi_square():
 
 
 def test_what_was_never_known_cannot_be_seen_to_change():
-    rng = np.random.default_rng(2)
-    _, block, _, _ = learned_and_block(rng, 5.0)
     unknown = np.eye(5)[:, [4]]
+    _, block, _, _ = learned_and_block(np.random.default_rng(2), 5.0, directions=unknown)
     assert score_statistics(block, unknown).ratios(np.array([[0]]))[0] < 1e-3
 
 
