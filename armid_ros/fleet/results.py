@@ -108,17 +108,13 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
         'start': start,
         'start_ns': summary.start_ns,
         'seconds': summary.seconds,
-        'samples': summary.samples,
         'bytes': bag.size,
         'relative_error_percent': None if own is None else own.relative_error_percent,
         'condition_number': None if own is None else own.condition_number,
         'joints': list(robot.joints),
         'residual_std': None if own is None else own.joint_std,
-        'lowest': summary.lowest,
-        'highest': summary.highest,
-        'top_speed': summary.top_speed,
-        'notes': list(summary.notes),
         'normal_equations': summary.normal.packed(),
+        **summary.motion,
     }
     store.write_table(part_of('bags', bag, summary.day), pa.Table.from_pylist([row], BAGS))
     for day in [] if bag.day else _days(store, bag):
@@ -150,10 +146,6 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
                 day,
                 row['start_ns'],
                 row['seconds'],
-                row['samples'],
-                np.array(row['lowest']),
-                np.array(row['highest']),
-                np.array(row['top_speed']),
                 NormalEquations.unpacked(np.array(row['normal_equations'])),
                 computed=row['run'] == job.run,
             )

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 import datetime
 
 from armid_ros.errors import ArmidError, IdentificationError
@@ -17,7 +17,6 @@ from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.checks import check_positions, check_torque, resting
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.identification.rows.streaming import streamed
-from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
@@ -40,18 +39,12 @@ class BagSummary:
         Its first stamp [ns], put on `day` where it is more than a day away.
     seconds : float
         From the first sample to the last [s].
-    samples : int
-        How many there are.
-    lowest, highest : ndarray, shape (n,)
-        Positions [rad or m].
-    top_speed : ndarray, shape (n,)
-        Of the filtered motion [rad/s or m/s].
     normal : NormalEquations
         Its rows in the columns that the arm's theory keeps.
     own : FleetEstimate or None
         Its estimate by itself; None where it is too short for that, or among the results.
-    notes : tuple of str
-        What a person should know.
+    motion : dict
+        Further columns of the table ``bags``; empty where it was found among the results.
     computed : bool
         False where it was found among the results.
 
@@ -61,13 +54,9 @@ class BagSummary:
     day: str
     start_ns: int
     seconds: float
-    samples: int
-    lowest: FloatArray
-    highest: FloatArray
-    top_speed: FloatArray
     normal: NormalEquations
     own: FleetEstimate | None = None
-    notes: tuple[str, ...] = ()
+    motion: Mapping[str, object] = field(default_factory=dict)
     computed: bool = True
 
 
@@ -172,8 +161,14 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
             if sum(part.columns.nbytes for part in kept) > budget:
                 kept = None
     check_positions(robot, path, lowest, highest)
-    notes = resting(robot, path, highest - lowest)
-    if normal is None:
+    motion = {
+        'samples': samples,
+        'lowest': lowest,
+        'highest': highest,
+        'top_speed': top_speed,
+        'notes': list(resting(robot, path, highest - lowest)),
+    }
+    if not triangles:
         raise IdentificationError(
             f'{path}: {seconds:.2f} s in {samples} samples is too short; '
             'record a movement of several seconds'
@@ -188,6 +183,5 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
     apart = datetime.date.fromisoformat(day) - stamped.date()
     if abs(apart.days) > 1:  # the clock counts from its start; one day off is a time zone
         start_ns += apart.days * DAY_NS
-    motion = start_ns, seconds, samples, lowest, highest, top_speed
-    summary = BagSummary(bag, day, *motion, normal, own, notes)
+    summary = BagSummary(bag, day, start_ns, seconds, triangle, own, motion)
     return PreparedBag(summary, None if kept is None else tuple(kept))

@@ -5,7 +5,6 @@
 import json
 import re
 
-from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import find_bags
 from armid_ros.fleet.diagnose import cases, diagnose_fleet
 from armid_ros.fleet.pages import write_pages
@@ -106,8 +105,3 @@ def test_the_diagnosis_names_what_happened_with_the_arms_own_past_as_baseline(li
     write_pages(store, found)
     page = store.read(f'pages/{arm}.html').decode()
     assert 'payload' in page and 'diagnosis/report.html' in page
-
-
-def test_a_folder_without_results_is_said(tmp_path):
-    with pytest.raises(FleetError, match='armid fleet identify'):
-        watch_fleet(Store(str(tmp_path)))
