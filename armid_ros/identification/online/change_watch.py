@@ -54,13 +54,18 @@ _TOGETHER, _ONE_BY_ONE = 10, 4
 _WIDENED = 3
 
 
-#: A sample, and what its nuisance rows are made from; None begins a new stretch.
-Narrow = tuple[WeightedSample, Seed | None]
+#: A sample, and what its nuisance rows are made from.
+Narrow = tuple[WeightedSample, Seed]
 
 
 @dataclass(eq=False)
 class _Stretch:
-    """Samples that were not searched so far; those of a block, or what an interruption left."""
+    """
+    Samples that were not searched so far; those of a block, or what an interruption left.
+
+    None among them begins a new stretch of rows.
+
+    """
 
     begin: float
     narrow: Learned
@@ -76,7 +81,7 @@ class ChangeWatch:
     ----------
     estimator : RecursiveLeastSquares
         Learns.
-    nuisance : NuisanceRows or None
+    nuisance : NuisanceRows
         Makes rows of what is learned for the tests alone.
     candidates : sequence of ChangeCandidate
         What may change.
@@ -95,14 +100,14 @@ class ChangeWatch:
     def __init__(
         self,
         estimator: RecursiveLeastSquares,
-        nuisance: NuisanceRows | None,
+        nuisance: NuisanceRows,
         candidates: Sequence[ChangeCandidate],
         settings: ChangeSettings,
         work: Background,
     ) -> None:
         self._estimator = estimator
         self._nuisance = nuisance
-        self._wider = estimator.with_more(() if nuisance is None else nuisance.parameters)
+        self._wider = estimator.with_more(nuisance.parameters)
         self._own = len(estimator.parameters)
         self._work = work
         self._search = ChangeSearch(
@@ -126,8 +131,7 @@ class ChangeWatch:
         self._unseen: deque[_Stretch] = deque()
         self._late: list[Narrow | None] | None = None
         self._searching = False
-        if self._nuisance is not None:
-            self._nuisance.reset()
+        self._nuisance.reset()
 
     def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
         """
@@ -154,7 +158,7 @@ class ChangeWatch:
         self._open.samples.append(None)
         self._hand_over(None)
 
-    def update(self, t: float, sample: WeightedSample, seed: Seed | None = None) -> FloatArray:
+    def update(self, t: float, sample: WeightedSample, seed: Seed) -> FloatArray:
         """
         Let the estimator take in one sample; see ``RecursiveLeastSquares.update``.
 
@@ -164,8 +168,8 @@ class ChangeWatch:
             Time of the sample [s].
         sample : WeightedSample
             Of the estimator.
-        seed : Seed, optional
-            What the nuisance rows are made from, where there are any.
+        seed : Seed
+            What the nuisance rows are made from.
 
         """
         if self._open is not None and t - self._open.begin >= BLOCK:
@@ -228,17 +232,15 @@ class ChangeWatch:
             if narrow is not None:
                 waiting.append(narrow)
             if narrow is None or len(waiting) == _WIDENED or number == len(samples):
-                seeds = [seed for _, seed in waiting if seed is not None]
-                own = [sample for sample, _ in waiting]
-                if self._nuisance is not None and seeds:
-                    narrow_rows = np.stack([sample.rows for sample in own])
-                    rows = np.concatenate([narrow_rows, self._nuisance.rows(seeds)], axis=2)
-                    pairs = zip(own, rows, strict=True)
-                    own = [sample._replace(rows=wide) for sample, wide in pairs]
-                whole += own
+                if waiting:
+                    own = np.stack([sample.rows for sample, _ in waiting])
+                    further = self._nuisance.rows([seed for _, seed in waiting])
+                    rows = np.concatenate([own, further], axis=2)
+                    for (sample, _), wide in zip(waiting, rows, strict=True):
+                        whole.append(sample._replace(rows=wide))
                 waiting = []
                 yield
-            if narrow is None and self._nuisance is not None:
+            if narrow is None:
                 self._nuisance.reset()
         return whole
 

@@ -9,7 +9,7 @@ import copy
 import time
 
 from armid_ros.identification.online import identifier as online_identifier
-from armid_ros.identification.online.background import at_once, Background
+from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.identifier import OnlineIdentifier
 from armid_ros.nodes.running.process import steady
 import numpy as np
@@ -54,14 +54,6 @@ def test_a_job_that_fails_is_given_up_and_the_others_go_on():
         work.advance()
     work.finish()
     assert done == ['a0']
-
-
-def test_at_once_returns_what_a_job_found():
-    def job():
-        yield
-        return 3
-
-    assert at_once(job()) == 3
 
 
 @pytest.fixture(scope='module')
