@@ -64,7 +64,13 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
     except (OSError, ValueError, TimeoutError) as error:
         raise FleetError(f'--scheduler {scheduler}: does not answer: {error}') from error
     with client:
-        _check_versions(client, scheduler)
+        workers = client.get_versions(packages=['armid_ros'])['workers'].values()
+        other = {str(worker['packages']['armid_ros']) for worker in workers} - {__version__}
+        if other:
+            raise FleetError(
+                f'--scheduler {scheduler}: its workers have armid_ros {", ".join(sorted(other))}, '
+                f'here it is {__version__}; install the same one'
+            )
         yield client
 
 
@@ -94,22 +100,3 @@ def _embedded(workers: int | None) -> Iterator[Client]:
                 yield client
     finally:
         os.environ['PYTHONSAFEPATH'] = before
-
-
-def _check_versions(client: Client, scheduler: str) -> None:
-    try:
-        versions = client.run(_version)
-    except ImportError as error:
-        raise FleetError(f'--scheduler {scheduler}: its workers lack {error.name}') from error
-    other = sorted({version for version in versions.values() if version != __version__})
-    if other:
-        raise FleetError(
-            f'--scheduler {scheduler}: its workers have armid_ros {", ".join(other)}, '
-            f'here it is {__version__}; install the same one'
-        )
-
-
-def _version() -> str:
-    from armid_ros.version import __version__
-
-    return __version__
