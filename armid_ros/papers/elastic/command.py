@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from armid_ros.cli import parameters as options
 import click
@@ -41,19 +42,7 @@ import click
 @options.reading
 @options.seed
 @options.as_json
-def elastic(
-    bags: tuple[Path, ...],
-    steps: tuple[Path, ...],
-    demo: bool,
-    experiments: int,
-    robot_source: str,
-    start: str | None,
-    model: Path | None,
-    out: Path,
-    seed: int,
-    as_json: bool,
-    **drives: str | None,
-) -> None:
+def elastic(out: Path, seed: int, as_json: bool, robot_source: str, **given: Any) -> None:
     """
     Identify elastic joints.
 
@@ -62,7 +51,6 @@ def elastic(
     are found joint by joint.
 
     """
-    from armid_ros.papers.elastic.work import DriveOptions, ElasticData, identify_elastic
+    from armid_ros.papers.elastic.work import ElasticOptions, identify_elastic
 
-    data = ElasticData(bags, steps, robot_source, model, demo, experiments, start)
-    identify_elastic(data, DriveOptions(**drives), out, seed, as_json)
+    identify_elastic(ElasticOptions(robot=robot_source, **given), out, seed, as_json)

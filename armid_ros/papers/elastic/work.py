@@ -36,7 +36,6 @@ from armid_ros.robots.two_link import (
     ROBOT,
     two_link_set,
     TwoLinkParameters,
-    TwoLinkSet,
 )
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
@@ -51,9 +50,9 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 
 
 @dataclass(frozen=True)
-class ElasticData:
+class ElasticOptions:
     """
-    What is identified.
+    What is identified, and what is known of sensors and motors.
 
     Attributes
     ----------
@@ -69,6 +68,8 @@ class ElasticData:
         How many of 4 s each are.
     start : str or None
         What the tuning begins with.
+    accelerometers, gear, kp, ki : str or None
+        Distances [m], gear ratios, gains of the velocity loop, two numbers each.
 
     """
 
@@ -79,55 +80,27 @@ class ElasticData:
     demo: bool
     experiments: int
     start: str | None
-
-
-@dataclass(frozen=True)
-class _Machine:
-    """A planar pair of links with its sensors, motors and velocity loop."""
-
-    robot: Robot
-    shipped: TwoLinkSet
-    sensors: Accelerometers
-    drives: TwoLinkParameters
-    loop: VelocityLoop
-
-
-@dataclass(frozen=True)
-class DriveOptions:
-    """
-    What is known of sensors and motors, two numbers each.
-
-    Attributes
-    ----------
-    accelerometers, gear, kp, ki : str or None
-        Distances [m], gear ratios, gains of the velocity loop.
-
-    """
-
     accelerometers: str | None
     gear: str | None
     kp: str | None
     ki: str | None
 
-    def pair(self, robot: Robot) -> _Machine:
-        """Return the pair that has them, and what is shipped for the rest."""
+    def machine(self, robot: Robot) -> tuple[Accelerometers, TwoLinkParameters, VelocityLoop]:
+        """Return sensors, drives and loop; what is not given is that of the shipped arm."""
         shipped = two_link_set('after')
-        usual = shipped.assumptions['accelerometer_radius']
-        radius = _two_numbers(self.accelerometers, 'accelerometers', usual)
-        sensors = Accelerometers.on(robot, radius)
-        gear = _two_numbers(self.gear, 'gear', shipped.parameters.gear)
+        radius = shipped.assumptions['accelerometer_radius']
+        sensors = Accelerometers.on(robot, _two_numbers(self, 'accelerometers', radius))
+        gear = _two_numbers(self, 'gear', shipped.parameters.gear)
         loop = two_link_loop(shipped)
         loop = replace(
             loop,
-            proportional=_two_numbers(self.kp, 'kp', loop.proportional),
-            integral=_two_numbers(self.ki, 'ki', loop.integral),
+            proportional=_two_numbers(self, 'kp', loop.proportional),
+            integral=_two_numbers(self, 'ki', loop.integral),
         )
-        return _Machine(robot, shipped, sensors, replace(shipped.parameters, gear=gear), loop)
+        return sensors, replace(shipped.parameters, gear=gear), loop
 
 
-def identify_elastic(
-    data: ElasticData, drives: DriveOptions, out: Path, seed: int, as_json: bool
-) -> None:
+def identify_elastic(data: ElasticOptions, out: Path, seed: int, as_json: bool) -> None:
     """Identify elastic joints."""
     begin = data.start or ('before' if data.demo else 'found')
     printed = None if begin == 'found' else two_link_set(begin).parameters
@@ -142,25 +115,26 @@ def identify_elastic(
         return
     if data.model is not None:
         raise RobotError('--model has no place in the three steps, which find the inertias')
-    pair = drives.pair(robot)
+    shipped = two_link_set('after')
+    sensors, drives, loop = data.machine(robot)
     staged = options.stage(out, SCHEMA, data.robot)
     with progress('reading') as tick:
         if data.demo:
-            data = _simulate(pair, staged, data, seed, tick)
+            data = _simulate(robot, sensors, staged, data, seed, tick)
         elif not data.bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
         how = options.read_settings(), options.tell_damage
         runs, responses = (
-            [run for path in paths for run in read_runs(path, robot, pair.sensors, *how)]
+            [run for path in paths for run in read_runs(path, robot, sensors, *how)]
             for paths in (data.bags, data.steps)
         )
         result = identify_two_inertia(
-            runs, pair.drives, steps=responses, loop=pair.loop, start=printed, progress=tick
+            runs, drives, steps=responses, loop=loop, start=printed, progress=tick
         )
         tick(1.0, 'writing')
         known, table = None, ''
         if robot.name == ROBOT:
-            known, table = pair.shipped.parameters, 'Table 1 of the source, after tuning'
+            known, table = shipped.parameters, 'Table 1 of the source, after tuning'
         elif printed is not None:
             known, table = printed, f"the set '{begin}', which the tuning began with"
         files, seeds = [*data.bags, *data.steps], seed if data.demo else None
@@ -169,7 +143,7 @@ def identify_elastic(
         write_file(staged.folder / 'report.html', page)
     document = elastic_document(result, data.robot)
     if data.demo and result.tuning is not None:
-        truth = pair.shipped.parameters
+        truth = shipped.parameters
         document['story'] = tuning_story(result.tuning, printed or result.untuned, truth)
     write_file(staged.folder / 'elastic.json', json_text(document, indent=1))
     staged.keep()
@@ -180,8 +154,9 @@ def identify_elastic(
     say(f'{out}: elastic.json, report.html')
 
 
-def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
-    """Read two positive numbers."""
+def _two_numbers(data: ElasticOptions, what: str, default: Any) -> FloatArray:
+    """Return the two positive numbers of an option."""
+    text = getattr(data, what)
     if text is None:
         return np.asarray(default, dtype=float)
     try:
@@ -194,13 +169,18 @@ def _two_numbers(text: str | None, what: str, default: Any) -> FloatArray:
 
 
 def _simulate(
-    pair: _Machine, staged: Staged, data: ElasticData, seed: int, tick: Tick
-) -> ElasticData:
+    robot: Robot,
+    sensors: Accelerometers,
+    staged: Staged,
+    data: ElasticOptions,
+    seed: int,
+    tick: Tick,
+) -> ElasticOptions:
     """Write bags of the simulated arm: through the resonances, and steps."""
     for name in DEMO_BAGS:
         require_new(staged.out / name)
     resonances, steps = (staged.folder / name for name in DEMO_BAGS)
-    rng, shipped = np.random.default_rng(seed), pair.shipped
+    rng, shipped = np.random.default_rng(seed), two_link_set('after')
     plant = two_link_plant(shipped.parameters)
     plans = (
         (
@@ -214,7 +194,7 @@ def _simulate(
     for path, loop, plan, noise in plans:
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
-        write_runs(path, runs, pair.robot, pair.sensors.on_links(pair.robot))
+        write_runs(path, runs, robot, sensors.on_links(robot))
     return replace(data, bags=(resonances,), steps=(steps,))
 
 

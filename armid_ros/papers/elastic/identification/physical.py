@@ -90,7 +90,7 @@ def ideal_response(
         parameters.link_damping,
     )
     values = np.array([*(quantity[joint] for quantity in own), 1.0])
-    return response(np.asarray(2j * np.pi * np.asarray(frequency, dtype=float)), values)[0]
+    return response(np.asarray(2j * np.pi * np.asarray(frequency, dtype=float)), values)
 
 
 def fit_joint(joint: DecoupledJoint) -> DecoupledFit:
@@ -109,16 +109,10 @@ def fit_joint(joint: DecoupledJoint) -> DecoupledFit:
     start = np.log(_first_guess(joint, frequency, found))
 
     def residual(logarithms: FloatArray) -> FloatArray:
-        ratio = (response(s, np.exp(logarithms))[0] / found - 1.0).ravel()
+        ratio = (response(s, np.exp(logarithms)) / found - 1.0).ravel()
         return np.concatenate([ratio.real, ratio.imag])
 
-    def jacobian(logarithms: FloatArray) -> FloatArray:
-        values = np.exp(logarithms)
-        ratio = response(s, values)[1] * values / found[..., np.newaxis]
-        flat = ratio.reshape(-1, len(values))
-        return np.concatenate([flat.real, flat.imag])
-
-    fit = least_squares(residual, start, jac=jacobian, x_scale='jac')
+    fit = least_squares(residual, start, x_scale='jac')
     rotor, inertia, stiffness, between, motor, link, gain = np.exp(fit.x).tolist()
     return DecoupledFit(
         rotor,
@@ -133,9 +127,9 @@ def fit_joint(joint: DecoupledJoint) -> DecoupledFit:
     )
 
 
-def response(s: ComplexArray, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+def response(s: ComplexArray, values: FloatArray) -> ComplexArray:
     """
-    Return the response of motor and link on a spring, and its derivatives.
+    Return the response of motor and link on a spring.
 
     Parameters
     ----------
@@ -146,8 +140,7 @@ def response(s: ComplexArray, values: FloatArray) -> tuple[ComplexArray, Complex
 
     Returns
     -------
-    response : ndarray of complex, shape (K, 2, 2)
-    derivatives : ndarray of complex, shape (K, 2, 2, 7)
+    ndarray of complex, shape (K, 2, 2)
 
     """
     rotor, inertia, stiffness, between, motor, link, gain = values
@@ -155,22 +148,7 @@ def response(s: ComplexArray, values: FloatArray) -> tuple[ComplexArray, Complex
     a, b = rotor * s + motor + spring, inertia * s + link + spring
     inverse = np.array([[b, spring], [spring, a]]) / (a * b - spring**2)
     inverse = np.moveaxis(inverse, 2, 0)
-    response = inverse * np.array([1.0, -gain])
-    one, twist = np.ones_like(s), np.array([[1.0, -1.0], [-1.0, 1.0]])
-    first, second = np.diag([1.0, 0.0]), np.diag([0.0, 1.0])
-    changes = (
-        (s, first),
-        (s, second),
-        (1.0 / s, twist),
-        (one, twist),
-        (one, first),
-        (one, second),
-    )
-    derivatives = np.zeros((len(s), 2, 2, 7), complex)
-    for k, (factor, pattern) in enumerate(changes):
-        derivatives[..., k] = -factor[:, np.newaxis, np.newaxis] * inverse @ pattern @ response
-    derivatives[:, :, 1, 6] = -inverse[:, :, 1]
-    return response, derivatives
+    return np.asarray(inverse * np.array([1.0, -gain]))
 
 
 def _first_guess(joint: DecoupledJoint, frequency: FloatArray, found: ComplexArray) -> FloatArray:

@@ -8,18 +8,16 @@ import json
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect, parse_effect
-from armid_ros.errors import ArmidError
 from armid_ros.files import json_text
 from armid_ros.motion import Motion
 from armid_ros.papers.elastic.command import elastic
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs
 from armid_ros.papers.elastic.identification.output import springs_document
-from armid_ros.recording import write_recording
 from armid_ros.recording.elastic import write_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import planar_pair
-from armid_ros.simulation import Reference, Sensors, simulate
+from armid_ros.simulation import Reference, Sensors
 from armid_ros.simulation.elastic.setup import make_elastic_arm
 from armid_ros.simulation.run import record
 from click.testing import CliRunner
@@ -102,16 +100,6 @@ def test_armid_elastic_takes_any_arm(bag, tmp_path):
     assert result.exit_code == 0
     assert 'N m/rad' in result.stdout
     assert {p.name for p in (tmp_path / 'out').iterdir()} == {'elastic.json', 'report.html'}
-
-
-def test_a_bag_without_links_is_refused_with_what_to_do(tmp_path):
-    run = simulate(ArmModel(ROBOT), swing(3), rng=np.random.default_rng(0), duration=0.5)
-    write_recording(tmp_path / 'bag', run)
-    arguments = [str(tmp_path / 'bag'), '--robot', 'humanoid_arm', '--out', str(tmp_path / 'out')]
-    result = CliRunner().invoke(elastic, arguments)
-    assert isinstance(result.exception, ArmidError)
-    assert '/link/joint_states' in str(result.exception)
-    assert 'armid diagnose' in str(result.exception)
 
 
 def test_two_links_are_a_planar_pair_where_they_bear_no_weight():

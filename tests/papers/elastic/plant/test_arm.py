@@ -14,7 +14,7 @@ from armid_ros.papers.elastic.plant.run import run_elastic
 from armid_ros.papers.elastic.plant.signals import step_experiments
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
-from armid_ros.simulation import Reference, Sensors, SimulatedArm
+from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.elastic.setup import elastic_joints, make_elastic_arm, shipped_arm
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
@@ -111,24 +111,6 @@ def test_a_trajectory_beyond_a_limit_is_refused_and_the_arm_stays():
     with pytest.raises(TrajectoryError, match='upper limit'):
         arm.set_trajectory(Reference(HUMANOID.joints, np.array([5.0]), far))
     np.testing.assert_allclose(arm.advance(100).link.q, home, atol=1e-9)
-
-
-def test_offsets_are_read_at_the_motors_alone():
-    plain, offset = humanoid().advance(), humanoid('encoder_offset:encoder_offset=0.01').advance()
-    np.testing.assert_allclose(np.abs(offset.q - plain.q), 0.01)
-    np.testing.assert_allclose(offset.link.q, plain.link.q, atol=1e-12)
-
-
-def test_noise_has_the_size_that_was_asked_for():
-    sensors = Sensors(position_noise=1e-4, velocity_noise=2e-3, acceleration_noise=0.1)
-    arm = two_links(sensors=sensors, start=[0.0, 0.0])
-    samples = [arm.advance() for _ in range(2000)]
-    for name, std in (('q', 1e-4), ('link.q', 1e-4), ('dq', 2e-3), ('link.dq', 2e-3)):
-        values = np.array([attrgetter(name)(sample) for sample in samples])
-        np.testing.assert_allclose(values.std(axis=0), std, rtol=0.1)
-    felt = np.array([sample.link.acceleration for sample in samples])
-    np.testing.assert_allclose(felt.std(axis=0), 0.1, rtol=0.1)
-    np.testing.assert_allclose(felt.mean(axis=0), [[0.0, 0.0, 9.81]] * 2, atol=0.02)
 
 
 def test_a_run_is_recorded_from_the_first_point_of_its_reference():

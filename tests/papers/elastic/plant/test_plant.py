@@ -136,20 +136,6 @@ def _at_rest(robot, q):
     return Motion(robot.joints, np.zeros(1), q[np.newaxis], zero, zero)
 
 
-def test_a_motor_that_friction_holds_stands_while_its_link_vibrates() -> None:
-    plant = two_link_plant(SHIPPED.parameters)
-    state = plant.state([0.0, 0.5])
-    state.rotors.twist[:] = [1e-4, 1e-4]
-    start, moved = plant.motors(state)[0], 0.0
-    for _ in range(500):
-        state = step(plant, state, np.zeros(2))
-        position, speed, _ = plant.motors(state)
-        moved = max(moved, np.abs(state.dq).max())
-        np.testing.assert_array_equal(speed, 0.0)
-    np.testing.assert_allclose(position, start, atol=1e-12)
-    assert moved > 1e-3
-
-
 def test_backlash_lets_the_link_fly_between_its_flanks() -> None:
     """Within the gap no torque reaches the link."""
     robot = load_robot('two_link_elastic')
@@ -178,12 +164,6 @@ def test_step_response_is_that_of_the_literature() -> None:
     assert 1e3 * run.link.t[np.argmax(first > 0.45)] == pytest.approx(68.0, abs=3.0)
     assert 100.0 * (first.max() / 0.5 - 1.0) == pytest.approx(24.7, abs=2.0)
     assert np.abs(second).max() == pytest.approx(0.1, abs=0.02)
-
-
-def test_a_rigid_arm_is_refused() -> None:
-    robot = load_robot('two_link_elastic')
-    with pytest.raises(ModelError, match='joint_elasticity'):
-        Plant(ArmModel(robot), elasticity=Elasticity())
 
 
 def test_a_motor_without_inertia_is_refused_by_name() -> None:
