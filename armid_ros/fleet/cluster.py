@@ -64,8 +64,8 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
     except (OSError, ValueError, TimeoutError) as error:
         raise FleetError(f'--scheduler {scheduler}: does not answer: {error}') from error
     with client:
-        workers = client.get_versions(packages=['armid_ros'])['workers'].values()
-        other = {str(worker['packages']['armid_ros']) for worker in workers} - {__version__}
+        found = client.get_versions(packages=['armid_ros'])['workers'].values()
+        other = {str(worker['packages']['armid_ros']) for worker in found} - {__version__}
         if other:
             raise FleetError(
                 f'--scheduler {scheduler}: its workers have armid_ros {", ".join(sorted(other))}, '

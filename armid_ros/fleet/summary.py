@@ -168,7 +168,7 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
         'top_speed': top_speed,
         'notes': list(resting(robot, path, highest - lowest)),
     }
-    if not triangles:
+    if normal is None:
         raise IdentificationError(
             f'{path}: {seconds:.2f} s in {samples} samples is too short; '
             'record a movement of several seconds'
@@ -183,5 +183,5 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
     apart = datetime.date.fromisoformat(day) - stamped.date()
     if abs(apart.days) > 1:  # the clock counts from its start; one day off is a time zone
         start_ns += apart.days * DAY_NS
-    summary = BagSummary(bag, day, start_ns, seconds, triangle, own, motion)
+    summary = BagSummary(bag, day, start_ns, seconds, normal, own, motion)
     return PreparedBag(summary, None if kept is None else tuple(kept))

@@ -205,7 +205,7 @@ def _gauss_newton(problem: InteractionProblem, theta: FloatArray, variance: Floa
     information += problem.precision
     gradient = np.einsum('nip,ni->p', columns, pull)
     gradient += problem.precision @ (problem.described - theta)
-    return _Step(gradient, information, columns, pull, float(np.sum(residual * pull)))
+    return _Step(gradient, information, columns, np.asarray(pull), float(np.sum(residual * pull)))
 
 
 def _noise(problem: InteractionProblem, by_motion: FloatArray, variance: FloatArray) -> FloatArray:
