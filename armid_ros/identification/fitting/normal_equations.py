@@ -212,12 +212,12 @@ def factored(products: FloatArray) -> tuple[FloatArray, FloatArray]:
     Directions of less than a rounding error of the others get that.
 
     """
-    size = np.sqrt(np.diag(products))
-    size = np.where(size > 0.0, size, 1.0)
+    length = np.sqrt(np.diag(products))
+    size = np.where(length > 0.0, length, 1.0)
     lengths, axes = np.linalg.eigh(products / np.outer(size, size))
     least = len(size) * np.finfo(float).eps * lengths.max(initial=0.0)
     lengths = np.sqrt(np.maximum(lengths, max(least, 1e-300)))
-    return lengths[:, np.newaxis] * axes.T * size, axes / lengths / size[:, np.newaxis]
+    return lengths[:, np.newaxis] * axes.T * length, axes / lengths / size[:, np.newaxis]
 
 
 def within(
