@@ -344,6 +344,8 @@ def design_excitation(
         that they begin with.
     time_budget : float
         Processor time [s]: by default 120, and above 20 joints 25.
+    **settings
+        Any of those from `speed` on.
 
     Returns
     -------

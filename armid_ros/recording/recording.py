@@ -30,6 +30,9 @@ _HOLE = 5.0
 #: Samples in common that are any use.
 _LEAST = 4
 
+#: A stretch without samples is a gap when it is longer than this many sampling periods.
+GAP_PERIODS = 5.0
+
 
 @dataclass(frozen=True)
 class TimeGap:
@@ -47,6 +50,13 @@ class TimeGap:
 
     t: float
     length: float
+
+
+def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
+    """Return the stretches without samples."""
+    steps = np.diff(t)
+    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
+    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
-from armid_ros.recording.recording import Clock, ReadReport, Recording, TimeGap
+from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.turns import unwrapped
 import numpy as np
@@ -36,8 +36,6 @@ RESTART_NS = 10**9
 _AROUND = 5
 # As many messages in a row, in time that others have had, are no late messages any more.
 _FEWEST_AGAIN = 10
-# A stretch without samples is a gap when it is longer than this many sampling periods.
-GAP_PERIODS = 5.0
 # No position, velocity or torque is as large; memory that nobody wrote to is.
 LARGEST = 1e15
 # A torque that varies by less is none: memory that nobody wrote to [N m].
@@ -331,6 +329,22 @@ def _resampled(
     return JointSamples(series.joints, stamps, values), valid, equal
 
 
+def _finite(
+    where: str, joints: tuple[str, ...], series: Any, counts: Counter[str]
+) -> tuple[JointSamples, Any, Any]:
+    """Return the finite samples, the quantities that are absent, and what is not finite."""
+    quantities, absent = _measured_quantities(where, series)
+    bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))
+    dropped = int(bad.sum())
+    if dropped > MAX_NOT_FINITE * len(series):
+        raise RecordingError(
+            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
+        )
+    counts['nan'] += dropped
+    samples = JointSamples(joints, series.stamps, quantities)
+    return (samples.select(~bad) if dropped else samples), absent, culprits
+
+
 def assemble(
     where: str,
     joints: tuple[str, ...],
@@ -375,16 +389,7 @@ def assemble(
                 f'{where} has no usable time: {note}, and receive times {problem}'
             )
     series = merged([ordered(states, clock, counts) for states in gathered], joints, counts)
-    quantities, absent = _measured_quantities(where, series)
-    bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))
-    dropped = int(bad.sum())
-    if dropped > MAX_NOT_FINITE * len(series):
-        raise RecordingError(
-            f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
-        )
-    counts['nan'] += dropped
-    samples = JointSamples(joints, series.stamps, quantities)
-    samples = samples.select(~bad) if dropped else samples
+    samples, absent, culprits = _finite(where, joints, series, counts)
     stamps = samples.stamps
     if len(stamps) < 2:
         lost = [f'{n} {name.replace("_", " ")}' for name, n in counts.items() if n]
@@ -439,10 +444,3 @@ def _measured_quantities(
     if kept[0] is None:
         raise RecordingError(f'{where} has no {absent[0]}')
     return tuple(kept), tuple(absent)
-
-
-def gaps(t: FloatArray) -> tuple[TimeGap, ...]:
-    """Return the stretches without samples."""
-    steps = np.diff(t)
-    at = np.flatnonzero(steps > GAP_PERIODS * np.median(steps))
-    return tuple(TimeGap(float(t[i]), float(steps[i])) for i in at)

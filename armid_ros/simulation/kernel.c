@@ -8,6 +8,9 @@
  * Vectors of 6 are motions or forces of a link in its own frame, the angular part first.
  * Algorithms: recursive Newton-Euler and composite rigid body, Featherstone 2008, chapters 5 and 6.
  */
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -351,4 +354,12 @@ void dynamics(const Arm *arm, const double *q, const double *dq, const double *d
     poses_of(arm, q, poses);
     inverse_dynamics(arm, poses, dq, ddq, tau);
     mass_matrix(arm, poses, matrix);
+}
+
+/* A module of Python that is empty: what is above is called by address, without objects. */
+static PyModuleDef module = {PyModuleDef_HEAD_INIT, "_kernel", NULL, -1, NULL, NULL, NULL, NULL, NULL};
+
+PyMODINIT_FUNC PyInit__kernel(void)
+{
+    return PyModule_Create(&module);
 }

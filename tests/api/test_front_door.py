@@ -89,7 +89,7 @@ def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tm
     assert short(model)
     assert repr(model).startswith('GOOD') and 'elbow_pitch' in repr(model)
     html = model._repr_html_()
-    assert html.startswith('<iframe srcdoc="&lt;!doctype html') and html.count('"') == 6
+    assert html.startswith('<iframe srcdoc="&lt;!DOCTYPE html') and html.count('"') == 6
     assert model.report(tmp_path / 'page.html').read_text().startswith('<!')
     table = model.to_dataframe()
     assert list(table.columns) == ['name', 'joint', 'value', 'std', 'unit']

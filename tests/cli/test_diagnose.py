@@ -10,14 +10,11 @@ import shutil
 from armid_ros.arm import load_model, save_model
 from armid_ros.cli.diagnose.command import Percent
 from armid_ros.diagnosis import Diagnosis
-from armid_ros.excitation import check_limits, Limits, load_excitation
 from armid_ros.model import inverse_dynamics
 from armid_ros.recording import write_recording
-from armid_ros.robots import collision_model, load_robot
 import numpy as np
 import pytest
 
-from tests.clearance import path_clearance
 from tests.diagnosis.conftest import Bench, URDF
 
 from .conftest import armid
@@ -62,33 +59,6 @@ def doubtful(tmp_path_factory):
         for k, recording in enumerate(recordings):
             write_recording(folder / f'{name}_{k}', recording)
     return [[folder / f'{name}_{k}' for k in range(3)] for name in ('now', 'before')]
-
-
-def test_a_provisional_name_comes_with_a_run_that_tells_it_from_the_next_best(
-    files, doubtful, tmp_path
-):
-    (urdf, model, _), (bags, before) = files, doubtful
-    out = tmp_path / 'out'
-    old = [option for bag in before[:2] for option in ('--baseline', bag)]
-    asked = ['--robot', urdf, '--model', model, *old, '--out', out]
-    result = armid('diagnose', *bags, *asked)
-    document = json.loads((out / 'diagnosis.json').read_text())
-    assert document['verdict'] == 'partial'
-    assert document['effects'][0]['name'] == 'payload'
-    run = document['next_run']
-    excitation = load_excitation(out / run['file'])
-    robot = load_robot(str(urdf))
-    motion = excitation.motion(100.0)
-    assert not check_limits(Limits.of(robot, speed=1.0, torque_fraction=1.0), motion)
-    assert path_clearance(collision_model(robot), motion.q).min() > 0.0
-    assert run['duration'] == pytest.approx(excitation.duration)
-    names = {effect['name'] for effect in document['effects']}
-    assert {pair['name'] for pair in run['separates']} <= names
-    twins = [p for p in run['separates'] if {p['name'], p['rival']} == {'payload', 'link_inertia'}]
-    assert all(pair['expected_z'] < 1e-3 for pair in twins)
-    page = (out / 'report.html').read_text()
-    assert run['file'] in page
-    assert run['file'] in result.output
 
 
 def test_the_sentence_comes_first_and_then_the_values_with_their_share(files, tmp_path):
@@ -193,7 +163,7 @@ def test_a_script_learns_from_the_code_whether_to_go_on(
     """Whatever the code is, the folder has the result."""
     urdf, model, bags = files
     said = Diagnosis(
-        verdict, 'Said.', (), (), (), (), None, None, load_model(model), (), (), (), False, (), ''
+        verdict, 'Said.', (), (), (), (), None, None, load_model(model), (), (), False, (), ''
     )
     monkeypatch.setattr('armid_ros.api.diagnosis.run', lambda *_, **__: said)
     asked = ('diagnose', *bags, '--robot', urdf, '--model', model, '--no-baseline')

@@ -10,7 +10,7 @@ from .conftest import armid, ROBOT
 def test_a_bag_is_shown_within_80_columns_and_on_a_page(bags, tmp_path):
     text = armid('inspect', bags[0], '--robot', ROBOT, '--out', tmp_path / 'o').stdout
     assert max(len(line) for line in text.splitlines() if line.startswith('  ')) <= 80
-    for said in ('/joint_states (read): 4000 x', 'elbow_pitch', 'Ready for `armid identify`'):
+    for said in ('/joint_states: 4000 x', 'elbow_pitch', 'Ready for `armid identify`'):
         assert said in text
     page = (tmp_path / 'o' / 'inspection.html').read_text()
     assert page.count('<figure') == 3 * 6 + 1

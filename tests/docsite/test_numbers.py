@@ -29,7 +29,7 @@ def test_a_module_beside_it_is_on_the_page_whole():
     """What says that data are at fault decides as well."""
     faults = PACKAGE.parent / 'identification' / 'assess' / 'data_faults.py'
     told = {row[0].strip('`') for row in rows(numbers_page(PACKAGE, [faults]))}
-    assert {'_NEAR', '_BEYOND', '_CLIPPED', '_IMPOSSIBLE'} <= told
+    assert {'_NEAR', '_BEYOND', '_CLIPPED'} <= told
 
 
 def test_what_decides_is_few():

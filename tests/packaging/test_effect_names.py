@@ -14,7 +14,6 @@ LEFT = {
     'simulation/elastic/two_link.py': 4,
     # advice and examples for a person
     'papers/elastic/springs.py': 1,
-    'inspection/inspect.py': 1,
     'identification/known_payload.py': 2,
     'simulation/springs.py': 3,
     'simulation/elastic/setup.py': 3,

@@ -183,7 +183,7 @@ def test_several_robot_descriptions_are_refused_equal_ones_are_not(tmp_path):
         ('file.db3', b'', 'an SQLite file, but not of rosbag2'),
         ('file.db3', b'rubbish' * 500, 'not an SQLite file of rosbag2'),
         ('file.mcap.zstd', b'rubbish' * 500, 'the compressed file is damaged'),
-        ('file.bag', b'#ROSBAG V2.0', 'not a bag; give a rosbag2 directory'),
+        ('file.bag', b'#ROSBAG V2.0', 'cannot be read as a bag of ROS 1'),
     ],
 )
 def test_what_is_no_bag_is_refused_with_its_name(tmp_path, name, content, problem):

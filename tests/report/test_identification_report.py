@@ -8,18 +8,16 @@ from html.parser import HTMLParser
 import re
 
 from armid_ros.identification import (
-    Fit,
     IdentificationSettings,
     identify,
     PhysicalSettings,
     verify,
 )
 from armid_ros.motion import Motion
-from armid_ros.recording import Recording
 from armid_ros.report.families import parameter_section
 from armid_ros.report.identification_report import Assessment, identification_report
 from armid_ros.report.provenance import hash_files, Provenance, versions
-from armid_ros.report.sections.data_quality import data_quality_section, repeatability
+from armid_ros.report.sections.data_quality import repeatability
 from armid_ros.report.sections.fit import fit_section
 import numpy as np
 import pytest
@@ -217,18 +215,6 @@ def test_periods_show_what_of_the_residual_repeats(case):
     np.testing.assert_allclose(varying, 0.1, rtol=0.3)
     np.testing.assert_allclose(residual, [0.3, *5 * [0.1]], rtol=0.3)
     assert repeatability([fit]) is None
-
-
-def test_a_page_has_the_period_of_the_recording_and_not_of_its_rows(case):
-    robot = case.result.arm.robot
-    t = 0.005 * np.arange(4000)
-    angle = 2.0 * np.pi * t[:, np.newaxis] / 8.0 + np.arange(robot.n_joints)
-    recording = Recording(joints=robot.joints, t=t, q=np.sin(angle) + 0.4 * np.sin(3.0 * angle))
-    rest = np.zeros_like(recording.q[::11])
-    rows = Motion(robot.joints, t[::11], recording.q[::11], rest, rest, rest)
-    fit = Fit('run', rows, np.ones(rest.shape, dtype=bool), rest)
-    html = data_quality_section([(recording, 'training', [fit])], robot).html()
-    assert '8.00 s' in html and '5 ms' in html
 
 
 def test_nothing_is_loaded(page, html):
