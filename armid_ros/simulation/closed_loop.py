@@ -91,7 +91,7 @@ def run(
             k, torque = reached, tau[reached]
             continue
         state = step(plant, state, torque if drive is None else drive(torque))
-        torque = command(plant, controller, state, next(iter(targets[k : k + 1])))
+        torque = command(plant, controller, state, targets.at(k))
         k += 1
     q[last], dq[last], ddq[last], tau[last] = state.q, state.dq, state.ddq, torque
     if motors is not links:

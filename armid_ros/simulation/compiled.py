@@ -18,13 +18,11 @@ from typing import Any
 
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
+from armid_ros.simulation.box_complementarity import SPEED_TOLERANCE
 from armid_ros.simulation.controller import Controller, LinearFeedback, Targets
 from armid_ros.simulation.plant import Plant, State
 import numpy as np
 import numpy.typing as npt
-
-#: Joints of the largest arm that the kernel has room for.
-_MOST_JOINTS = 32
 
 _JOINT = np.dtype(
     [
@@ -66,6 +64,7 @@ class _Plant(ctypes.Structure):
     _fields_ = (
         ('arm', _Arm),
         ('dt', _REAL),
+        ('speed_tolerance', _REAL),
         ('damping', _ADDRESS),
         ('constant', _ADDRESS),
         ('lower', _ADDRESS),
@@ -177,24 +176,23 @@ class CompiledLoop:
         added = np.diag(plant.model.armature)
         added = added if plant.coupling is None else added + plant.coupling
         body = rigid_body(plant.robot, added)
-        open_ended = np.full(n, np.inf)
+        far = np.full(n, np.inf)
+        lower, upper = (plant.robot.lower, plant.robot.upper) if plant.hard_stops else (-far, far)
         self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
-        self._torque = plant.torque
+        self._torque, self._failure = plant.torque, list[BaseException]()
         arrays = (
             _array(plant.damping),
             np.zeros(n) if plant.constant is None else _array(plant.constant),
-            _array(plant.robot.lower) if plant.hard_stops else -open_ended,
-            _array(plant.robot.upper) if plant.hard_stops else open_ended,
-            *map(_array, plant.torque_range),
+            *map(_array, (lower, upper, *plant.torque_range)),
             _array(dry.axes, np.int64),
-            _array(dry.law.lower),
-            _array(dry.law.upper),
+            *map(_array, (dry.law.lower, dry.law.upper)),
         )
         addresses = [array.ctypes.data for array in arrays]
         self._plant = _Structure(
             _Plant(
                 body.values,
                 plant.dt,
+                SPEED_TOLERANCE,
                 *addresses[:6],
                 len(dry.axes),
                 *addresses[6:],
@@ -204,11 +202,7 @@ class CompiledLoop:
             ),
             (*body.arrays, *arrays),
         )
-        nominal = rigid_body(
-            feedback.robot,
-            feedback.added_inertia + np.diag(feedback.robot.model.armature),
-            feedback.weighs,
-        )
+        nominal = rigid_body(feedback.robot, feedback.added_inertia, feedback.weighs)
         gains = [np.array(np.broadcast_to(x, n)) for x in (feedback.stiffness, feedback.damping)]
         self._controller = _Structure(
             _Controller(
@@ -219,7 +213,6 @@ class CompiledLoop:
             ),
             (*nominal.arrays, *gains),
         )
-        self.dt = plant.dt
         self.addresses = self._plant.address, self._controller.address
 
     @classmethod
@@ -228,22 +221,29 @@ class CompiledLoop:
         action, dry = plant.action, plant.contacts
         usual = plant.springs is None and action.drive is None and action.hysteresis is None
         of_joints = dry.friction is None and -1 not in dry.axes
-        fits = plant.robot.n_joints <= _MOST_JOINTS and len(set(dry.axes)) == len(dry.axes)
-        feedback = controller.feedback
-        if not (usual and of_joints and fits) or feedback is None or kernel() is None:
+        of_joints = of_joints and len(set(dry.axes)) == len(dry.axes)
+        feedback, library = controller.feedback, kernel()
+        if not (usual and of_joints) or feedback is None or library is None:
             return None
-        return cls(plant, feedback)
+        most = _COUNT.in_dll(library, 'most_joints').value
+        return cls(plant, feedback) if plant.robot.n_joints <= most else None
 
     def _smooth_effects(self) -> int:
-        """Let the effects of the plant act for the kernel; return 1 if they cannot."""
+        """Let the effects of the plant act for the kernel; return 1 if that raises something."""
         n = len(self._law_torque)
         t, q, dq = self._law_input[0], self._law_input[1 : n + 1], self._law_input[n + 1 :]
         assert self._torque is not None
         try:
             self._law_torque[:] = self._torque(t, q, dq)
-        except Exception:  # the step is taken again in Python, which raises it
+        except BaseException as error:  # Ctrl-C too: nothing passes through C by itself
+            self._failure.append(error)
             return 1
         return 0
+
+    def raise_failure(self) -> None:
+        """Raise what the effects of the plant raised."""
+        if self._failure:
+            raise self._failure.pop()
 
 
 class CompiledRun:
@@ -273,15 +273,16 @@ class CompiledRun:
 
     def advance(self, state: State, row: int) -> int:
         """Take the steps from a row on in which nothing changes; return the row after them."""
-        library, dt = kernel(), self._loop.dt
+        library = kernel()
         assert library is not None
         modes = np.array(state.modes, dtype=np.int64)
         reached: int = library.advance(
             *self._loop.addresses,
             modes.ctypes.data,
-            dt * (state.steps - row),
+            state.t,
             row,
             self._last,
             *self._addresses,
         )
+        self._loop.raise_failure()
         return reached

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
@@ -43,9 +42,9 @@ class Targets:
     ddq: FloatArray
     feedforward: FloatArray
 
-    def __iter__(self) -> Iterator[Target]:
-        """Yield what to do at one step after the other."""
-        return zip(zip(self.q, self.dq, self.ddq, strict=True), self.feedforward, strict=True)
+    def at(self, row: int) -> Target:
+        """Return what to do at one step."""
+        return (self.q[row], self.dq[row], self.ddq[row]), self.feedforward[row]
 
     def __getitem__(self, rows: slice) -> Targets:
         """Return some of the steps."""

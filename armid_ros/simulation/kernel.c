@@ -16,7 +16,7 @@
 #include <string.h>
 
 #define MOST_JOINTS 32
-#define SPEED_TOLERANCE 1e-13 /* as in box_complementarity.py */
+const int64_t most_joints = MOST_JOINTS; /* of the largest arm that there is room for */
 
 /* One joint and the link it moves; the fields are those of `JointGeometry`. */
 typedef struct {
@@ -41,7 +41,7 @@ typedef struct {
 
 typedef struct {
     Arm arm;
-    double dt;
+    double dt, speed_tolerance;
     const double *damping, *constant;             /* (n, n), (n,) */
     const double *lower, *upper;                  /* (n,), position limits */
     const double *lowest_torque, *highest_torque; /* (n,), of the drives */
@@ -266,7 +266,7 @@ static int step(const Plant *plant, const int64_t *modes, double t, const double
         plant->law_input[0] = t + half;
         memcpy(plant->law_input + 1, middle, (size_t)n * sizeof *middle);
         memcpy(plant->law_input + 1 + n, speed, (size_t)n * sizeof *speed);
-        if (plant->torque_law()) return 0; /* it failed, and will again in Python */
+        if (plant->torque_law()) return 0; /* it raised something */
         for (int64_t i = 0; i < n; i++) force[i] -= plant->law_torque[i];
     }
     mass_matrix(&plant->arm, poses, inertia);
@@ -293,7 +293,7 @@ static int step(const Plant *plant, const int64_t *modes, double t, const double
     for (int64_t e = 0; e < plant->n_elements; e++) {
         int64_t joint = plant->element_joint[e];
         if (modes[e]) {
-            if (dq_next[joint] * (double)modes[e] < -SPEED_TOLERANCE) return 0;
+            if (dq_next[joint] * (double)modes[e] < -plant->speed_tolerance) return 0;
             continue;
         }
         double held = force[joint];
@@ -328,7 +328,7 @@ static void command(const Plant *plant, const Controller *controller, const doub
  * Take steps from row `first` to row `last`, and return the row that was reached. Row `first` of q,
  * dq, ddq and torque, each (last + 1, n), is given; the rows after it are written. Row k of the
  * targets, each (last, n), belongs to the end of step k; `modes` is what every friction element
- * does: 1, -1, or 0 where it sticks. `t` is the time of row 0.
+ * does: 1, -1, or 0 where it sticks. `t` is the time of row `first`.
  */
 int64_t advance(const Plant *plant, const Controller *controller, const int64_t *modes, double t,
                 int64_t first, int64_t last, double *q, double *dq, double *ddq, double *torque,
@@ -338,7 +338,7 @@ int64_t advance(const Plant *plant, const Controller *controller, const int64_t 
     int64_t n = plant->arm.n, k = first;
     for (; k < last; k++) {
         int64_t row = n * k, next = row + n;
-        if (!step(plant, modes, t + (double)k * plant->dt, q + row, dq + row, ddq + row, torque + row, q + next,
+        if (!step(plant, modes, t + (double)(k - first) * plant->dt, q + row, dq + row, ddq + row, torque + row, q + next,
                   dq + next, ddq + next))
             break;
         const double *desired[3] = {q_desired + row, dq_desired + row, ddq_desired + row};

@@ -312,7 +312,7 @@ class SimulatedArm:
 
     def _act(self) -> None:
         """Let the controller do what the course says now."""
-        self._torque = command(self.plant, self._acting, self._state, next(iter(self._targets)))
+        self._torque = command(self.plant, self._acting, self._state, self._targets.at(0))
 
     def _look_ahead(self, asked: FloatArray | None = None, steps: int = _BLOCK) -> None:
         """Evaluate the reference from now on, for some steps; motors were to be here now."""

@@ -99,15 +99,16 @@ def test_run_is_that_of_python(source, names, stops, kind, monkeypatch):
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
 
 
-def test_a_torque_law_that_fails_is_an_error():
+@pytest.mark.parametrize('error', [ZeroDivisionError, KeyboardInterrupt])
+def test_what_a_torque_law_raises_ends_the_run(error):
     body = robot('humanoid_arm')
     plant = Plant(with_effects(body, ['stribeck_friction']))
 
     def broken(t, q, dq):
-        raise ZeroDivisionError(f'at {float(t):g} s')
+        raise error(f'at {float(t):g} s')
 
     object.__setattr__(plant, 'torque', broken)
-    with pytest.raises(ZeroDivisionError, match=r'at 0\.0005 s'):
+    with pytest.raises(error, match=r'at 0\.0005 s'):
         simulate(plant, swinging(body), rng=np.random.default_rng(0))
 
 

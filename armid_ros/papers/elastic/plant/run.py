@@ -97,7 +97,7 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     extra = still if experiment.torque is None else experiment.torque
     targets = Targets(still, experiment.velocity, still, extra)
     state = plant.state(experiment.q)
-    torque = command(plant, control, state, next(iter(targets)))
+    torque = command(plant, control, state, targets.at(0))
     trace = run(plant, control, state, torque, targets[1:])
     _require_range(plant.robot, trace.state)
     joints, t = plant.robot.joints, plant.times(0, len(targets))
