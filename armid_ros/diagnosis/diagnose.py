@@ -315,7 +315,7 @@ def _remarks(
         f'The model is not patched: {names} would make it worse in {", ".join(worse)}.': worse,
         chosen.untested: verdict.word == 'unknown',
         doubt: True,
-        f'Not checked: {still} did not move.': still,
+        f'Not checked: {still} did not move, or turned round all the time.': still,
     }
     return [text for text, told in remarks.items() if text and told]
 

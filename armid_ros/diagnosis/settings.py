@@ -28,12 +28,11 @@ class Thresholds:
     tie : float
         Log odds within which two causes are tied: 20 to 1.
     inexact : float
-        Share of what a cause explains by which its law is inexact: a lead of less is none, such a
-        share may be left in a second, and a joint that has less of it is not where the gap is.
+        Share of what a cause explains by which its law is inexact: a lead of less is none, and a
+        joint that has less of it is not where the gap is.
     headline : float
         Share that a cause takes of a gap beside the misfit that a model had before, below which it
-        is small print; recordings hardly show causes that take less than this share of what they
-        take of others.
+        is small print.
     same_fit : float
         Factor between losses of two explanations that are as good as each other where the unit is
         a misfit of other data, which varies so from motion to motion as a rule, or a noise that

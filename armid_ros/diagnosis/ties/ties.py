@@ -126,7 +126,7 @@ class _Ties:
         if tried[0][2].misfit - best[2].misfit < _LEAST_GAIN * noise:
             best = tried[0]
         slack, problem, found = best
-        while len(found.segments) and np.min(found.stiffness / found.std) < LEAST_Z:
+        while len(found.segments) and not np.min(found.stiffness / found.std) >= LEAST_Z:
             weakest = int(np.argmin(found.stiffness / found.std))
             problem = problem.with_springs(np.delete(np.arange(len(found.segments)), weakest))
             if not problem.segments:

@@ -40,8 +40,10 @@ from armid_ros.identification.assess.comparison import (
     ResidualChange,
 )
 from armid_ros.identification.assess.grade_limits import FREEDOM
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.known_fit import KnownFit
 from armid_ros.identification.parameters_file import ParameterFile
+from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
 import numpy as np
 from scipy import stats
@@ -54,15 +56,12 @@ CHANCE = 0.05
 _ROUNDING = 1e-10
 #: Share of its torque below which the residual of a joint is of filters, and not of an arm.
 _LEAST_RESIDUAL = 1e-3
-#: Parameters of a link as base parameters name them, without its number; and with it.
-_SYMBOLS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
+#: A parameter of a link as base parameters name it, with its number.
 _NUMBERED = re.compile(r'(?:m[xyz]?|I[xyz]{2})(\d+)$')
 #: Probability with which the changes of a load are taken for something else.
 _REFUSED = 0.01
 #: Below this share of the largest a direction of a load is not seen at all.
 _UNSEEN = 1e-9
-#: A mass differs from zero if it is this many standard deviations away.
-_TOLD = 1.96
 
 
 def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
@@ -110,10 +109,11 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     )
     rigid = [k for k, name in enumerate(shared) if name.rigid]
     load = None
-    if any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found):
+    moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
+    if joint and moved:
         whole = _Whole.of(sides, (first, second), shared, rigid)
         terms = [first.terms.get(shared[k], {}) for k in rigid]
-        load = _find_load(terms, whole.difference, whole.covariance) if joint else None
+        load = _find_load(terms, whole.difference, whole.covariance)
     left = beyond_chance([one.p_value for one in residuals], chance)
     return Comparison(
         before,
@@ -278,7 +278,7 @@ def _find_load(
     numbers = {int(found[1]) for row in terms for key in row if (found := _NUMBERED.match(key))}
     loads = []
     for link in sorted(numbers):
-        keys = [f'{symbol}{link}' for symbol in _SYMBOLS]
+        keys = [f'{symbol}{link}' for symbol in LINK_PARAMETERS]
         factors = np.array([[row.get(key, 0.0) for key in keys] for row in terms])
         columns = scipy.linalg.solve_triangular(root, factors / std[:, np.newaxis], lower=True)
         load = _load(link, columns, white)
@@ -304,7 +304,7 @@ def _load(link: int, columns: FloatArray, white: FloatArray) -> LoadChange | Non
         return None
     values = (right.T @ (along / sizes)) / scale
     mass, std = float(values[0]), float(np.linalg.norm(right[:, 0] / sizes) / scale[0])
-    if abs(mass) < _TOLD * std:
+    if abs(mass) < HALF_WIDTH * std:
         return None
     whole = np.all(np.linalg.norm(right[:, 1:4], axis=0) > 1.0 - 1e-6)
     return LoadChange(link, mass, std, values[1:4] / mass if whole else None, p_value)

@@ -116,19 +116,19 @@ def _mistakes(
 ) -> list[Fault]:
     """Return what recordings show to be wrong: names, signs, units, zeros, delays, gravity."""
     robot, used = description.body, result.used
-    alike: dict[tuple[object, ...], dict[str, Mistake]] = {}
+    alike: dict[tuple[object, ...], list[tuple[str, Mistake]]] = {}
     settings = SignalSettings(used.cutoff_hz, used.decimation)
     for recording in without_damage(recordings, settings)[0] if recordings else ():
         mistake = find_mistake(robot, recording, used)
         if mistake is not None:
             kind = (mistake.hypotheses[0].kind, *mistake.hypotheses[0].where)
-            alike.setdefault(kind, {})[recording.source] = mistake
+            alike.setdefault(kind, []).append((recording.source, mistake))
     faults = []
     for found in alike.values():
-        worst = max(found.values(), key=lambda mistake: float(mistake.before.joints.max()))
+        worst = max((one for _, one in found), key=lambda one: float(one.before.joints.max()))
         text = worst.sentence(robot)
         if len(found) < len(recordings):
-            text = f'in {", ".join(found)}: {text}'
+            text = f'in {", ".join(dict.fromkeys(source for source, _ in found))}: {text}'
         error = 100.0 * float(worst.before.joints[worst.joint])
         certain = error > LIMITS.unusable and not worst.hypotheses[0].disputable
         faults.append(Fault(text, 'unusable' if certain else 'poor'))

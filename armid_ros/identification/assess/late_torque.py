@@ -23,9 +23,9 @@ from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
 from armid_ros.identification.assess.hypotheses import shifted
 from armid_ros.identification.assess.prediction_error import (
     beside,
-    near_deviation,
     root_mean_square,
 )
+from armid_ros.identification.fitting.excited import near_deviation
 from armid_ros.identification.rows.signals import (
     Conditioning,
     decimate,

@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from armid_ros.effects.load import described_spread
 from armid_ros.identification.assess.grade_limits import FREEDOM, LIMITS
+from armid_ros.identification.fitting.excited import near_deviation
 from armid_ros.identification.fitting.normal_equations import within
 from armid_ros.model import inverse_dynamics, regressor
 from armid_ros.motion import FloatArray, Motion
@@ -191,11 +191,6 @@ def beside(own: FloatArray, shared: FloatArray) -> FloatArray:
     turned = own.transpose(0, 2, 1)
     normal = turned @ own + LIMITS.floor**2 * np.eye(own.shape[2])
     return np.asarray(shared - own @ np.linalg.solve(normal, turned @ shared))
-
-
-def near_deviation(robot: Robot) -> FloatArray:
-    """Return standard deviations of rigid parameters of a description, shape (10 n,)."""
-    return np.asarray(described_spread(robot).ravel() / np.sqrt(3.0))
 
 
 def root_mean_square(columns: FloatArray) -> FloatArray:

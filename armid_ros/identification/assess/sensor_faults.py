@@ -20,7 +20,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import LIMITS, Word
 from armid_ros.identification.rows.checks import REST_RANGE, SILENT
 from armid_ros.identification.rows.regression import Stretch
-from armid_ros.identification.rows.signals import Conditioning, GAP_PERIODS
+from armid_ros.identification.rows.signals import Conditioning, unbroken
 from armid_ros.identification.rows.stamps import rounded_stamps, uneven_stamps
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import FloatArray, Motion
@@ -279,8 +279,7 @@ def velocity_ratio(recording: Recording) -> tuple[FloatArray, FloatArray]:
         return nothing
     # positions and integrated velocities of unbroken pieces, both without their line
     pairs = []
-    breaks = np.flatnonzero(np.diff(recording.t) > GAP_PERIODS * recording.period) + 1
-    for stretch in np.split(np.arange(len(recording.t)), breaks):
+    for stretch in unbroken(recording, 1.0 / recording.period):
         duration = recording.t[stretch[-1]] - recording.t[stretch[0]]
         for part in np.array_split(stretch, max(1, int(np.ceil(duration / _PIECE)))):
             if len(part) > 3:

@@ -341,19 +341,15 @@ def simulate_held_out(
     duration = min(_LONGEST, _SIMULATED / len(held_out))
     for index, recording in enumerate(held_out):
         progress(index / len(held_out), 'simulating held-out recordings')
-        scores: list[ForwardScore | None] = []
-        for arm, what in ((after, ''), (before, 'the description is ')):
-            try:
-                score = forward_validation(arm, recording, used, nominal=after, duration=duration)
-            except ArmidError as error:
-                left_out.append(f'{recording.source}: {what}not simulated: {error}')
-                score = None
-            scores.append(score)
-            if scores[0] is None:
-                break
-        else:
-            assert scores[0] is not None
-            pairs.append(ForwardValidation(scores[1], scores[0]))
+        patched = plain = None
+        try:
+            patched = forward_validation(after, recording, used, nominal=after, duration=duration)
+            plain = forward_validation(before, recording, used, nominal=after, duration=duration)
+        except ArmidError as error:
+            what = '' if patched is None else 'the description is '
+            left_out.append(f'{recording.source}: {what}not simulated: {error}')
+        if patched is not None:
+            pairs.append(ForwardValidation(plain, patched))
     return tuple(pairs), tuple(left_out)
 
 

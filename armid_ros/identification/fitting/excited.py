@@ -22,6 +22,7 @@ from armid_ros.identification.fitting.normal_equations import factored, NormalEq
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns, regroup
 from armid_ros.motion import FloatArray
+from armid_ros.robots import Robot
 import numpy as np
 
 #: Parameters whose column the data separate from the others by less than this share are grouped
@@ -160,3 +161,8 @@ def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:
     known = np.where(np.isfinite(spread), spread, 0.0)
     size = np.linalg.norm(base.grouping * known, axis=1)
     return np.where(~unknown & (size > 0.0), size, np.inf)
+
+
+def near_deviation(robot: Robot) -> FloatArray:
+    """Return standard deviations of rigid parameters of a description, uniform, shape (10 n,)."""
+    return np.asarray(described_spread(robot).ravel() / np.sqrt(3.0))

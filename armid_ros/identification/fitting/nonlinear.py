@@ -290,8 +290,8 @@ def _iterate(
         # straight to a solution that keeps its promise, else the best of damped steps
         for damping in (0.0, *_DAMPINGS):
             values = now.damped(damping, limits) if damping else solution.values
-            linear = tuple(part.torque(values) for part in now.problem)
-            vain = max(vain, now.gain(linear)) if damping else vain
+            if damping:
+                vain = max(vain, now.gain(tuple(part.torque(values) for part in now.problem)))
             stepped = moved(now.arm, base, values, free)
             predicted = torques(stepped, recordings, used)
             if now.cost(predicted) <= now.cost(None if trial is None else trial.predicted):

@@ -11,9 +11,9 @@ workers. Joints are kept apart, for their weights are known only when all rows a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from armid_ros.identification.rows.regression import Regression
+from armid_ros.identification.rows.regression import by_stretch, Regression
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 import numpy.typing as npt
@@ -67,12 +67,12 @@ class NormalEquations:
 
         """
         n_joints, rank = problem[0].columns.shape[1:]
-        products = np.zeros((n_joints, rank + 1, rank + 1))
-        counts, start = np.zeros(n_joints), 0
-        for part in problem:
-            stop = start + len(part.tau)
-            weight = part.informative if weights is None else weights[start:stop]
-            target, start = part.target, stop
+        products, counts = np.zeros((n_joints, rank + 1, rank + 1)), np.zeros(n_joints)
+        if weights is None:
+            weights = np.concatenate([part.informative for part in problem])
+        own = by_stretch(problem, np.asarray(weights, dtype=float))
+        for part, weight in zip(problem, own, strict=True):
+            target = part.target
             counts += part.informative.sum(axis=0)
             for joint in range(n_joints):
                 rows = np.column_stack([part.columns[:, joint], target[:, joint]])
@@ -193,8 +193,7 @@ def weighted_fit(
         if np.allclose(fit.scale, before, rtol=1e-6):
             break
     if bounds is not None:
-        values = within(fit.values, fit.factor, bounds)
-        return WeightedFit(values, fit.scale, fit.factor, fit.inverse)
+        return replace(fit, values=within(fit.values, fit.factor, bounds))
     return fit
 
 

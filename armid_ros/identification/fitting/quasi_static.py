@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects.load import described_spread
+from armid_ros.identification.fitting.excited import near_deviation
 from armid_ros.identification.fitting.nonlinear import FittedValues
 from armid_ros.identification.rows.regression import regressions, weighted_rows
 from armid_ros.identification.rows.signals import Conditioning
@@ -65,7 +65,7 @@ def with_uncertain_inertia(
     scale = np.linalg.norm(rows, axis=0)
     made = np.linalg.lstsq(rows / scale, body, rcond=None)[0] / scale[:, np.newaxis]
     pull = made - fit.base.grouping[:, :rigid]
-    spread = described_spread(description.robot).ravel() / np.sqrt(3.0)  # of a uniform density
+    spread = near_deviation(description.robot)
     added = (pull * spread) @ (pull * spread).T
     plain = fit.solution.covariance
     solution = replace(fit.solution, covariance=plain + added)

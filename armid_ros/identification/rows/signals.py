@@ -22,6 +22,7 @@ from armid_ros.identification.rows.stamps import two_senders
 from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion, MovingPoints, read_only
 from armid_ros.recording import Recording
+from armid_ros.recording.recording import GAP_PERIODS
 from armid_ros.recording.series import NOTHING
 import numpy as np
 import numpy.typing as npt
@@ -32,8 +33,6 @@ from scipy.interpolate import CubicSpline
 SLOWEST = 2.0
 #: Rates at which arms are recorded [Hz].
 USUAL_RATES = (20.0, 20_000.0)
-#: A step of this many nominal periods is a hole that interpolation must not bridge.
-GAP_PERIODS = 5.0
 #: Stamps within this share of a period of an even grid are taken as even.
 JITTER_TOLERANCE = 0.05
 #: Torque and regressor keep this many times the band of the motion and what friction adds to it.

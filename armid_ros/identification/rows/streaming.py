@@ -21,11 +21,11 @@ from armid_ros.identification.rows.regression import Regression, regressions
 from armid_ros.identification.rows.signals import (
     Conditioning,
     EDGE_PERIODS,
-    GAP_PERIODS,
     SignalSettings,
 )
 from armid_ros.recording import ReadSettings, Recording
 from armid_ros.recording.reader import read_pieces
+from armid_ros.recording.recording import GAP_PERIODS
 import numpy as np
 import numpy.typing as npt
 

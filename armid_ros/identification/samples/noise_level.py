@@ -222,10 +222,17 @@ def line_errors(
     error[2:] = moves[1:] - ratio[:, np.newaxis] * moves[:-1]
     error[2:][gap[1:] | gap[:-1]] = 0.0
     plain = error[2:] / np.maximum(noise, bend)[2:]
-    windows = np.array_split(plain, max(1, len(plain) // WINDOW))
-    sizes = np.array([robust_scale(part, SHARE) for part in windows])
-    shares = [share_of_noise(part, size) for part, size in zip(windows, sizes, strict=True)]
-    usual = _loudest(period, sizes, np.array(shares))
+    count = max(1, len(plain) // WINDOW)
+    size, longer = divmod(len(plain), count)  # windows of one length are taken at once
+    cut, signals = longer * (size + 1), x.shape[1]
+    batches = (
+        plain[:cut].reshape(longer, size + 1, signals),
+        plain[cut:].reshape(count - longer, size, signals),
+    )
+    windows = [batch.swapaxes(0, 1) for batch in batches if len(batch)]
+    sizes = [robust_scale(part, SHARE) for part in windows]
+    shares = [share_of_noise(*both) for both in zip(windows, sizes, strict=True)]
+    usual = _loudest(period, np.concatenate(sizes), np.concatenate(shares))
     smallest = _smallest(np.abs(moves))[-1]
     least = np.minimum(np.where(np.isfinite(smallest), smallest, 0.0), np.abs(error).max(axis=0))
     usual = replace(usual, size=np.maximum(usual.size, least))
