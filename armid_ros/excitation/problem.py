@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from armid_ros.arm import ArmModel
@@ -209,7 +210,11 @@ def _in_focus(arm: ArmModel, focus: tuple[str, ...]) -> npt.NDArray[np.bool_]:
         raise TrajectoryError(
             f"focus: the arm has no effect '{unknown[0]}'; it has {', '.join(names) or 'none'}"
         )
+    return marked(arm, lambda effect: effect.name in focus)
+
+
+def marked(arm: ArmModel, which: Callable[[Effect], bool]) -> npt.NDArray[np.bool_]:
+    """Mark the parameters of some effects, shape (P,)."""
     marks = [np.zeros(len(arm.robot.rigid_parameters), dtype=bool)]
-    for effect in arm.effects:
-        marks.append(np.full(len(effect.parameters(arm.robot)), effect.name in focus))
+    marks += [np.full(len(one.parameters(arm.robot)), which(one)) for one in arm.effects]
     return np.concatenate(marks)

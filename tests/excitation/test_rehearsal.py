@@ -35,7 +35,7 @@ def rehearsed(arm, run, off=0.0, factor=1.0, count=500):
 def test_an_arm_as_described_surprises_nobody(arm, run):
     report = rehearsed(arm, run).report()
     assert report.surprises == ()
-    np.testing.assert_allclose(report.torque, report.foreseen, rtol=1e-3)
+    np.testing.assert_allclose(report.torque, report.foreseen, rtol=2e-5)
     np.testing.assert_allclose(report.tracking, 0.0, atol=1e-12)
 
 

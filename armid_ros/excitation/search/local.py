@@ -173,7 +173,7 @@ class Search:
         return [trajectory for _, trajectory in drawn[: settings.starts]]
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
-        """Go on in rounds from several trajectories; the worse half ends after each."""
+        """Go on in rounds from several trajectories; the worse half ends after every `_ROUNDS`."""
         objective, watched = Objective.of(self.problem, self.prior), self._watched()
         branches = [_Branch(self, objective, watched, start) for start in starts]
         while branches:

@@ -16,7 +16,7 @@ from functools import cached_property
 
 from armid_ros.effects.direction import BlurredMotion
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
-from armid_ros.excitation.problem import DesignProblem
+from armid_ros.excitation.problem import DesignProblem, marked
 from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -88,7 +88,8 @@ class Objective:
         problem, settings = self.problem, self.problem.settings
         states = (basis @ x.T for basis in self.basis)
         motion = BlurredMotion(problem.limits.joints, self.t, *states, width=self.width)
-        columns = np.concatenate(self._by_state(motion) + self._by_past(x), axis=2)
+        state, past = self._by_state(motion), self._by_past(x)
+        columns = np.concatenate(state + past, axis=2)
         order = self._order[problem.base.independent]
         inverse_noise = 1.0 / problem.noise[:, np.newaxis]
         w = (columns[:, :, order] * inverse_noise).reshape(-1, len(order))
@@ -102,16 +103,16 @@ class Objective:
             weights = np.zeros_like(columns)
             by_w = 2.0 * weight * (w @ by_matrix)
             weights[:, :, order] = by_w.reshape(*motion.q.shape, -1) * inverse_noise
-            return self._state_gradient(motion, weights) + self._past_gradient(x, weights)
+            by_state = self._state_gradient(motion, _weighted(state, weights), weights)
+            return by_state + self._past_gradient(x, past, weights)
 
         return cost, gradient
 
-    def _state_gradient(self, motion: Motion, weights: FloatArray) -> FloatArray:
+    def _state_gradient(self, motion: Motion, here: FloatArray, weights: FloatArray) -> FloatArray:
         """Differentiate sum(weights * columns of the state) by the coefficients."""
         count, n = motion.q.shape
         total = np.zeros((n, self.basis[0].shape[1]))
         state = np.array([motion.q, motion.dq, motion.ddq])
-        here = _weighted(self._by_state(motion), weights)
         for argument, basis in enumerate(self.basis):
             for joints in np.array_split(np.arange(n), -(-n // _TOGETHER)):
                 moved = np.tile(state, (1, len(joints), 1)).reshape(3, len(joints), count, n)
@@ -122,17 +123,18 @@ class Objective:
                 total[joints] += (_weighted(there, weights) - here) @ basis / _STEP
         return total
 
-    def _past_gradient(self, x: FloatArray, weights: FloatArray) -> FloatArray:
+    def _past_gradient(
+        self, x: FloatArray, past: Sequence[FloatArray], weights: FloatArray
+    ) -> FloatArray:
         """Differentiate sum(weights * columns of the past) by the coefficients."""
         total = np.zeros_like(x)
-        here = self._by_past(x)
-        if here:
-            weights = weights[:, :, -sum(block.shape[2] for block in here) :]
+        if past:
+            weights = weights[:, :, -sum(block.shape[2] for block in past) :]
+            here = _weighted(past, weights)
             for index in np.ndindex(*x.shape):
                 moved = x.copy()
                 moved[index] += _STEP
-                change = _weighted(self._by_past(moved), weights) - _weighted(here, weights)
-                total[index] = change.sum() / _STEP
+                total[index] = (_weighted(self._by_past(moved), weights) - here).sum() / _STEP
         return total
 
     def _by_state(self, motion: Motion) -> list[FloatArray]:
@@ -156,11 +158,8 @@ class Objective:
     @cached_property
     def _order(self) -> npt.NDArray[np.intp]:
         """Where each standard parameter is among the columns: those of the past are last."""
-        arm = self.problem.arm
-        past = [np.zeros(len(arm.robot.rigid_parameters), dtype=bool)]
-        for effect in arm.effects:
-            past.append(np.full(len(effect.parameters(arm.robot)), not effect.instantaneous))
-        return np.argsort(np.argsort(np.concatenate(past), kind='stable'))
+        past = marked(self.problem.arm, lambda effect: not effect.instantaneous)
+        return np.argsort(np.argsort(past, kind='stable'))
 
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:
