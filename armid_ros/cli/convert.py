@@ -116,4 +116,4 @@ def _bag(path: Path, out: Path | None) -> None:
         say(f'  {copied.damage}')
     if copied.renamed:
         say('  renamed: ' + ', '.join(f'{old} to {new}' for old, new in copied.renamed))
-    say(f'{out}: {sum(topic.count for topic in copied.topics)} messages')
+    say(f'{out}: {copied.messages} messages')

@@ -231,7 +231,7 @@ def _files_of(path: Path) -> BagMetadata:
     if not path.is_dir():
         if _storage_suffix(path) not in _STORAGES and not is_ros1(path):
             raise RecordingError(
-                f'{path}: not a bag; give a rosbag2 directory, or a file .mcap or .db3'
+                f'{path}: not a bag; give a rosbag2 directory, or a file .mcap, .db3 or .bag'
             )
         return BagMetadata((path,))
     if os.path.lexists(path / FILE_NAME):

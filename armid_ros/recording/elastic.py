@@ -124,7 +124,7 @@ def read_accelerations(
 
     """
     with Bag(path, settings) as bag:
-        bag.topic_of(IMU, topic)
+        topic = bag.topic_of(IMU, topic).name
         messages = [b.message(k) for b in bag.blocks(topic) for k in range(len(b))]
     if not messages:
         raise RecordingError(f'{path}: {topic} has no messages')

@@ -40,7 +40,7 @@ def read_recording(
     ----------
     path : str or Path
         A rosbag2 directory (MCAP or SQLite, split, compressed, with or without metadata.yaml), or
-        a file .mcap or .db3. A file cut off by a crash is read as far as it goes.
+        a file .mcap, .db3 or (ROS 1) .bag. A file cut off by a crash is read as far as it goes.
     joints : sequence of str
         The joints wanted, in this order; of others in the messages (a gripper's) the range of the
         positions is kept.

@@ -38,7 +38,7 @@ class Ros1Source:
         path : Path
             The file.
         settings : ReadSettings
-            Not needed: its chunks have no checksums.
+            Not needed: its chunks have no checksums, and one is in memory at a time.
 
         Raises
         ------
@@ -47,7 +47,6 @@ class Ros1Source:
 
         """
         open_regular(path, RecordingError).close()  # a FIFO would be waited for
-        self._path = path
         self._damage = Damage()
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)

@@ -330,8 +330,8 @@ def _resampled(
 
 
 def _finite(
-    where: str, joints: tuple[str, ...], series: Any, counts: Counter[str]
-) -> tuple[JointSamples, Any, Any]:
+    where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
+) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
     """Return the finite samples, the quantities that are absent, and what is not finite."""
     quantities, absent = _measured_quantities(where, series)
     bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))

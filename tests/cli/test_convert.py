@@ -45,7 +45,7 @@ def test_a_table_becomes_a_bag(csv, recording, tmp_path):
 def test_a_dry_run_shows_and_writes_nothing(csv, tmp_path):
     text = armid('convert', csv, '--robot', ROBOT, '--dry-run', '--out', tmp_path / 'bag').stdout
     words = ' '.join(text.split())
-    assert "'current{}'" in words and '--current-gain' in words
+    assert "'current{}'" in words and '--current-gain' in words and '--degrees' in words
     assert not (tmp_path / 'bag').exists()
     assert all(len(line) <= 80 for line in text.splitlines()[1:-1])
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import textwrap
 
@@ -25,6 +25,8 @@ _FACTORS |= {'mrad': 1e-3, 'kN m': 1e3, 'rpm': 2 * np.pi / 60, 'mm': 1e-3, 'mm/s
 _TURNS = ('deg', 'deg/s', 'rpm', 'mrad')
 #: Sampling periods that are recognised from the numbers alone [s].
 _STEP = (2e-5, 0.5)
+#: Positions further from zero are hardly in rad or m.
+_FAR = 4.5 * np.pi
 
 
 @dataclass(frozen=True)
@@ -217,7 +219,7 @@ def plan(
             )
     time, unit, rate = _time(table, settings)
     effort = next((one for one in sources if one.quantity == 'effort'), None)
-    notes = []
+    notes = list(_far(position, settings, sliding))
     if effort is not None and not settings.effort_scale:
         name = effort.chosen.pattern
         if effort.unit in ('A', 'mA') or 'load' in name.lower():
@@ -293,6 +295,23 @@ def _scaled(
 
 def _short(values: FloatArray) -> str:
     return ', '.join(dict.fromkeys(f'{value:.6g}' for value in values))
+
+
+def _far(
+    position: QuantitySource, settings: ColumnSettings, slides: npt.NDArray[np.bool_]
+) -> Iterator[str]:
+    """Doubt the unit of positions by how far each joint is from zero."""
+    if position.unit != 'rad' or settings.gear or settings.position_scale:
+        return
+    reach = np.fmax.reduce(np.abs(position.values()))
+    turned, slid = (reach > _FAR) & ~slides, (reach > _FAR) & slides
+    if turned.any() and not settings.degrees:
+        yield f'positions reach {reach[turned].max():.4g}: --degrees, or motor angles (--gear)?'
+    if slid.any():
+        others = 'pi/180' if settings.degrees else '1'
+        scale = ','.join('0.001' if one else others for one in slides)
+        far = f'{reach[slid].max():.4g}'
+        yield f'positions that slide reach {far} m: --position-scale {scale} if in mm?'
 
 
 def _time(table: Table, settings: ColumnSettings) -> tuple[TableColumn | None, str, float | None]:
