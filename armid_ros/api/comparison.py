@@ -55,7 +55,7 @@ class ComparisonResult(Shown):
         """Return all parameters as a pandas table, before and after."""
         return data_frame(self.document()['parameters'])
 
-    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what comparison.json holds."""
         return self.core.document()
 

@@ -158,7 +158,7 @@ class DiagnosisResult(ShownModel):
             for row in effect['parameters']
         )
 
-    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what diagnosis.json holds."""
         extras = self.extras
         return {

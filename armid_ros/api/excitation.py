@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+import sys
 from typing import Any, TYPE_CHECKING, Unpack
 
 from armid_ros.api.arguments import (
@@ -40,7 +41,7 @@ from armid_ros.excitation import (
     whole_period,
     with_joint_limits,
 )
-from armid_ros.files import json_text, write_file
+from armid_ros.files import json_text, settled, write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray, Motion
@@ -230,7 +231,12 @@ class ExcitationResult(Shown):
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
         document = self.document(origin)
         write_file(folder / 'excitation.json', json_text(document, indent=1))
-        write_file(folder / 'report.html', self.page(origin))
+        path = folder / 'report.html'
+        try:
+            write_file(path, self.page(origin))
+        except Exception as error:  # whatever it is, the trajectory is written and good
+            said = f'{settled(path)}: not written: {type(error).__name__}: {error}'
+            print(said, file=sys.stderr)
         return document
 
     def summary(self) -> Summary:
@@ -257,7 +263,7 @@ class ExcitationResult(Shown):
         except TrajectoryError as error:
             return [f'there is no way to the trajectory: {error}']
         robot = self.arm.robot
-        fault = self.planner.free_start()[1] if self.given_start is None else ''
+        fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
         pose = [
             f'{joint} {value:.3g} {unit}'
             for joint, value, unit in zip(
@@ -381,8 +387,10 @@ def design_excitation(
     if scene is None:
         height = None if floor is None else str(floor)
         scene = CollisionScene.of(model.robot, asked.clearance, height, environment)
-    fault = '' if start is None else _planner(model, asked, scene).fault(start)
-    if fault:
+    planner = _planner(model, asked, scene)
+    if start is None:
+        planner.free_start()  # where there is none, that is said before the search
+    elif fault := planner.fault(start):
         raise TrajectoryError(f'--start: {fault}')
     earlier = recordings_of(after, model.robot)
     found = design(

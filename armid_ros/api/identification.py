@@ -173,7 +173,7 @@ class IdentificationResult(ShownModel):
         fits = next(iter(self.validation.values()), self.core.training)
         t = np.concatenate([fit.motion.t for fit in fits])
         curves = {
-            'measured': (t, np.concatenate([fit.predicted + fit.residual for fit in fits])),
+            'measured': (t, np.concatenate([fit.tau for fit in fits])),
             'predicted': (t, np.concatenate([fit.predicted for fit in fits])),
         }
         return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')

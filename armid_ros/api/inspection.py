@@ -77,7 +77,7 @@ class InspectionResult(Shown):
         """Return ranges, speeds and efforts of the joints as a pandas table."""
         return data_frame(self.core.joints)
 
-    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what ``armid inspect --json`` prints."""
         return inspection_document(self.core)
 
@@ -200,7 +200,7 @@ class CheckResult(Shown):
         impossible = any(one.weight == 'bad' for one in self.remarks)
         return impossible or (self.links is not None and not self.links.agrees)
 
-    def document(self, _: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
+    def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what ``armid check --json`` prints."""
         links = None if self.links is None else asdict(self.links)
         if links is not None:

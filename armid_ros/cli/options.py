@@ -108,13 +108,12 @@ def deliver(
         What is printed; by default that of the result.
 
     """
-    if staged is None:
-        document = result.document(origin)
-    else:
+    document = None
+    if staged is not None:
         document = result.fill(staged.folder, origin)
         staged.keep()
     if as_json:
-        click.echo(json_text(document))
+        click.echo(json_text(document or result.document(origin)))
         return
     for line in (summary or result.summary()).full_text():
         say(line)

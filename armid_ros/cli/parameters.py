@@ -31,10 +31,14 @@ class OutPath(click.Path):
 
 def _completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
     """Complete the last name of a list with commas: of a shipped robot, or of an effect."""
-    from armid_ros.effects import CATALOGUE
-    from armid_ros.robots import shipped_robots
+    if parameter.name == 'effects':
+        from armid_ros.effects import CATALOGUE
 
-    names = list(CATALOGUE) if parameter.name == 'effects' else list(shipped_robots())
+        names = list(CATALOGUE)
+    else:
+        from armid_ros.robots import shipped_robots
+
+        names = list(shipped_robots())
     before, comma, last = incomplete.rpartition(',')
     return [f'{before}{comma}{name}' for name in names if name.startswith(last)]
 

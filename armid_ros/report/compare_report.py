@@ -98,7 +98,7 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
         ends = [f'{x:.4g}' if excludes_zero(x, std) else 'includes 0' for x, std in values]
         number, reach = measured(change.difference, HALF_WIDTH * change.std)
         share = ''
-        if excludes_zero(change.before, change.before_std):
+        if ends[0] != 'includes 0':
             share = f' ({100.0 * change.difference / abs(change.before):+.0f} %)'
         sign = '+' * (change.difference > 0.0)
         by = f'{sign}{number} ± {reach} {pretty(change.parameter.unit)}{share}'

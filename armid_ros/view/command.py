@@ -57,6 +57,8 @@ def view(
         arm = ArmModel(robot)
     (recording,) = options.read([bag], arm.robot, topic)
     marked = listed(mark) if mark else _named(model)
+    for joint in marked:
+        arm.robot.index(joint)
     with _whole(out) as file:
         stream = open_stream(Path(recording.source).name or arm.robot.name, file)
         notes = log_recording(stream, arm, recording, marked)
@@ -83,6 +85,8 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
         beside.replace(out)
     except OSError as error:
         raise OutputError(f'{out}: cannot be written: {error.strerror}') from error
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _named(model: Path | None) -> tuple[str, ...]:

@@ -144,8 +144,6 @@ def log_recording(
 
     """
     rr, robot = rerun(), arm.robot
-    for joint in marked:
-        robot.index(joint)
     notes = _log_bodies(stream, robot, marked)
     t, q = poses(recording)
     rotations, translations = joint_frames(robot, q)

@@ -80,6 +80,6 @@ def torques(
     fits = predictions(arm, [recording], conditioning([recording], SignalSettings()))
     return (
         np.concatenate([fit.motion.t for fit in fits]),
-        np.concatenate([fit.predicted + fit.residual for fit in fits]),
+        np.concatenate([fit.tau for fit in fits]),
         np.concatenate([fit.predicted for fit in fits]),
     )

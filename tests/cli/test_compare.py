@@ -200,3 +200,15 @@ def test_an_identification_of_another_model_is_left_alone(tmp_path):
     theta[-1] += 0.1
     save_model(folder / 'model.yaml', arm.with_theta(theta), 'humanoid_arm')
     assert read_parameters(folder / 'model.yaml').source == str(folder / 'model.yaml')
+
+
+def test_models_of_other_effects_leave_other_residuals(tmp_path):
+    first = identified(tmp_path / 'a', 0.08, errors=(4.0, 1.0))
+    second = identified(tmp_path / 'b', 0.081, errors=(4.1, 30.0))
+    file = second / 'identification.json'
+    file.write_text(file.read_text().replace(FRICTION[0], 'spring_stiffness'))
+    document = json.loads(file.read_text())
+    document['parameters'][1]['value'] = 0.501
+    file.write_text(json.dumps(document))
+    result = armid('compare', first, second, '--out', tmp_path / 'out')
+    assert '30 times' in result.output and 'different effects' in result.output

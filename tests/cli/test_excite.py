@@ -216,3 +216,14 @@ def test_a_recording_is_no_folder_for_a_design(tmp_path):
     refused = excite(ROBOT, bag, code=2)
     assert str(bag) in refused.stderr and '--out' in refused.stderr
     assert [path.name for path in bag.iterdir()] == ['monday_0.mcap']
+
+
+def test_a_report_that_fails_costs_nothing_else(tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise ZeroDivisionError('no picture')
+
+    monkeypatch.setattr('armid_ros.report.excitation_report.excitation_report', fail)
+    result = excite(ROBOT, tmp_path / 'plan')
+    assert 'report.html' in result.stderr and 'no picture' in result.stderr
+    for name in ('excitation.yaml', 'excitation.csv', 'excitation.json', 'trajectory'):
+        assert (tmp_path / 'plan' / name).exists()

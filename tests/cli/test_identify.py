@@ -219,3 +219,24 @@ def test_a_known_payload_fixes_the_gains_of_the_drives(tmp_path):
         assert export['share'] < 1e-9
     for text in ('b', 'z=1@forearm', 'b=1@nowhere'):
         armid('identify', *bags, '--robot', ROBOT, '--payload', text, '--out', out, code=2)
+
+
+def test_identify_writes_model_numbers_and_page(bags, tmp_path):
+    out = tmp_path / 'out'
+    result = armid('identify', bags[0], '--robot', '-', '--validate', bags[1], '--out', out)
+    assert 'held out' in result.output
+    document = json.loads((out / 'identification.json').read_text())
+    assert document['schema'] == 'armid/identification/1'
+    assert document['validation'][0]['relative_error_percent'] < 3.0
+    assert {'name', 'joint', 'value', 'std', 'unit'} == set(document['parameters'][0])
+    arm = load_model(out / 'model.yaml')  # its robot came with the bag and lies beside it
+    viscous = arm.values[arm.effects.index(make_effect('viscous_friction', arm.robot))]
+    np.testing.assert_allclose(viscous, 0.1, atol=0.01)
+    assert (out / 'report.html').stat().st_size > 10_000
+
+
+def test_checks_can_be_left_out(bags, tmp_path):
+    out = tmp_path / 'out'
+    asked = ('identify', bags[0], '--robot', ROBOT, '--no-verify')
+    assert 'check:' not in armid(*asked, '--out', out).stdout
+    assert 'verification' not in json.loads((out / 'identification.json').read_text())

@@ -85,3 +85,9 @@ def test_an_image_is_a_png_of_its_pixels():
     assert kind == 'data:image/png;base64'
     pixels = imread(BytesIO(b64decode(content)), format='png')
     np.testing.assert_allclose(pixels, [[[1, 0, 0, 1], [0, 0, 1, 0.5]]], atol=1 / 255)
+
+
+def test_bars_of_nothing_have_no_length():
+    chart = BarChart([('<b>', [Bar(0.0, 'floor', 'none')])])
+    assert 'width: 0.0%' in chart.html()
+    assert '<b>' not in chart.html() and '&lt;b&gt;' in chart.html()

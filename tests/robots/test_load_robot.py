@@ -399,11 +399,37 @@ class TestSizes:
 @pytest.mark.parametrize(
     ('old', 'new', 'message'),
     [
-        ('<mass value="1"/>', '<mass value="inf"/>', "'l0': value='inf' of <mass> is not finite"),
-        ('<child', '<axis xyz="nan 0 1"/><child', "xyz='nan 0 1' of <axis> is not three"),
+        (
+            '<mass value="1"/>',
+            '<mass value="inf"/>',
+            "link 'l0': value='inf' of <mass> is not fin",
+        ),
+        ('ixx="1"', 'ixx="-inf"', "link 'l0': ixx='-inf' of <inertia> is not finite"),
+        ('<mass value="1"/>', '<origin xyz="0 0 inf"/><mass value="1"/>', 'not three finite'),
+        (
+            '<child',
+            '<axis xyz="nan 0 1"/><child',
+            "joint 'j1': xyz='nan 0 1' of <axis> is not three",
+        ),
+        (
+            '<child',
+            '<axis xyz="1.7e308 1.7e308 0"/><child',
+            "'j1': xyz='1.7e308 1.7e308 0' of <axis>",
+        ),
         ('ixx="1"', 'ixx="1e101"', "link 'l0': ixx='1e101' of <inertia> is beyond 1e+100"),
-        ('<child', '<origin xyz="0 1e200 0"/><child', "xyz='0 1e200 0' of <origin> is beyond"),
+        (
+            '<child',
+            '<origin rpy="0 0 nan"/><child',
+            "joint 'j1': rpy='0 0 nan' of <origin> is not",
+        ),
+        ('<child', '<origin xyz="0 1e999 0"/><child', "joint 'j1': xyz='0 1e999 0' of <origin>"),
         ('<child', '<dynamics damping="inf"/><child', "damping='inf' of <dynamics> is not finite"),
+        (
+            '<mass value="1"/>',
+            '<origin xyz="1e200 0 0"/><mass value="1e200"/>',
+            "xyz='1e200 0 0' of <origin> is beyond 1e+100",
+        ),
+        ('<child', '<origin xyz="0 1e200 0"/><child', "xyz='0 1e200 0' of <origin> is beyond"),
     ],
 )
 def test_a_number_that_is_not_finite_is_refused_by_name(old: str, new: str, message: str) -> None:
