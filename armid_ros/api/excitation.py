@@ -47,7 +47,7 @@ from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording, write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
-from armid_ros.robots import joints_beside_arms, Robot
+from armid_ros.robots import joints_beside_arms
 import numpy as np
 import numpy.typing as npt
 
@@ -123,9 +123,8 @@ class ExcitationResult(Shown):
     def plot(self) -> npt.NDArray[np.object_]:
         """Draw the position of each joint; return its axes (matplotlib), shape (n,)."""
         motion = self.motion()
-        return draw_joints(
-            motion.joints, {'position': (motion.t, motion.q)}, 'position [rad or m]'
-        )
+        curves = {'position': (motion.t, motion.q)}
+        return draw_joints(motion.joints, curves, 'position [rad or m]')
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the waypoints as a pandas table: t, and q, dq, ddq of every joint."""
@@ -231,12 +230,11 @@ class ExcitationResult(Shown):
         write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
         document = self.document(origin)
         write_file(folder / 'excitation.json', json_text(document, indent=1))
-        path = folder / 'report.html'
+        page = folder / 'report.html'
         try:
-            write_file(path, self.page(origin))
+            write_file(page, self.page(origin))
         except Exception as error:  # whatever it is, the trajectory is written and good
-            said = f'{settled(path)}: not written: {type(error).__name__}: {error}'
-            print(said, file=sys.stderr)
+            sys.stderr.write(f'{settled(page)}: not written: {type(error).__name__}: {error}\n')
         return document
 
     def summary(self) -> Summary:
@@ -373,8 +371,13 @@ def design_excitation(
 
     """
     model = arm_of(arm)
-    if isinstance(arm, str | Path):
-        _require_one_arm(model.robot, arm)
+    others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
+    if others:
+        kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
+        raise TrajectoryError(
+            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
+        )
     if joint_limits is not None:
         model, known = _limited(model, joint_limits)
         settings.setdefault('acceleration', known)
@@ -406,16 +409,6 @@ def design_excitation(
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
 
 
-def _require_one_arm(robot: Robot, source: str | Path) -> None:
-    others = joints_beside_arms(robot)
-    if others:
-        kept = ', '.join(repr(joint) for joint in robot.joints if joint not in others)
-        raise TrajectoryError(
-            f'{source}: {", ".join(others)} belong to no arm; choose what is driven with '
-            f'ar.load_robot({str(source)!r}, joints=[{kept}])'
-        )
-
-
 def _limited(
     model: ArmModel, given: str | Path | Mapping[str, float]
 ) -> tuple[ArmModel, FloatArray | None]:
@@ -443,8 +436,7 @@ def _information(
     """Return the information that recordings hold already, shape (r, r)."""
     used = conditioning(list(recordings), SignalSettings())
     problem = DesignProblem.of(arm, settings, np.random.default_rng(rng))
-    size = len(problem.base.parameters)
-    matrix = np.zeros((size, size))
+    matrix = np.zeros(2 * [len(problem.base.parameters)])
     for recording in recordings:
         for motion in segments(recording, used):
             thinned = motion.select(slice(None, None, used.decimation))

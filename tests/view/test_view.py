@@ -194,5 +194,5 @@ def test_a_window_is_reached_from_this_machine_alone(monkeypatch, tmp_path):
         listening = [one[1] for one in sockets if one[3] == '0A' and one[1][-4:] == f'{port:04X}']
         assert listening == [f'0100007F:{port:04X}']
     finally:
-        os.killpg(started[0].pid, signal.SIGTERM)
+        os.killpg(started[0].pid, signal.SIGKILL)
         started[0].wait(10)
