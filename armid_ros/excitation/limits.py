@@ -300,32 +300,35 @@ def with_joint_limits(
     robot: Robot, path: str | Path | None = None, velocity: Sequence[str] = ()
 ) -> tuple[Robot, FloatArray | None]:
     """
-    Return a robot with velocity limits that are given, and the acceleration limits.
+    Return a robot with the position and velocity limits that are given, and acceleration limits.
 
     Parameters
     ----------
     robot : Robot
         The arm.
     path : str or Path, optional
-        ``joint_limits.yaml`` of MoveIt; limits apply where its ``has_..._limits`` says so. A
-        velocity limit above that of the description is not taken.
+        ``joint_limits.yaml`` of MoveIt; limits apply where its ``has_..._limits`` says so.
+        Position and velocity limits beyond those of the description are not taken.
     velocity : sequence of str
         'joint:=value' [rad/s or m/s]; these replace all others.
 
     Returns
     -------
     robot : Robot
-        With these velocity limits.
+        With these position and velocity limits.
     acceleration : ndarray, shape (n,), or None
         Limits [rad/s^2 or m/s^2], NaN where none is given; None without a file.
 
     Raises
     ------
     TrajectoryError
-        If the file has no limits of joints, a limit is not positive, or a joint is unknown.
+        If the file has no limits of the arm's joints, a limit is no positive number, a position
+        range is empty, or a joint is unknown.
 
     """
-    top = np.array(robot.velocity_limit)
+    top, lower, upper = (
+        np.array(limit) for limit in (robot.velocity_limit, robot.lower, robot.upper)
+    )
     acceleration = None
     if path:
         acceleration = np.full(robot.n_joints, np.nan)
@@ -334,12 +337,25 @@ def with_joint_limits(
         entries = document.get('joint_limits') if isinstance(document, dict) else None
         if not isinstance(entries, dict):
             raise TrajectoryError(f'{path}: no mapping joint_limits, as MoveIt has it')
+        if not entries.keys() & set(robot.joints):
+            raise TrajectoryError(f'{path}: no limits for any of {", ".join(robot.joints)}')
         for j, joint in enumerate(robot.joints):
             entry = entries.get(joint)
             if entry is None:
                 continue
             if not isinstance(entry, dict):
                 raise TrajectoryError(f'{path}: joint {joint}: no mapping of limits')
+            if entry.get('has_position_limits'):
+                ends = [
+                    _number(entry.get(key), f'{path}: {joint}: {key}')
+                    for key in ('min_position', 'max_position')
+                ]
+                lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
+                if not lower[j] < upper[j]:
+                    raise TrajectoryError(
+                        f'{path}: {joint}: positions from {ends[0]:g} to {ends[1]:g} leave '
+                        f'nothing of {robot.lower[j]:g} to {robot.upper[j]:g} in the description'
+                    )
             if entry.get('has_velocity_limits'):
                 given = _positive(entry.get('max_velocity'), f'{path}: {joint}: max_velocity')
                 top[j] = min(top[j], given) if top[j] > 0.0 else given
@@ -354,14 +370,21 @@ def with_joint_limits(
                 f"velocity '{text}': write joint:=value for one of {', '.join(robot.joints)}"
             )
         top[robot.joints.index(joint)] = _positive(number, f'velocity of joint {joint}')
-    return replace(robot, velocity_limit=top), acceleration
+    return replace(robot, lower=lower, upper=upper, velocity_limit=top), acceleration
 
 
 def _positive(value: Any, where: str) -> float:
+    number = _number(value, where)
+    if number <= 0.0:
+        raise TrajectoryError(f"{where} has to be a positive number, not '{value}'")
+    return number
+
+
+def _number(value: Any, where: str) -> float:
     try:
         number = float(value)
     except (TypeError, ValueError):
         number = math.nan
-    if not 0.0 < number < math.inf:
-        raise TrajectoryError(f"{where} has to be a positive number, not '{value}'")
+    if not math.isfinite(number):
+        raise TrajectoryError(f"{where} has to be a number, not '{value}'")
     return number

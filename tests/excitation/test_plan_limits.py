@@ -2,8 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plan never takes a missing, mistyped or foreign limit for a licence."""
 
+from armid_ros.arm import ArmModel
 from armid_ros.errors import TrajectoryError
-from armid_ros.excitation import CollisionScene, Limits, with_joint_limits
+from armid_ros.excitation import (
+    CollisionScene,
+    Excitation,
+    Limits,
+    random_feasible,
+    with_joint_limits,
+)
 from armid_ros.excitation.limits import SLOW_VELOCITY, TIME_TO_TOP_SPEED
 from armid_ros.robots import joints_beside_arms, load_arms, robot_from_urdf
 import numpy as np
@@ -64,6 +71,41 @@ def test_moveit_limits_are_read(tmp_path):
     path.write_text('joint_limits: {waist: {has_acceleration_limits: true}}')
     with pytest.raises(TrajectoryError, match='waist: max_acceleration'):
         with_joint_limits(robot, path)
+
+
+@pytest.mark.parametrize(
+    ('least', 'most', 'lower', 'upper'), [(-0.5, 0.7, -0.5, 0.7), (-9, 9, -2, 2)]
+)
+def test_moveit_position_limits_narrow_those_of_the_description(
+    tmp_path, least, most, lower, upper
+):
+    path = tmp_path / 'joint_limits.yaml'
+    limits = f'has_position_limits: true, min_position: {least}, max_position: {most}'
+    path.write_text(f'joint_limits: {{waist: {{{limits}}}}}')
+    robot, _ = with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
+    np.testing.assert_array_equal(robot.lower, [lower, -1, -1])
+    np.testing.assert_array_equal(robot.upper, [upper, 1, 1])
+    found = random_feasible(
+        ArmModel(robot), Limits.of(robot, speed=1.0), 4.0, 2, np.random.default_rng(0)
+    )
+    q = Excitation(found, 1, 2.0).motion(100.0).q
+    assert np.all((q >= robot.lower) & (q <= robot.upper))
+    assert np.ptp(q[:, 0]) > 0.2 * (upper - lower)
+
+
+@pytest.mark.parametrize(
+    ('entry', 'named'),
+    [
+        ('waist: {has_position_limits: true, min_position: -1}', 'waist: max_position'),
+        ('waist: {has_position_limits: true, min_position: 3, max_position: 4}', 'waist'),
+        ('elbow_1: {has_velocity_limits: true, max_velocity: 1}', 'waist, shoulder'),
+    ],
+)
+def test_a_file_of_limits_that_leave_nothing_is_refused(tmp_path, entry, named):
+    path = tmp_path / 'joint_limits.yaml'
+    path.write_text(f'joint_limits: {{{entry}}}')
+    with pytest.raises(TrajectoryError, match=named):
+        with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
 
 
 def test_wheels_head_and_torso_belong_to_no_arm():

@@ -132,7 +132,7 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--joint-limits',
     type=click.Path(path_type=Path),
-    help='joint_limits.yaml of MoveIt: velocity and acceleration limits.',
+    help='joint_limits.yaml of MoveIt: position, velocity and acceleration limits.',
 )
 @click.option(
     '--velocity',
