@@ -74,7 +74,9 @@ class Commands(click.Group):
             near = meant(args[0], self.list_commands(ctx))
             raise click.UsageError(error.message.rstrip('.') + near, ctx) from error
         if name and command and not {'-h', '--help'} & set(rest):
-            ctx.default_map = {name: project_options(name, command, rest)}
+            listed = self.list_commands(ctx)
+            others = partial(map, _imported, listed)
+            ctx.default_map = {name: project_options(name, command, rest, others)}
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

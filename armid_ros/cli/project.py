@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 import tomllib
 from typing import Any
@@ -16,7 +16,12 @@ import click
 FILE = 'armid.toml'
 
 
-def project_options(name: str, command: click.Command, typed: Sequence[str]) -> dict[str, Any]:
+def project_options(
+    name: str,
+    command: click.Command,
+    typed: Sequence[str],
+    others: Callable[[], Iterable[click.Command]],
+) -> dict[str, Any]:
     """
     Return defaults of a command by the names of its parameters, and print on stderr what they are.
 
@@ -31,17 +36,20 @@ def project_options(name: str, command: click.Command, typed: Sequence[str]) -> 
         The command.
     typed : sequence of str
         Its arguments as they were typed: an option among them is not looked up.
+    others : callable
+        Returns all commands; called where a key is no option of this one.
 
     Raises
     ------
     ArmidError
-        If the file is no TOML, or the table of the command has a key that is none of its options.
+        If the file is no TOML, the table of the command has a key that is none of its options, or
+        a key outside of a table is an option of no command.
 
     """
     if isinstance(command, click.Group):
         below = next((word for word in typed if word in command.commands), '')
         inner = command.commands.get(below)
-        return {below: project_options(f'{name} {below}', inner, typed)} if inner else {}
+        return {below: project_options(f'{name} {below}', inner, typed, others)} if inner else {}
     if not Path(FILE).is_file():
         return {}
     try:
@@ -52,21 +60,29 @@ def project_options(name: str, command: click.Command, typed: Sequence[str]) -> 
     for part in name.split():
         own = own[part] if isinstance(own.get(part), dict) else {}
     given = {key: value for key, value in project.items() if not isinstance(value, dict)} | own
-    options = {
-        text.lstrip('-'): one
-        for one in command.params
-        if isinstance(one, click.Option)
-        for text in one.opts
-    }
+    options = _options(command)
     for key in own.keys() - options.keys():
         raise ArmidError(f"{FILE}: armid {name} has no option '{key}'{meant(key, options)}")
+    foreign = given.keys() - options.keys()
+    every = {key for one in others() for key in _options(one)} if foreign else set()
+    for key in sorted(foreign - every):
+        raise ArmidError(f"{FILE}: no command has an option '{key}'{meant(key, every)}")
     words = {text.split('=')[0] for text in typed}
     found = {}
     for key, value in given.items():
         option = options.get(key)
         if option is None or option.name is None or words & {*option.opts, *option.secondary_opts}:
             continue
-        listed = isinstance(value, list) and not option.multiple
-        found[option.name] = ','.join(map(str, value)) if listed else value
-        click.echo(f'{FILE}: --{key} {found[option.name]}', err=True)
+        values = value if isinstance(value, list) else [value]
+        text = ','.join(map(str, values))
+        found[option.name] = values if option.multiple else text if value is values else value
+        click.echo(f'{FILE}: --{key} {text}', err=True)
     return found
+
+
+def _options(command: click.Command) -> dict[str, click.Option]:
+    """Return the options of a command, and of those in a group, by their long names."""
+    inner = command.commands.values() if isinstance(command, click.Group) else ()
+    own = [one for one in command.params if isinstance(one, click.Option)]
+    found = {text.lstrip('-'): one for one in own for text in one.opts}
+    return {key: one for below in inner for key, one in _options(below).items()} | found
