@@ -70,12 +70,14 @@ def explain(
         named.append(SelectedEffect(effect, kept))
         values.append(first)
         steps.append(trial)
-    for trial in _open(result, unknown, settings):
-        if trial.odds > alarm and np.any(np.abs(trial.values) >= trial.least):
+    there = [trial for trial in _open(result, unknown, settings) if trial.odds > alarm]
+    large = {t.effect.name for t in there if np.any(np.abs(t.values) >= t.least)}
+    for trial in there:  # left out where it is small, it would be in the values of others
+        if trial.effect.name in large:
             named.append(trial.named)
             values.append(trial.values)
             steps.append(trial)
-        elif trial.odds > alarm:
+        else:
             small.append(trial)
     return Explanation(
         problem.arm,
