@@ -271,11 +271,11 @@ def _fitted(
     settings: IdentificationSettings,
 ) -> FittedValues:
     """Fit by least squares what data determine better than the description does."""
-    method, told, free = settings.least_squares, base, None
+    method, told, free, solution = settings.least_squares, base, None, None
     if settings.holds_description:
-        told, problem = determined(arm, base, problem, method)
+        told, problem, solution = determined(arm, base, problem, method)
         free = None if told.rank == base.rank else ungrouped(arm, base)
-    return fit_values(arm, told, problem, recordings, used, method, free)
+    return fit_values(arm, told, problem, recordings, used, method, free, solution)
 
 
 def _require_samples(

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
-from armid_ros.identification.fitting.least_squares import Method, solve
+from armid_ros.identification.fitting.least_squares import Method, Solution, solve
 from armid_ros.identification.fitting.normal_equations import factored, NormalEquations
 from armid_ros.identification.rows.regression import Regression
 from armid_ros.model import BaseParameters, group_columns, regroup
@@ -96,7 +96,7 @@ def bounds(arm: ArmModel, base: BaseParameters) -> tuple[FloatArray, FloatArray]
 
 def determined(
     arm: ArmModel, base: BaseParameters, problem: Sequence[Regression], method: Method
-) -> tuple[BaseParameters, tuple[Regression, ...]]:
+) -> tuple[BaseParameters, tuple[Regression, ...], Solution]:
     """
     Hold at the description what is less sure than it, the least sure first.
 
@@ -119,12 +119,17 @@ def determined(
         What the data determine.
     problem : tuple of Regression
         Its columns, and the torque of what is held as a constant.
+    solution : Solution
+        Of the problem.
 
     """
     problem = tuple(problem)
     spread = base_spread(arm, base)
-    while base.rank:
-        std = np.sqrt(np.diag(solve(problem, method, bounds(arm, base)).covariance))
+    while True:
+        solution = solve(problem, method, bounds(arm, base))
+        if not base.rank:
+            break
+        std = np.sqrt(np.diag(solution.covariance))
         worst = int(np.argmax(std / spread))
         if std[worst] <= spread[worst]:
             break
@@ -144,7 +149,7 @@ def determined(
             grouping=base.grouping[kept],
         )
         spread = spread[kept]
-    return base, problem
+    return base, problem, solution
 
 
 def base_spread(arm: ArmModel, base: BaseParameters) -> FloatArray:

@@ -113,6 +113,7 @@ def fit_values(
     used: Conditioning,
     method: Method,
     free: FloatArray | None = None,
+    solution: Solution | None = None,
 ) -> FittedValues:
     """
     Fit base parameters, again and again where the torque is not linear in them.

@@ -56,6 +56,9 @@ _KEPT = 0.4
 #: Second derivatives of torques, fourth of positions, are taken below this many bands of the
 #: motion: between two and five, elasticity is found all the same; at ten there is but noise.
 _CURVATURE_BANDS = 2.0
+#: Samples a period of the cut-off that the band of a filtered motion is taken from: a difference
+#: of two damps the cut-off itself by sinc(1 / 20), 0.4 %.
+_RATE_OF_BAND = 20.0
 #: Samples that a stretch has to have to have a spectrum.
 _LEAST_SAMPLES = 4
 #: Output samples that one matrix product makes; larger ones multiply more zeros of the band.
@@ -353,7 +356,9 @@ def _differentiated(
     ddq = _central_difference(dq[:, :n], t[1] - t[0])
     edge = int(np.ceil(EDGE_PERIODS * used.rate_hz / used.cutoff_hz))
     inner = slice(edge, len(t) - edge)
-    band = _CURVATURE_BANDS * _motion_band([(smooth[:, :n], used.cutoff_hz)], used.rate_hz)
+    few = max(1, int(used.rate_hz / (_RATE_OF_BAND * used.cutoff_hz)))
+    bands = [(smooth[::few, :n], used.cutoff_hz)]
+    band = _CURVATURE_BANDS * _motion_band(bands, used.rate_hz / few)
     beside = None
     if recording.partner is not None:
         # the other machine's ends of the ties along its positions and velocities
