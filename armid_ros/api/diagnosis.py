@@ -261,9 +261,13 @@ class DiagnosisResult(ShownModel):
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
-            self.extras.sentences(self.core),
-            self.extras.steps(self.core, model),
+            [*self._baseline(), *self.extras.sentences(self.core)],
+            list(map(printed, self.extras.steps(self.core, model))),
         )
+
+    def _baseline(self) -> list[str]:
+        sources = ', '.join(recording.source for recording in self.baseline)
+        return [f'baseline: {sources}'] if sources else []
 
 
 def diagnose(

@@ -90,6 +90,11 @@ def load_robot(
             f'{source}: neither a file nor a shipped robot; shipped are '
             f'{", ".join(shipped_robots())}'
         )
+    if path.is_dir():
+        raise RobotError(
+            f'{source}: a folder; name the URDF, xacro or MJCF file of the robot, which comes '
+            'before recordings'
+        )
     text = read_text(path, RobotError)
     notes: tuple[str, ...] = ()
     if is_mjcf(text) and not xacro_arguments:

@@ -171,7 +171,8 @@ def check_torque(
         if np.all(factors < 0.0):
             raise IdentificationError(
                 f'{source}: torques of {joints} have the opposite sign of what the description '
-                'takes; effort has to be positive along the URDF joint axis: negate it'
+                'takes; effort has to be positive along the URDF joint axis: negate it '
+                '(--effort-scale -1)'
             )
         for unit, factor in TORQUE_UNITS.items():
             if np.all((factors > 0.5 * factor) & (factors < 2.0 * factor)):
@@ -267,7 +268,7 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
     said = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
     if degrees[worst]:
         names = ', '.join(np.array(robot.joints)[degrees])
-        said = f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees: {said}'
+        said = f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {said}'
     return (
         f'{said} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
         f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '
