@@ -316,8 +316,8 @@ def design_excitation(
     environment : str or Path, optional
         YAML with what stands around the arm, or a planning scene of MoveIt.
     joint_limits : str, Path or mapping of str to float, optional
-        ``joint_limits.yaml`` of MoveIt (position, velocity, acceleration), or the velocity limit
-        of joints by name [rad/s or m/s]. A joint without any velocity limit gets a slow one, which the summary names.
+        ``joint_limits.yaml`` of MoveIt, or the velocity limit of joints by name [rad/s or m/s].
+        A joint without any velocity limit gets a slow one, which the summary names.
     scene : CollisionScene, optional
         Bodies, floor and surroundings, in place of ``floor`` and ``environment``.
     start : ndarray, shape (n,), optional

@@ -326,43 +326,10 @@ def with_joint_limits(
         range is empty, or a joint is unknown.
 
     """
-    top, lower, upper = (
-        np.array(limit) for limit in (robot.velocity_limit, robot.lower, robot.upper)
-    )
     acceleration = None
     if path:
-        acceleration = np.full(robot.n_joints, np.nan)
-        with reading(path, TrajectoryError):
-            document = load_yaml(read_text(Path(path), TrajectoryError))
-        entries = document.get('joint_limits') if isinstance(document, dict) else None
-        if not isinstance(entries, dict):
-            raise TrajectoryError(f'{path}: no mapping joint_limits, as MoveIt has it')
-        if not entries.keys() & set(robot.joints):
-            raise TrajectoryError(f'{path}: no limits for any of {", ".join(robot.joints)}')
-        for j, joint in enumerate(robot.joints):
-            entry = entries.get(joint)
-            if entry is None:
-                continue
-            if not isinstance(entry, dict):
-                raise TrajectoryError(f'{path}: joint {joint}: no mapping of limits')
-            if entry.get('has_position_limits'):
-                ends = [
-                    _number(entry.get(key), f'{path}: {joint}: {key}')
-                    for key in ('min_position', 'max_position')
-                ]
-                lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
-                if not lower[j] < upper[j]:
-                    raise TrajectoryError(
-                        f'{path}: {joint}: positions from {ends[0]:g} to {ends[1]:g} leave '
-                        f'nothing of {robot.lower[j]:g} to {robot.upper[j]:g} in the description'
-                    )
-            if entry.get('has_velocity_limits'):
-                given = _positive(entry.get('max_velocity'), f'{path}: {joint}: max_velocity')
-                top[j] = min(top[j], given) if top[j] > 0.0 else given
-            if entry.get('has_acceleration_limits'):
-                acceleration[j] = _positive(
-                    entry.get('max_acceleration'), f'{path}: {joint}: max_acceleration'
-                )
+        robot, acceleration = _with_file(robot, Path(path))
+    top = np.array(robot.velocity_limit)
     for text in velocity:
         joint, assigned, number = text.partition(':=')
         if not assigned or joint not in robot.joints:
@@ -370,6 +337,44 @@ def with_joint_limits(
                 f"velocity '{text}': write joint:=value for one of {', '.join(robot.joints)}"
             )
         top[robot.joints.index(joint)] = _positive(number, f'velocity of joint {joint}')
+    return replace(robot, velocity_limit=top), acceleration
+
+
+def _with_file(robot: Robot, path: Path) -> tuple[Robot, FloatArray]:
+    """Return a robot with the limits of a file, and its acceleration limits, NaN without, (n,)."""
+    top, lower, upper = (
+        np.array(limit) for limit in (robot.velocity_limit, robot.lower, robot.upper)
+    )
+    acceleration = np.full(robot.n_joints, np.nan)
+    with reading(path, TrajectoryError):
+        document = load_yaml(read_text(path, TrajectoryError))
+    entries = document.get('joint_limits') if isinstance(document, dict) else None
+    if not isinstance(entries, dict):
+        raise TrajectoryError(f'{path}: no mapping joint_limits, as MoveIt has it')
+    if not entries.keys() & set(robot.joints):
+        raise TrajectoryError(f'{path}: no limits for any of {", ".join(robot.joints)}')
+    for j, joint in enumerate(robot.joints):
+        entry = entries.get(joint, {})
+        if not isinstance(entry, dict):
+            raise TrajectoryError(f'{path}: joint {joint}: no mapping of limits')
+        if entry.get('has_position_limits'):
+            ends = [
+                _number(entry.get(key), f'{path}: {joint}: {key}')
+                for key in ('min_position', 'max_position')
+            ]
+            lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
+            if not lower[j] < upper[j]:
+                raise TrajectoryError(
+                    f'{path}: {joint}: positions from {ends[0]:g} to {ends[1]:g} leave '
+                    f'nothing of {robot.lower[j]:g} to {robot.upper[j]:g} in the description'
+                )
+        if entry.get('has_velocity_limits'):
+            given = _positive(entry.get('max_velocity'), f'{path}: {joint}: max_velocity')
+            top[j] = min(top[j], given) if top[j] > 0.0 else given
+        if entry.get('has_acceleration_limits'):
+            acceleration[j] = _positive(
+                entry.get('max_acceleration'), f'{path}: {joint}: max_acceleration'
+            )
     return replace(robot, lower=lower, upper=upper, velocity_limit=top), acceleration
 
 

@@ -37,7 +37,7 @@ from armid_ros.report.sections.diagnosed import (
     named_section,
     overlay_section,
     patch_section,
-    shares_section,
+    share_bars,
 )
 from armid_ros.report.sections.fit import forward_section
 from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
@@ -165,9 +165,8 @@ def diagnosis_report(
     sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
     if diagnosis.gap is not None:
         sections += [
-            Story(diagnosis, residual),
-            *([shares_section(diagnosis)] if patched else []),
             overlay_section(arm.robot, diagnosis.gap, patched, names),
+            Story(diagnosis, residual),
             gap_section(arm.robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
             *([named_section(diagnosis.findings)] if patched else []),
         ]
@@ -227,9 +226,12 @@ def _verdict(
             f'Driven by the recorded torques, the patched model has larger position errors than '
             f'before in {", ".join(worse)}; see Forward validation.'
         )
-    summary = printed(with_names(diagnosis.summary, names))
-    badge = 'cause found' if diagnosis.verdict == 'named' else diagnosis.verdict.replace('_', ' ')
-    return VerdictSection(badge, tone, [summary], notes, step=with_names(step, names))
+    first, stop, more = printed(with_names(diagnosis.summary, names)).partition('. ')
+    badge, bars = diagnosis.verdict.replace('_', ' '), None
+    if diagnosis.gap is not None and diagnosis.findings:
+        bars = share_bars(diagnosis)
+    sentences = [first + stop.rstrip(), *filter(None, [more])]
+    return VerdictSection(badge, tone, sentences, notes, bars, with_names(step, names))
 
 
 def _of_maps(residual: Residual | None) -> list[str]:

@@ -33,7 +33,6 @@ from armid_ros.report.sections.data_quality import data_quality_section
 from armid_ros.report.sections.fit import by_recording, error_bars, fit_section, forward_section
 from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
 from armid_ros.report.statistics import (
-    Direction,
     directions,
     residual_section,
     torque_reach,
@@ -124,23 +123,22 @@ def identification_report(
     if grade is None:
         grade = graded(result, description, recordings, validation, validation_recordings)
     judgement = judge(result, validation, [*recordings, *validation_recordings], verification)
-    sentences = (*grade.reasons, *judgement.sentences)
     read = [
         *((one, 'training', training.get(one.source, ())) for one in recordings),
         *((one, 'held-out', validation.get(one.source, ())) for one in validation_recordings),
     ]
-    worst = directions(result.estimate, torque_scale(result))
     forward, noise = (verification.forward, verification.noise) if verification else ((), None)
     sections: list[Section] = [
         VerdictSection(
             grade.word,
             TONES[grade.word],
-            sentences,
+            (*grade.reasons, *judgement.sentences),
             judgement.beware,
             error_bars(described, training, validation),
+            ''.join(judgement.next_steps[:1]),
         ),
-        next_steps_section(judgement.next_steps),
         fit_section(described, training, validation, torque_reach(result, shown)),
+        *([next_steps_section(judgement.next_steps)] if judgement.next_steps[1:] else []),
         *([forward_section(described, forward)] if forward else []),
         residual_section(described, shown, role),
         parameter_section(
@@ -151,7 +149,7 @@ def identification_report(
             assessment.reference,
         ),
         *([_physical_section(result.physical, assessment.exports)] if result.physical else []),
-        _excitation_section(result.condition_number, result.base.rank, worst, described.links),
+        _excitation_section(result),
         whiteness_section(described, shown, role),
         *([] if noise is None else [_noise_section(described, noise)]),
         *assessment.sections,
@@ -189,21 +187,20 @@ def _asked(
     return ContentSection('What was asked', [FactList(facts)])
 
 
-def _excitation_section(
-    condition_number: float, rank: int, directions: Sequence[Direction], links: Sequence[str]
-) -> ContentSection:
+def _excitation_section(result: Identification) -> ContentSection:
     """Return how well a motion determines the parameters."""
-    rows = []
-    for direction in directions[:_WORST]:
+    rows, links = [], result.arm.robot.links
+    worst = directions(result.estimate, torque_scale(result))
+    for direction in worst[:_WORST]:
         parts = [f'{full_label(one, links)} {100.0 * x:.0f} %' for one, x in direction.parts]
         rows.append((', '.join(parts), digits(direction.uncertainty)))
-    values = np.array([direction.uncertainty for direction in directions])
+    values = np.array([direction.uncertainty for direction in worst])
     return ContentSection(
         'Excitation',
         [
             Paragraph(
-                f'This motion identifies {counted(rank, "parameter")}. The condition number of '
-                f'the weighted regressor is {condition_number:.3g}.'
+                f'This motion identifies {counted(result.base.rank, "parameter")}. The condition '
+                f'number of the weighted regressor is {result.condition_number:.3g}.'
             ),
             Paragraph(
                 'The worst-determined combinations are listed first. Each number is the torque '

@@ -27,7 +27,7 @@ from armid_ros.report.sections.diagnosed import (
     gap_section,
     named_section,
     overlay_section,
-    shares_section,
+    share_bars,
 )
 from armid_ros.report.sections.fit import forward_section
 import numpy as np
@@ -86,12 +86,12 @@ def test_the_story_comes_first_and_what_was_looked_at_last(html):
         body.index(text)
         for text in (
             'Quadratic friction',
+            'share of the gap',
+            '>Measured and modelled<',
             '>In short<',
             '<svg class="arm"',
             '<dt>Where</dt>',
             '<dt>Gap</dt>',
-            '>What explains the gap<',
-            '>Measured and modelled<',
             '>Gap</h2>',
             '>Parameters</h2>',
             '>Where it shows<',
@@ -118,7 +118,7 @@ def test_causes_that_are_one_have_one_bar(found):
     (finding,) = found.findings
     twin = replace(finding, name='base_tilt', joints=(), together=(finding.name,))
     both = replace(found, findings=(replace(finding, together=('base_tilt',)), twin))
-    rows = shares_section(both).blocks[1].rows
+    rows = share_bars(both).rows
     assert len(rows) == 2
     assert 'quadratic friction' in rows[0][0] and 'base tilt' in rows[0][0]
     assert sum(bar.value for _, bars in rows for bar in bars) == pytest.approx(1.0)
@@ -224,9 +224,12 @@ def test_a_browser_draws_it_without_complaint(browser, charts_drawn, html):
     assert charts_drawn(html, 390, dark=False) >= 4
     shown = browser.run('document.querySelector(".verdict").innerText')
     assert 'Quadratic friction' in shown
-    box = 'document.querySelector("svg.arm").getBoundingClientRect()'
-    assert browser.run(f'{box}.width') > 200
-    assert browser.run(f'{box}.bottom') < 900  # the drawing is above the fold
+    arm, chart = (
+        f'document.querySelector("{what}").getBoundingClientRect()'
+        for what in ('svg.arm', '.u-over')
+    )
+    assert browser.run(f'{arm}.width') > 200
+    assert browser.run(f'{chart}.top') < 800  # the torque is above the fold
 
 
 def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
@@ -237,7 +240,7 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
         return replace(overlay, trajectory=replace(overlay.trajectory, unsure=unsure))
 
     gap = replace(found.gap, overlays=tuple(resting(one) for one in found.gap.overlays))
-    _, torque, _ = overlay_section(found.arm.robot, gap, True, {}).blocks
+    _, torque, _, _ = overlay_section(found.arm.robot, gap, True, {}).blocks
     shown = gap.overlays
     assert len(torque.x) > 10
     assert any(torque.x[-1] == pytest.approx(one.trajectory.t[-1], abs=0.1) for one in shown)

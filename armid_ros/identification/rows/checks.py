@@ -268,7 +268,9 @@ def position_problem(robot: Robot, lowest: FloatArray, highest: FloatArray) -> s
     said = f'{robot.joints[worst]} reaches {reach:.4g}{hint}, its'
     if degrees[worst]:
         names = ', '.join(np.array(robot.joints)[degrees])
-        said = f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {said}'
+        said = (
+            f'{names} seem{"s" if degrees.sum() == 1 else ""} to be in degrees (--degrees): {said}'
+        )
     return (
         f'{said} limits are {robot.lower[worst]:.4g} to {robot.upper[worst]:.4g} '
         f'{robot.position_units[worst]}; positions have to be in rad or m, with the zero of the '

@@ -51,8 +51,8 @@ _MEAN_SAID = 0.005
 _SIGNIFICANT = 3.0
 
 
-def shares_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return the share of the held-out gap that each cause explains, and the rest."""
+def share_bars(diagnosis: Diagnosis) -> BarChart:
+    """Return the share of the gap that each cause explains, and the rest."""
     rows, taken = [], 0.0
     for group in by_cause(diagnosis.findings):
         one = group[0]
@@ -64,21 +64,11 @@ def shares_section(diagnosis: Diagnosis) -> ContentSection:
         rows.append((f'{names}, {where}', [Bar(share, 'after', text)]))
     rest = max(1.0 - taken, 0.0)
     rows.append(('unexplained (noise included)', [Bar(rest, 'floor', percent(rest))]))
+    # the gap is the sum of squares, each joint in units of its floor; noise is part of it
     held_out = diagnosis.gap is not None and diagnosis.gap.predicted
-    data = 'on parts of the recordings, each predicted from the others'
-    return ContentSection(
-        'What explains the gap',
-        [
-            Paragraph(
-                'Share of the gap that each cause explains '
-                f'{"on recordings that were not used" if held_out else data}, with 95 % '
-                'intervals (block bootstrap). The gap is the sum of squared residuals without the '
-                'causes, each joint in units of its floor. Noise is part of the gap, so no cause '
-                'explains all of it.'
-            ),
-            BarChart(rows, full=1.0),
-        ],
-    )
+    data = 'on held-out recordings' if held_out else 'on parts predicted from the others'
+    legend = f'share of the gap explained {data}, 95 % intervals by block bootstrap'
+    return BarChart(rows, [('after', legend)], full=1.0)
 
 
 def named_rows(
@@ -407,11 +397,7 @@ def overlay_section(
     return ContentSection(
         'Measured and modelled',
         [
-            Paragraph(
-                f'{robot.joints[j]} in {source}, where the error is largest over the floor. The '
-                f'broad line is what was measured{dashes}. {ZOOM} Where the joint turns round, '
-                'friction is undetermined and nothing is judged.'
-            ),
+            Paragraph(f'{robot.joints[j]} in {source}, where the error is largest.'),
             Chart(
                 t[kept],
                 [Series('measured', measured[kept], 'measured'), *models(before, after)],
@@ -430,6 +416,11 @@ def overlay_section(
                 height=170,
                 link='overlay',
                 symmetric=True,
+            ),
+            Paragraph(
+                f'The broad line is what was measured{dashes}. {ZOOM} Where the joint turns '
+                'round, friction is undetermined and nothing is judged.',
+                'hint',
             ),
         ],
     )

@@ -51,19 +51,13 @@ def error_bars(robot: Robot, training: Fits, validation: Fits) -> BarChart:
     ]
     rows = []
     for joint in _worst_first(scores[0][2]):
-        unit = robot.torque_units[joint]
-        bars = []
-        for role, _, score in scores:
-            error = float(score.joint_relative_error_percent[joint])
-            bars.append(Bar(error, role, f'{digits(error)} % ({digits(score.rms[joint])} {unit})'))
+        errors = [float(score.joint_relative_error_percent[joint]) for _, _, score in scores]
+        bars = [
+            Bar(error, role, f'{digits(error)} %')
+            for error, (role, _, _) in zip(errors, scores, strict=True)
+        ]
         rows.append((robot.joints[joint], bars))
-    return BarChart(
-        rows,
-        [
-            (role, f'{label} error: rms of residual over rms of torque')
-            for role, label, _ in scores
-        ],
-    )
+    return BarChart(rows, [(role, f'{label} error of torque') for role, label, _ in scores])
 
 
 def fit_section(
@@ -87,12 +81,7 @@ def fit_section(
         f'{name} ±{digits(value)} {unit}'
         for name, value, unit in zip(robot.joints, reach, robot.torque_units, strict=True)
     )
-    blocks: list[PageBlock] = [
-        Paragraph(
-            f'Uncertainty of the predicted torque from the parameters (95 %, rms over the '
-            f'motion): {certainty}. A larger residual is noise, or an effect that the model lacks.'
-        )
-    ]
+    blocks: list[PageBlock] = []
     errors = [
         (name, role, error)
         for role, group in groups.items()
@@ -102,10 +91,6 @@ def fit_section(
         )
     ]
     several = len(errors) > 2
-    if several:
-        rows = [(name, role, f'{digits(error)} %') for name, role, error in errors]
-        table = DataTable(('Recording', 'Used for', 'Error'), rows, (0, 1))
-        blocks.append(Fold(f'{counted(len(errors), "recording")} one by one', [table]))
     rests = not all(
         bool(fit.informative.all())
         for group in groups.values()
@@ -126,15 +111,26 @@ def fit_section(
             said = f'residual {digits(score.rms[joint])} {unit} rms, {share} %'
             charts = _fit_charts(group[worst], joint, unit, f'{role}-{joint}')
             panels.append((robot.joints[joint], said, charts))
-        which = ' predicted worst' * several
-        blocks.append(
-            Fold(
-                f'Torques of the {role} recording{which}: {worst}',
-                [hint, Panels(panels)] if role == errors[0][1] else [Panels(panels)],
-                opened=role == errors[0][1],
-            )
+        which = f'{role} recording{" predicted worst" * several}: {worst}'
+        if role == errors[0][1]:
+            name, said, charts = panels.pop(0)
+            blocks += [Paragraph(f'{name} is the worst joint: {said}.'), *charts, hint]
+            which = f'other joints of the {which}'
+        else:
+            which = f'torques of the {which}'
+        if panels:
+            blocks.append(Fold(which[0].upper() + which[1:], [Panels(panels)]))
+    if several:
+        rows = [(name, role, f'{digits(error)} %') for name, role, error in errors]
+        table = DataTable(('Recording', 'Used for', 'Error'), rows, (0, 1))
+        blocks.append(Fold(f'{counted(len(errors), "recording")} one by one', [table]))
+    blocks.append(
+        Paragraph(
+            f'Uncertainty of the predicted torque from the parameters (95 %, rms over the '
+            f'motion): {certainty}. A larger residual is noise, or an effect that the model lacks.'
         )
-    return ContentSection('Fit', blocks)
+    )
+    return ContentSection('Torque', blocks)
 
 
 def _worst_first(score: Score) -> list[int]:
