@@ -32,8 +32,8 @@ run = ar.simulate(arm.with_effect(hose, [1.5]), torque_noise=0.05)
 
 without = ar.identify(URDF, run, effects=FRICTION)
 model = ar.identify(ar.ArmModel.of(URDF, effects=FRICTION).with_effect(hose), run)
-print(f'without the hose {without.relative_error_percent:.2f} %')
-print(f'with it          {model.relative_error_percent:.2f} %')
+print(f'without the hose {without.error_percent:.2f} %')
+print(f'with it          {model.error_percent:.2f} %')
 k = model.estimate.index('hose_stiffness', 'elbow')
 print(
     f'stiffness {model.estimate.values[k]:.3f} +- {model.estimate.std[k]:.3f} N m/rad^3, true 1.5'

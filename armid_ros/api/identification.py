@@ -21,7 +21,14 @@ from armid_ros.api.arguments import (
     USUAL,
     with_sources_apart,
 )
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
+from armid_ros.api.table import (
+    aligned,
+    data_frame,
+    DEFAULT_ORIGIN,
+    ResultOrigin,
+    ShownModel,
+    Summary,
+)
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.arm.export import arm_mjcf, arm_urdf, Exported
 from armid_ros.arm.export_check import torque_check
@@ -84,7 +91,7 @@ class IdentificationResult(ShownModel):
     --------
     >>> import armid_ros as ar
     >>> model = ar.identify('my_arm.urdf', 'monday', validate='tuesday')
-    >>> model.relative_error_percent < 1.0
+    >>> model.error_percent < 10.0
     True
     >>> sorted(path.name for path in model.save('result').iterdir())
     ['identification.json', 'model.yaml', 'report.html']
@@ -131,9 +138,9 @@ class IdentificationResult(ShownModel):
         return Score.of(fits) if fits else None
 
     @property
-    def relative_error_percent(self) -> float:
-        """100 |tau - tau_hat| / |tau|, of the held-out recordings where there are any."""
-        return (self.held_out_score or self.training).relative_error_percent
+    def error_percent(self) -> float:
+        """Error of the worst joint, 100 |tau - tau_hat| / |tau|, as the grade states it."""
+        return self.graded.error_percent
 
     @property
     def misfit(self) -> Misfit:
@@ -232,8 +239,8 @@ class IdentificationResult(ShownModel):
         write_document(folder / 'identification.json', document)
         return document
 
-    def summary(self) -> Summary:
-        """Return errors and friction of each joint, doubts, and the next step."""
+    def summary(self, every: bool = False) -> Summary:
+        """Return errors and friction of each joint, doubts, and the next step; or every value."""
         from armid_ros.report.families import joint_columns
         from armid_ros.report.judgement import judge, residual_trends
         from armid_ros.report.notation import counted
@@ -261,9 +268,37 @@ class IdentificationResult(ShownModel):
                 *(self.gains.sentences() if self.gains else ()),
                 *(f'{one.source}: {one.report.describe()}' for one in damaged),
                 f'{count}; condition number {core.condition_number:.3g}',
+                *self._bodies(),
+                *(self._parameters() if every else ()),
             ),
             steps[:1],
         )
+
+    def _parameters(self) -> list[str]:
+        """Return all parameters beside those of the description, a line each."""
+        from armid_ros.report.families import estimate_text, full_label
+        from armid_ros.report.notation import digits, pretty
+
+        estimate, links = self.estimate, self.arm.robot.links
+        described = self.core.base.values(self.description.theta)
+        rows = []
+        for name, value, std, before in zip(
+            estimate.parameters, estimate.values, estimate.std, described, strict=True
+        ):
+            number, reach = estimate_text(float(value), float(std))
+            text = f'{number} ± {reach} {pretty(name.unit)}'
+            rows.append((full_label(name, links), text, digits(float(before))))
+        return aligned(('parameter', 'value, 95 %', 'described'), rows)
+
+    def _bodies(self) -> list[str]:
+        """Say whether simulators take the model."""
+        cost = self.core.bodies_cost
+        if cost is None:
+            return []
+        grows = f'{100.0 * max(cost, 0.0):.2g} %'
+        if self.exports:
+            return [f'links are bodies (torque error {grows} larger); {", ".join(self.exports)}']
+        return [f'no links that are bodies fit as well (torque error {grows} larger): --physical']
 
 
 def identify(
@@ -275,7 +310,7 @@ def identify(
     method: Estimator = 'wls',
     cutoff: float | None = None,
     decimation: int | None = None,
-    physical: bool | PhysicalSettings = False,
+    physical: bool | PhysicalSettings | None = None,
     verifies: bool = False,
     payloads: Sequence[str] = (),
     rng: Rng = 0,
@@ -301,8 +336,9 @@ def identify(
         Of the position filter [Hz]; from the noise by default.
     decimation : int, optional
         Keep one sample of this many.
-    physical : bool or PhysicalSettings
-        Fit links that can be bodies; ``urdf`` then describes one.
+    physical : bool or PhysicalSettings, optional
+        Fit links that can be bodies, which simulators need; ``urdf`` then describes one. By
+        default where that makes the torque error larger by a tenth at most.
     verifies : bool
         Test for encoder noise and simulate along the held-out recordings.
     payloads : sequence of str
@@ -342,7 +378,9 @@ def identify(
     check_held_out(model.robot, held_out)
     tick, source = progress or (lambda *_: None), np.random.default_rng(rng)
     known = PhysicalSettings() if physical is True else physical or None
-    settings = IdentificationSettings(method, SignalSettings(cutoff, decimation), known)
+    settings = IdentificationSettings(
+        method, SignalSettings(cutoff, decimation), known, prefers_bodies=physical is None
+    )
     gains = None
     if payloads:
         every = [*training, *held_out]

@@ -69,11 +69,11 @@ class Summary:
             hidden = len(rows) - room + 1
             rows = [*rows[: room - 1], (f'... and {hidden} more',)]
         steps = [piece for line in self._next for piece in textwrap.wrap(line, WIDTH)]
-        return '\n'.join([*title, *_aligned(self.heads, rows, WIDTH), *below, *steps])
+        return '\n'.join([*title, *aligned(self.heads, rows, WIDTH), *below, *steps])
 
     def full_text(self) -> list[str]:
         """Return all of it, as the commands print it."""
-        table = _aligned(self.heads, self.rows)
+        table = aligned(self.heads, self.rows)
         return [self._headline, *table, *filter(None, self.lines), *self._next]
 
     @property
@@ -189,7 +189,7 @@ class ShownModel(Shown):
         return text
 
 
-def _aligned(
+def aligned(
     heads: Sequence[str], rows: Sequence[Sequence[str]], width: int | None = None
 ) -> list[str]:
     """Return lines with columns below each other, names to the left and the rest to the right."""

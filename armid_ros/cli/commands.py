@@ -10,7 +10,7 @@ from functools import cache, partial
 from importlib import import_module
 import math
 import sys
-from typing import Any
+from typing import Any, cast, TextIO
 
 from armid_ros.cli.node import lacking
 from armid_ros.cli.project import project_options
@@ -19,6 +19,7 @@ from armid_ros.plug_ins import load_plug_in, plug_ins
 from armid_ros.version import __version__
 import click
 from click.shell_completion import CompletionItem
+from click.utils import PacifyFlushWrapper
 
 #: The commands of the core in the order of the work, and the modules below `armid_ros.cli` that
 #: declare them.
@@ -42,6 +43,8 @@ COMMANDS = {
 
 #: Exit code after Ctrl-C: 128 and the number of SIGINT.
 INTERRUPTED = 130
+#: The same with SIGPIPE.
+BROKEN_PIPE = 141
 #: Where the context keeps what is said on stderr when the work was done: an error is one line.
 NOTES = 'armid.notes'
 
@@ -113,8 +116,9 @@ class Commands(click.Group):
             click.echo(f'armid: {said}', err=True)
             sys.exit(2)
         except OSError as error:  # a disk that is full, a folder that went away
-            if error.errno == errno.EPIPE:
-                raise
+            if error.errno == errno.EPIPE:  # whoever reads has read enough
+                sys.stdout = cast(TextIO, PacifyFlushWrapper(sys.stdout))
+                sys.exit(BROKEN_PIPE)
             where = f'{error.filename}: ' if error.filename else ''
             click.echo(visible(f'armid: {where}{error.strerror or error}'), err=True)
             sys.exit(2)

@@ -31,9 +31,10 @@ import click
 @parameters.decimation
 @click.option('--quasi-static', is_flag=True, help='Weight and effects only, for slow motions.')
 @click.option(
-    '--physical',
-    is_flag=True,
-    help='Fit links that can be bodies; writes identified.urdf and identified.mjcf.xml too.',
+    '--physical/--no-physical',
+    default=None,
+    help='Fit links that can be bodies, for identified.urdf and identified.mjcf.xml. By default '
+    'where the torque error grows by a tenth at most.',
 )
 @click.option('--total-mass', type=float, help='Of all moving links [kg], with --physical.')
 @click.option(
@@ -65,6 +66,7 @@ import click
     show_default=True,
     help='Test for encoder noise and simulate along the held-out bags.',
 )
+@click.option('--all', 'every', is_flag=True, help='Print all parameters with their intervals.')
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
 @columns.options
 @parameters.topic
@@ -83,7 +85,8 @@ def identify(
     validate: tuple[Path, ...],
     effects: str,
     quasi_static: bool,
-    physical: bool,
+    physical: bool | None,
+    every: bool,
     total_mass: float | None,
     mass_range: float | None,
     boxes: tuple[str, ...],
@@ -114,7 +117,7 @@ def identify(
             arm,
             options.read(bags, robot, topic),
             validate=options.read(validate, robot, topic),
-            physical=known if physical else False,
+            physical=known if physical else physical,
             rng=seed,
             progress=tick,
             **asked,
@@ -125,6 +128,7 @@ def identify(
             options.kept_source(robot_source, robot, staged.folder),
             provenance([*bags, *validate], result.document()['settings'], seed),
         )
-        options.deliver(result, staged, origin, as_json)
+        told = None if as_json else result.summary(every)
+        options.deliver(result, staged, origin, as_json, told)
     if strict and result.grade == 'unusable':
         click.get_current_context().exit(3)

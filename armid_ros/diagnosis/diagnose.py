@@ -270,7 +270,7 @@ def _said(
         [*left, *resting],
         arm,
         NOISE if chosen.measured else chosen.floor_in_words,
-        None if found else measured.as_it_is(explanation),
+        measured.as_it_is(explanation),
         minor,
     )
     doubt = doubt or (doubt_of_names(found) if before else '')

@@ -52,6 +52,10 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 import numpy as np
 
+#: Share of torque error that links which are bodies may cost, where they are preferred: simulators
+#: take nothing else, and a model that lacks an effect costs more.
+_CHEAP = 0.1
+
 
 @dataclass(frozen=True)
 class IdentificationSettings:
@@ -67,12 +71,15 @@ class IdentificationSettings:
         Filtering and decimation.
     physical : PhysicalSettings or None
         Fit among parameters that bodies have, and effects within their bounds.
+    prefers_bodies : bool
+        Fit among such parameters where the torque error grows by a tenth at most.
 
     """
 
     method: Estimator = 'wls'
     signals: SignalSettings = field(default_factory=SignalSettings)
     physical: PhysicalSettings | None = None
+    prefers_bodies: bool = False
 
     def __post_init__(self) -> None:
         """Refuse an unknown method, and constraints of bodies on instrumental variables."""
@@ -131,6 +138,8 @@ class Identification:
         What values vary by from recording to recording; see `scatter`.
     physical : PhysicalCertificate or None
         What shows that the links are bodies, where that was asked.
+    bodies_cost : float or None
+        Share by which the torque error of links that are bodies is larger; None if not tried.
     passes : int
         Linearisations of the arm that the fit took; 1 if its torque is linear in its parameters.
 
@@ -149,6 +158,7 @@ class Identification:
     halves: HalvesError
     scatter: FloatArray
     physical: PhysicalCertificate | None = None
+    bodies_cost: float | None = None
     passes: int = 1
 
     def __repr__(self) -> str:
@@ -225,6 +235,9 @@ def identify(
     _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
+    certificate, cost, tries = None, None, [settings]
+    if settings.prefers_bodies and not described and settings.method != 'iv':
+        tries.insert(0, replace(settings, physical=PhysicalSettings()))
     if described:
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = ungrouped(whole, whole.base_parameters(rng))
@@ -232,16 +245,27 @@ def identify(
         fit, remarks = with_uncertain_inertia(whole, fit, recordings, used)
         notes += remarks
     else:
-        fit = _fitted(arm, base, problem, recordings, used, settings)
-        theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
+        for settings in tries:
+            fit = _fitted(arm, base, problem, recordings, used, settings)
+            told, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
+            if settings.physical is None:
+                break
+            try:
+                bodies, certificate = fit_to_bodies(
+                    arm, fit, recordings, used, settings.least_squares, settings.physical, rng
+                )
+            except IdentificationError:
+                if settings is tries[-1]:
+                    raise
+                continue
+            cost = max(certificate.misfit_ratio, certificate.held_out_ratio) - 1.0
+            if settings is tries[-1] or cost <= _CHEAP:
+                fit, notes = bodies, notes + certificate.sentences()
+                break
+            certificate = None
+        theory = told
     if settings.method == 'iv':
         fit = fit_by_instruments(fit, recordings, used)
-    certificate = None
-    if settings.physical is not None:
-        fit, certificate = fit_to_bodies(
-            arm, fit, recordings, used, settings.least_squares, settings.physical, rng
-        )
-        notes += certificate.sentences()
     spread = base_spread(whole, fit.base) if settings.holds_description else None
     prior = fit.base.values(whole.theta)
     return Identification(
@@ -257,6 +281,7 @@ def identify(
         notes=notes + _remarks(fit, theory),
         halves=halves_error(fit.problem, fit.solution.weights, prior, spread),
         physical=certificate,
+        bodies_cost=cost,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )

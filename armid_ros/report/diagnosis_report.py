@@ -101,11 +101,10 @@ class Extras:
             + (', together' if len(group) > 1 else '')
             for group in by_cause(diagnosis.findings)
         ]
-        share = 'the gap' if diagnosis.findings else 'the remaining error'
         lines += [
             f'minor (significant, but negligible or not confirmed): '
             f'{one.name.replace("_", " ")} in {", ".join(one.joints) or "the whole arm"}, '
-            f'{percent(one.share)} of {share}, p {probability(one.p)}'
+            f'p {probability(one.p)}'
             for one in diagnosis.minor
         ]
         lines += [] if self.residual is None else self.residual.sentences()

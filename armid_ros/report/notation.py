@@ -101,8 +101,8 @@ def counted(number: int, what: str) -> str:
 
 def robot_label(source: str) -> str:
     """Return what a robot is called in a heading: its name, or that of its file."""
-    path, *arguments = source.split(' ') if ':=' in source else [source]
-    return ' '.join([PurePath(path).name or path, *arguments])
+    path = source.split(' ')[0] if ':=' in source else source
+    return PurePath(path).name or path
 
 
 def short_names(sources: Sequence[str]) -> dict[str, str]:

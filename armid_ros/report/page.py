@@ -95,7 +95,13 @@ class Page:
             'script': asset('report.js'),
             'style': asset('report.css'),
         }
-        return _visible(str(render('page.html', {'page': self, **assets})))
+        return _visible(_without_secrets(str(render('page.html', {'page': self, **assets}))))
+
+
+def _without_secrets(text: str) -> str:
+    """Return a text without passwords: values of arguments named so, and those in addresses."""
+    text = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', text)
+    return re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', text)
 
 
 def _visible(text: str) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 arm = ar.ArmModel.of('ur10.urdf', effects='viscous_friction', gravity=(0.0, 0.0, -1.6))
 model = ar.identify(arm, ['monday.mcap', 'tuesday.csv'], validate='wednesday.mcap', rng=3)
-error: float = model.relative_error_percent
+error: float = model.error_percent
 found = ar.diagnose(model.arm, 'today.mcap')
 names: tuple[str, ...] = found.names
 text: str = found.urdf()

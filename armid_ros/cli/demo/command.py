@@ -103,9 +103,10 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
     }
     save_model(new / 'model.yaml', found.arm, steps.ROBOT, found.estimate)
     write_file(new / 'report.html', _page(found, truth, history, target))
-    changed = truth.with_effect(hidden.effect, hidden.values)
     rng = np.random.default_rng([seed, 1])
-    diagnosed = steps.diagnose_hidden(new / 'story', changed, found.arm, recording, rng, rate)
+    diagnosed = steps.diagnose_hidden(
+        new / 'story', hidden, truth, found.arm, recording, rng, rate
+    )
     document['story'] = hidden.document(diagnosed)
     write_document(new / 'identification.json', document)
     staged.keep()
@@ -124,7 +125,6 @@ def _tell(
     say(f'{found.grade.upper()}: {found.graded.reasons[0]}')
     say(f'online:  {online.sentence()}')
     say(f'offline: {offline.sentence()}')
-    say(f'relative error of the torque {found.relative_error_percent:.2f} % (noise included)')
     difference = f'largest difference {document["replay_difference"]:.1g}'
     say(f'playing the bag back repeats the online estimate ({difference})')
 

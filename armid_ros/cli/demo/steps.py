@@ -118,6 +118,11 @@ class HiddenChange:
         named = self.effect.name, self.effect.joints
         return any((one.name, one.joints) == named for one in first)
 
+    def outcome(self, diagnosis: Diagnosis) -> str:
+        """Say what was hidden, and whether it was found."""
+        rank = 'found it' if self.found_by(diagnosis) else 'did not rank it first'
+        return f'Hidden was: {self.sentence(diagnosis.arm)}. The diagnosis {rank}.'
+
     def document(self, diagnosis: Diagnosis) -> dict[str, Any]:
         """Return what was hidden and found, for programs to read."""
         gap, joints = diagnosis.gap, diagnosis.arm.robot.joints
@@ -141,7 +146,8 @@ class HiddenChange:
 
 def diagnose_hidden(
     out: Path,
-    changed: ArmModel,
+    hidden: HiddenChange,
+    truth: ArmModel,
     known: ArmModel,
     baseline: Recording,
     rng: np.random.Generator,
@@ -154,8 +160,10 @@ def diagnose_hidden(
     ----------
     out : Path
         Folder to fill.
-    changed : ArmModel
-        The arm with the hidden change.
+    hidden : HiddenChange
+        What is changed, which the page says as well.
+    truth : ArmModel
+        The arm without it.
     known : ArmModel
         The model that was identified.
     baseline : Recording
@@ -167,6 +175,7 @@ def diagnose_hidden(
 
     """
     limits, bodies = Limits.of(known.robot), collision_model(known.robot)
+    changed = truth.with_effect(hidden.effect, hidden.values)
 
     def recorded(name: str) -> Recording:
         drawn = random_feasible(known, limits, _PERIOD, _HARMONICS, rng, collision=bodies)
@@ -192,7 +201,8 @@ def diagnose_hidden(
             rng=rng,
             progress=tick,
         )
-        found.fill(out, ResultOrigin(known.robot.name, known.robot.name))
+        told = replace(found.core, summary=f'{found.core.summary} {hidden.outcome(found.core)}')
+        replace(found, core=told).fill(out, ResultOrigin(known.robot.name, known.robot.name))
     return found.core
 
 
@@ -208,5 +218,4 @@ def show_hidden(hidden: HiddenChange, found: Diagnosis) -> None:
             f'{digits(float(gap.before[worst]))} N m, and {digits(float(gap.after[worst]))} N m '
             'with the named effect.'
         )
-    rank = 'found it' if hidden.found_by(found) else 'did not rank it first'
-    say(f'Hidden was: {hidden.sentence(arm)}. The diagnosis {rank}.')
+    say(hidden.outcome(found))

@@ -80,11 +80,12 @@ class RemainingMisfit:
         return list(self._of_whole(parts, left))
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
-        """Return what the given model leaves; None if its rigid body is not fitted anew."""
+        """Return what is left with the body as given; None if it is not fitted anew."""
         if not explanation.refitted:
             return None
-        part = self._parts(explanation)[:1]
-        return next(self._of_whole(part, [part[0].residuals(self.given)]))
+        part, given, fitted = self._parts(explanation)[:1], self.given.theta, explanation.fitted
+        arm = fitted.arm.with_theta(np.concatenate([given, fitted.arm.theta[len(given) :]]))
+        return next(self._of_whole(part, [part[0].residuals(arm)]))
 
     def harmed(self, explanation: Explanation) -> tuple[str, ...]:
         """

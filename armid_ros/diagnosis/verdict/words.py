@@ -67,7 +67,7 @@ def decide(
     floor_in_words : str
         The floor of the gap: noise, or a misfit.
     as_it_is : Excess or None
-        The same of the given model, where ``left`` is with a rigid body that was fitted.
+        The same with the rigid body as given, where ``left`` is with one that was fitted.
     minor : sequence of Finding
         The small print, the most important first.
 
@@ -88,16 +88,16 @@ def decide(
         if open_gap:
             nothing = 'closes it' if small else 'explains it'
             text = f'Something is missing: {rest}. Nothing in the catalogue {nothing}.{small}'
-            return Verdict('unknown', text)
+            return Verdict('unknown', f'{text} {refit}'.rstrip())
         text = f'The model explains the recordings: what is left is no more than {floor_in_words}'
         text += f', or too small to matter.{small}' if small else '.'
         return Verdict('consistent', f'{refit}{text}')
     said, tied = _sentences(findings), _rivals_in_words(findings)
     if open_gap:
-        return Verdict('partial', f'{said}{tied} There is more: {rest}.')
+        return Verdict('partial', f'{said}{tied} {refit}There is more: {rest}.')
     if tied:
-        return Verdict('ambiguous', f'{said}{tied}')
-    return Verdict('named', f'{refit}{said} The remaining error is no more than {floor_in_words}.')
+        return Verdict('ambiguous', f'{said}{tied} {refit}'.rstrip())
+    return Verdict('named', f'{said} {refit}The remaining error is no more than {floor_in_words}.')
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:

@@ -45,16 +45,28 @@ class Grade:
         Why, the worst first; one at least.
     faults : tuple of str
         What the recordings themselves show to be wrong, the worst first, without a full stop.
+    error_percent : float
+        Relative error of the torque of the worst joint, held out where anything is, otherwise of
+        one half of the data predicted from the other.
+    worst_joint : str
+        That joint.
 
     """
 
     word: Word
     reasons: tuple[str, ...]
-    faults: tuple[str, ...] = ()
+    faults: tuple[str, ...]
+    error_percent: float
+    worst_joint: str
 
     def document(self) -> dict[str, object]:
         """Return the grade for programs to read."""
-        return {'grade': self.word, 'reasons': list(self.reasons)}
+        return {
+            'grade': self.word,
+            'error_percent': self.error_percent,
+            'worst_joint': self.worst_joint,
+            'reasons': list(self.reasons),
+        }
 
 
 def grade(
@@ -100,10 +112,19 @@ def grade(
         *(fault for fault in sensors if fault.word == 'good'),
     ]
     ordered = _worst_first(reasons)
+    judged = [(Score.of(fits).joint_relative_error_percent, fits) for fits in validation.values()]
+    worst = [
+        (float(errors[joint]), joint)
+        for errors, fits in judged or [(result.halves.joints, result.training)]
+        for joint in [_worst(errors, fits, result)[0]]
+    ]
+    error, joint = max(worst)
     return Grade(
         ordered[0].word,
         tuple(f'{reason.text[0].upper()}{reason.text[1:]}.' for reason in ordered),
         tuple(fault.text for fault in _worst_first(faults)),
+        error,
+        result.arm.robot.joints[joint],
     )
 
 
@@ -137,7 +158,7 @@ def _mistakes(
 
 def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
     for bag, fits in validation.items():
-        error, said = _worst(Score.of(fits).joint_relative_error_percent, fits, result)
+        _, error, said = _worst(Score.of(fits).joint_relative_error_percent, fits, result)
         use = {
             'good': '',
             'poor': ', too much to compute torques with',
@@ -162,12 +183,16 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
         yield Fault(text, 'good')
 
 
-def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> tuple[float, str]:
+def _worst(
+    errors: FloatArray, fits: Sequence[Fit], result: Identification
+) -> tuple[int, float, str]:
     """
     Choose the joint that is predicted worst, or is off most where noise is all of that.
 
     Returns
     -------
+    worst : int
+        Index of the joint.
     error : float
         Its error beyond noise [%].
     text : str
@@ -182,14 +207,14 @@ def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> t
     details = [f'{error:.3g} % without noise'] if noisy else []
     details += [f'worst joint: {joints[worst]}'] if len(joints) > 1 else []
     said = f'{errors[worst]:.3g} %'
-    return error, f'{said} ({", ".join(details)})' if details else said
+    return worst, error, f'{said} ({", ".join(details)})' if details else said
 
 
 def _halves(result: Identification) -> Fault:
     """Judge by what one half of the data says of the other, where nothing was held out."""
     training = Score.of(result.training).joint_relative_error_percent
     every = result.halves.joints
-    error, said = _worst(every, result.training, result)
+    _, error, said = _worst(every, result.training, result)
     word, text = by_error(error), f'cross-check between the halves of the data: {said}'
     undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
     undetermined &= beyond_noise(every, result.training, result.used) > 0.0
