@@ -94,7 +94,7 @@ class IdentificationResult(ShownModel):
     >>> model.error_percent < 10.0
     True
     >>> sorted(path.name for path in model.save('result').iterdir())
-    ['identification.json', 'model.yaml', 'report.html']
+    ['identification.json', 'identified.mjcf.xml', 'identified.urdf', 'model.yaml', 'report.html']
 
     """
 

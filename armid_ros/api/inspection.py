@@ -274,7 +274,7 @@ def check(
     read = recordings_of(recordings, described)
     if not read:
         return CheckResult(described, remarks, None)
-    found = identify(described, read, rng=rng)
+    found = identify(described, read, physical=False, rng=rng)
     graded = found.graded
     fault = next(iter(graded.faults), graded.reasons[0] if graded.word == 'unusable' else '')
     links = check_links(found.core, found.description, found.grade, fault)

@@ -9,8 +9,9 @@ import errno
 from functools import cache, partial
 from importlib import import_module
 import math
+import os
 import sys
-from typing import Any, cast, TextIO
+from typing import Any
 
 from armid_ros.cli.node import lacking
 from armid_ros.cli.project import project_options
@@ -19,7 +20,6 @@ from armid_ros.plug_ins import load_plug_in, plug_ins
 from armid_ros.version import __version__
 import click
 from click.shell_completion import CompletionItem
-from click.utils import PacifyFlushWrapper
 
 #: The commands of the core in the order of the work, and the modules below `armid_ros.cli` that
 #: declare them.
@@ -117,7 +117,7 @@ class Commands(click.Group):
             sys.exit(2)
         except OSError as error:  # a disk that is full, a folder that went away
             if error.errno == errno.EPIPE:  # whoever reads has read enough
-                sys.stdout = cast(TextIO, PacifyFlushWrapper(sys.stdout))
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
                 sys.exit(BROKEN_PIPE)
             where = f'{error.filename}: ' if error.filename else ''
             click.echo(visible(f'armid: {where}{error.strerror or error}'), err=True)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -86,16 +87,19 @@ def inspection_report(
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
     """Return the finding in one sentence, and the numbers behind it in others."""
-    bad = sum(one.weight == 'bad' for one in remarks)
-    values = 'No impossible value in the description.'
-    if bad:
-        values = f'Impossible in the description: {counted(bad, "value")}.'
+    count = Counter(one.weight for one in remarks)
+    values = 'No impossible or suspicious value in the description.'
+    for weight, word in (('doubt', 'Suspicious'), ('bad', 'Impossible')):
+        if count[weight]:
+            values = f'{word} in the description: {counted(count[weight], "value")}.'
     if found is None:
         return values, 'Add a recording to check the masses.'
     errors = (
         f'Torque error: {digits(found.error_percent)} % with the links of the URDF, '
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
+    if np.isnan(found.measured_mass).any():
+        errors += ' A dash is a mass that the recording does not determine.'
     if found.fault:
         first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
     elif found.agrees:

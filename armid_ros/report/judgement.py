@@ -17,6 +17,8 @@ import numpy as np
 
 #: Ratio of the held-out to the training error from which the model is fitted to the noise.
 _OVERFIT = 1.3
+#: Torque error [%] below which an effect does not matter, as of `diagnose`.
+_MATERIAL = 1.0
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
@@ -139,7 +141,7 @@ def _of_errors(
 ) -> Iterator[Caution]:
     """Yield what the errors on training and on held-out data mean."""
     if held_out is None:
-        yield '', 'Record another motion and validate with it.'
+        yield '', 'Record another motion, and test the model on it: --validate BAG.'
     else:
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         if ratio > _OVERFIT:
@@ -163,7 +165,9 @@ def _of_errors(
 def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ...]:
     """Return a sentence on joints whose residual depends on speed, position or load; or none."""
     depends: dict[str, list[str]] = {}
-    for joint, name in enumerate(joints):
+    errors = Score.of(fits).joint_relative_error_percent
+    matters = [(joint, name) for joint, name in enumerate(joints) if errors[joint] >= _MATERIAL]
+    for joint, name in matters:
         for key, share in explained_shares(fits, joint).items():
             if share > TELLING_SHARE:
                 depends.setdefault(key, []).append(name)
@@ -179,7 +183,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
     """Yield what residuals and excitation mean."""
     joints = result.arm.robot.joints
     for sentence in residual_trends(joints, fits):
-        yield sentence, 'Run armid diagnose to find the missing effect, and add it with --effects.'
+        yield sentence, 'Find the missing effect with armid diagnose, and add it with --effects.'
     coloured = [
         name
         for joint, name in enumerate(joints)

@@ -99,7 +99,8 @@ def test_an_identification_shows_itself_in_ten_lines_and_in_a_notebook(model, tm
 
 def test_a_saved_identification_is_what_the_command_line_writes(model, tmp_path):
     folder = model.save(tmp_path / 'saved')
-    names = {'model.yaml', 'identification.json', 'report.html'}
+    exports = {'identified.urdf', 'identified.mjcf.xml'}
+    names = {'model.yaml', 'identification.json', 'report.html'} | exports
     assert {path.name for path in folder.iterdir()} == names
     again = ar.load_model(folder / 'model.yaml')
     np.testing.assert_allclose(again.theta, model.arm.theta)

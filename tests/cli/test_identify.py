@@ -57,6 +57,33 @@ def test_identify_prints_one_screen(bags, tmp_path):
         assert row.count('±') == 2
 
 
+def test_all_prints_a_line_for_every_parameter_and_the_number_of_the_grade(bags, tmp_path):
+    asked = ('identify', bags[0], '--robot', ROBOT, '--no-verify')
+    every = armid(*asked, '--all', '--out', tmp_path / 'a').stdout.splitlines()
+    few = armid(*asked, '--out', tmp_path / 'b').stdout.splitlines()
+    document = json.loads((tmp_path / 'b' / 'identification.json').read_text())
+    assert len(every) - len(few) == len(document['parameters']) + 1
+    errors = document['training']['joint_halves_error_percent']
+    assert document['error_percent'] == errors[document['worst_joint']]
+    assert f'{document["error_percent"]:.3g} %' in few[0]
+
+
+def test_links_are_bodies_unless_that_is_refused_or_costs_too_much(bags, tmp_path):
+    """Torques of links with negative masses are those of no bodies."""
+    arm = ArmModel(load_robot(ROBOT))
+    theta = arm.theta.copy()
+    theta[10:20] *= -2.0
+    impossible = bag_of(tmp_path / 'impossible', arm.with_theta(theta), 3)
+    asked = ('--robot', ROBOT, '--no-verify')
+    written = {}
+    for name, bag, more in (
+        ('bodies', bags[0], ()), ('free', bags[0], ('--no-physical',)), ('not', impossible, ())
+    ):  # fmt: skip
+        armid('identify', bag, *asked, *more, '--out', tmp_path / name)
+        written[name] = (tmp_path / name / 'identified.urdf').exists()
+    assert written == {'bodies': True, 'free': False, 'not': False}
+
+
 @pytest.fixture(scope='module')
 def physical(bags, tmp_path_factory):
     """Return what armid identify --physical writes of the first bag."""

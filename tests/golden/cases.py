@@ -52,7 +52,7 @@ class Case:
 
 
 _ROBOT = '--robot {inputs}/my_arm.urdf'
-_MONDAY = f'identify {{inputs}}/monday {_ROBOT} --no-verify --out {{out}}/monday'
+_MONDAY = f'identify {{inputs}}/monday {_ROBOT} --no-physical --no-verify --out {{out}}/monday'
 _SINCE = f'--baseline {{inputs}}/monday --model {{out}}/monday/model.yaml {_ROBOT}'
 _MOON = '{root}/bags/humanoid_arm_moon --robot - --gravity moon'
 _VOLTS = '--position qm --effort vir --effort-scale 35.15065 --robot {inputs}/emps.urdf'
@@ -85,12 +85,15 @@ CASES = {
     'identify_bag': Case((f'identify {_MOON} --out {{out}}/result --json',)),
     'identify_held_out': Case(
         (
-            f'identify {{inputs}}/monday --validate {{inputs}}/tuesday {_ROBOT}'
+            f'identify {{inputs}}/monday --validate {{inputs}}/tuesday {_ROBOT} --no-physical'
             ' --out {out}/r --json',
         )
     ),
     'identify_robust': Case(
-        (f'identify {{inputs}}/monday {_ROBOT} --method irls --no-verify --out {{out}}/r --json',)
+        (
+            f'identify {{inputs}}/monday {_ROBOT} --method irls --no-physical --no-verify'
+            ' --out {out}/r --json',
+        )
     ),
     'identify_physical': Case(
         (
@@ -101,7 +104,7 @@ CASES = {
     'compare': Case(
         (
             _MONDAY,
-            f'identify {{inputs}}/friday {_ROBOT} --no-verify --out {{out}}/friday',
+            f'identify {{inputs}}/friday {_ROBOT} --no-physical --no-verify --out {{out}}/friday',
             'compare {out}/monday {out}/friday --out {out}/changes --json',
         )
     ),
@@ -129,7 +132,7 @@ CASES = {
     ),
     'emps_identify': Case(
         (
-            f'identify {_EMPS} --validate {{data}}/emps/DATA_EMPS_PULSES.mat --no-verify'
+            f'identify {_EMPS} --validate {{data}}/emps/DATA_EMPS_PULSES.mat --no-physical --no-verify'
             ' --out {out}/r --json',
         )
     ),
@@ -141,14 +144,14 @@ CASES = {
             f' {_TX40} --rate 5000 --gear 32,32,45,-48,45,32 --coupling 6,5=32'
             ' --zero 0,-pi/2,pi/2,0,0,0 --out {out}/bag',
             f'identify {{out}}/bag {_TX40} --effects {_WRIST} --method ols --decimation 100'
-            ' --no-verify --out {out}/r --json',
+            ' --no-physical --no-verify --out {out}/r --json',
         )
     ),
     'pendulum_identify': Case(
         (
             'identify {data}/dfki_simple_pendulum/payload_1kg/energy_shaping.csv'
             ' --robot {data}/dfki_simple_pendulum/parameters/dfki_simple_pendulum.urdf'
-            ' --no-verify --out {out}/r --json',
+            ' --no-physical --no-verify --out {out}/r --json',
         )
     ),
 }  # fmt: skip

@@ -89,7 +89,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
         )
         tick(0.0, 'identifying offline')
         recording = replace(read_recording(bag, joints=robot.joints), source=str(settled(bag)))
-        found = identify(nominal, recording, rng=rng, progress=tick)
+        found = identify(nominal, recording, physical=False, rng=rng, progress=tick)
     offline = Agreement.of(found.estimate, found.core.base.values(truth.theta))
     learned, replayed = identifier.estimate(), again.estimate()
     online = Agreement.of(learned, target)
