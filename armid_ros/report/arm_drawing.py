@@ -93,6 +93,7 @@ class ArmDrawing(Templated):
     """
 
     template: ClassVar[str] = 'arm_drawing.html'
+    short_names: ClassVar[bool] = True
 
     width: float
     height: float

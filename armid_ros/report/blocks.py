@@ -149,6 +149,7 @@ class DataTable(Templated):
     """
 
     template: ClassVar[str] = 'table.html'
+    short_names: ClassVar[bool] = True
 
     heads: Sequence[str]
     rows: Sequence[Cells]
@@ -231,6 +232,7 @@ class Panels(Templated):
     """
 
     template: ClassVar[str] = 'panels.html'
+    short_names: ClassVar[bool] = True
 
     panels: Sequence[tuple[str, str, Sequence[PageBlock]]]
     three: bool = False
@@ -266,6 +268,7 @@ class SmallMultiples(Templated):
     """
 
     template: ClassVar[str] = 'small_multiples.html'
+    short_names: ClassVar[bool] = True
 
     figures: Sequence[tuple[str, str, Markup, str]]
 
@@ -311,6 +314,7 @@ class BarChart(Templated):
     """
 
     template: ClassVar[str] = 'bars.html'
+    short_names: ClassVar[bool] = True
 
     rows: Sequence[tuple[str, Sequence[Bar]]]
     roles: Sequence[tuple[Role, str]] = ()

@@ -130,6 +130,7 @@ class Chart(Templated):
     """
 
     template: ClassVar[str] = 'chart.html'
+    short_names: ClassVar[bool] = True
 
     x: FloatArray
     series: Sequence[Series]

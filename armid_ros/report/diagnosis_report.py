@@ -200,7 +200,8 @@ def diagnosis_report(
     )
     if counts[2]:
         subtitle += f' · {counted(counts[2], "recording")} from before'
-    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections).html()
+    joints = (*arm.robot.joints, *arm.robot.links)
+    return Page(f'Diagnosis of {arm.robot.name}', subtitle, sections, names=joints).html()
 
 
 def _at_fault(

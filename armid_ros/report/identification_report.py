@@ -161,7 +161,8 @@ def identification_report(
         f'{robot_label(robot)} · {counted(len(training), "training recording")} · '
         f'{counted(len(validation), "held-out recording")}'
     )
-    return Page(f'Identification of {described.name}', subtitle, sections).html()
+    names = (*described.joints, *described.links)
+    return Page(f'Identification of {described.name}', subtitle, sections, names=names).html()
 
 
 def _asked(

@@ -82,7 +82,7 @@ def inspection_report(
     subtitle = ' · '.join(
         filter(None, (Path(robot).name, recording.topic, counted(recording.n_joints, 'joint')))
     )
-    return Page(f'Inspection of {name}', subtitle, sections).html()
+    return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
@@ -173,7 +173,9 @@ def description_check_report(
         table = DataTable(HEADS, link_rows(links), kind='tight')
         sections.append(ContentSection('Links', [table, Paragraph(said, 'hint')]))
     sections.append(Origin(provenance or Provenance()))
-    return Page(f'Check of {robot_label(robot)}', '', sections, charts=False).html()
+    names = () if links is None else (*links.joints, *links.links)
+    title = f'Check of {robot_label(robot)}'
+    return Page(title, '', sections, charts=False, names=names).html()
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 import math
 from pathlib import PurePath
+import re
 
 from armid_ros.diagnosis.verdict import words
 from armid_ros.diagnosis.verdict.finding import Finding
@@ -17,6 +18,8 @@ from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 DASH = '\N{EN DASH}'
 #: No quantity of an arm in SI units is as large.
 _NO_NUMBER = 1e12
+#: Letters of a prefix of names that is worth leaving out.
+_SHORT = 5
 
 
 def pretty(unit: str) -> str:
@@ -126,6 +129,44 @@ def short_names(sources: Sequence[str]) -> dict[str, str]:
                 break
         names[source] = '/'.join(part.strip('/') for part in own[-count:])
     return names
+
+
+def common_prefix(names: Sequence[str]) -> str:
+    """
+    Return what all joints and links of an arm begin with, if it is long: 'panda_' of panda_joint1.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Joints and links.
+
+    Returns
+    -------
+    str
+        Five letters or more and a separator, after which each name goes on with a letter; or ''.
+
+    """
+    first = names[0] if len(names) > 1 else ''
+    ends = [first[: found.end()] for found in re.finditer(r'[_/.:-]', first)]
+    rests = {end: [name.removeprefix(end) for name in names] for end in ends if len(end) > _SHORT}
+    shared = [end for end in rests if all(name.startswith(end) for name in names)]
+    return max((end for end in shared if all(r[:1].isalpha() for r in rests[end])), default='')
+
+
+def without_prefix(text: str, names: Sequence[str]) -> str:
+    """Return a text, as of a label, with names in it without their common prefix."""
+    prefix = common_prefix(names)
+    if not prefix:
+        return text
+    rests = '|'.join(re.escape(name.removeprefix(prefix)) for name in names)
+    return re.sub(rf'(?<![\w/.-]){re.escape(prefix)}(?=(?:{rests})(?!\w))', '', text)
+
+
+def many_counted(text: str, names: Sequence[str]) -> str:
+    """Return a text in which four or more names in a row are a number: '7 joints'."""
+    one = f'(?:{"|".join(map(re.escape, names))})(?!\\w)'
+    run = rf'(?<![\w/.-]){one}(?:, {one}){{3,}}'
+    return re.sub(run, lambda found: f'{found[0].count(",") + 1} joints', text)
 
 
 def with_names(text: str, names: Mapping[str, str]) -> str:

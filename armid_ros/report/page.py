@@ -10,6 +10,7 @@ A section is a small frozen dataclass with a title and a template of its own.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -17,9 +18,20 @@ import re
 from typing import Any, ClassVar
 
 from armid_ros.files.own import GENERATOR
-from armid_ros.report.notation import counted, digits, plain, pretty
+from armid_ros.report.notation import (
+    common_prefix,
+    counted,
+    digits,
+    many_counted,
+    plain,
+    pretty,
+    without_prefix,
+)
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+
+#: Names of joints and links whose common prefix the page that is being made leaves out.
+_names: ContextVar[Sequence[str]] = ContextVar('_names', default=())
 
 
 class Templated:
@@ -32,15 +44,19 @@ class Templated:
         Name of the file in templates/.
     package : str
         Where templates/ is: a plug-in brings its own.
+    short_names : bool
+        Whether names of joints and links in it are without their common prefix.
 
     """
 
     template: ClassVar[str]
     package: ClassVar[str] = 'armid_ros.report'
+    short_names: ClassVar[bool] = False
 
     def html(self) -> Markup:
         """Return it as HTML, everything in it escaped."""
-        return render(self.template, {'block': self, 'section': self}, self.package)
+        text = render(self.template, {'block': self, 'section': self}, self.package)
+        return _short(text) if self.short_names else text
 
 
 class Section(Templated):
@@ -77,6 +93,8 @@ class Page:
         Parts in order; the first is the verdict.
     charts : bool
         Whether there are interactive charts, which need a library.
+    names : sequence of str
+        Joints and links of the arm. Labels leave their common prefix out.
 
     """
 
@@ -84,6 +102,7 @@ class Page:
     subtitle: str
     sections: Sequence[Section]
     charts: bool = True
+    names: Sequence[str] = ()
 
     def html(self) -> str:
         """Return the whole file, scripts and styles included."""
@@ -95,7 +114,19 @@ class Page:
             'script': asset('report.js'),
             'style': asset('report.css'),
         }
-        return _visible(_without_secrets(str(render('page.html', {'page': self, **assets}))))
+        token = _names.set(self.names)
+        text = render('page.html', {'page': self, 'prefix': common_prefix(self.names), **assets})
+        _names.reset(token)
+        return _visible(_without_secrets(str(text)))
+
+
+def _short(text: str) -> Markup:
+    """Return a label with short names of joints and links, markup and all."""
+    return Markup(without_prefix(text, _names.get()))
+
+
+def _few(text: str) -> Markup:
+    return Markup(many_counted(text, _names.get())) if _names.get() else Markup(text)
 
 
 def _without_secrets(text: str) -> str:
@@ -123,7 +154,7 @@ def _environment(package: str) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(digits=digits, pretty=pretty)
+    environment.filters.update(digits=digits, pretty=pretty, short=_short, few=_few)
     environment.globals['counted'] = counted
     environment.globals['plain'] = plain
     return environment
