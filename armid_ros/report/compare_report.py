@@ -308,9 +308,12 @@ def changes_section(comparison: Comparison) -> ContentSection:
             )
             for value, std in ((one.before, one.before_std), (one.after, one.after_std))
         )
+        known = excludes_zero(one.before, one.before_std) or excludes_zero(
+            one.after, one.after_std
+        )
         return (
             before,
-            TableCell(after, 'changed' if one.changed else ''),
+            TableCell(after, 'changed' if one.changed else '' if known else 'unknown'),
             f'{one.deviations:+.1f}',
             IntervalTrack(one.after, HALF_WIDTH * one.after_std, one.before),
         )

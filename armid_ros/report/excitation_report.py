@@ -364,8 +364,8 @@ def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
         share = 100.0 * float(size[k]) / longest[k] if seen else 100.0
         return (
             f'{value:.3g}' if known else 'not known',
-            digits(float(std)) if seen else 'not seen',
-            relative if std < abs(value) or not relative else '> 100 %',
+            digits(float(std)) if seen else TableCell('not seen', 'unknown'),
+            relative if std < abs(value) or not relative else TableCell('> 100 %', 'unknown'),
             ShareBar(round(share, 1), 'residual' if seen else 'predicted'),
         )
 

@@ -73,20 +73,17 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
 
     """
     if name.rigid:
-        label = rigid_label(name, links)
+        words, link = _words_and_link(name, links)
+        label = f'{words} of {link or f"the link of {name.joint}"}'
         return f'{label} (grouped)' if grouping(name) else label
     return f'{name.words} of {name.joint}' if name.joint else name.words
 
 
-def rigid_label(name: ParameterName, links: Sequence[str]) -> str:
-    """Return the same of the first parameter of a group alone."""
-    found = _SYMBOL.match(name.name)
-    if found is None:
-        return name.name
-    symbol, number = found[1], int(found[2])
-    known = 0 < number <= len(links)
-    link = links[number - 1] if known else f'the link of {name.joint}'
-    return f'{symbol_in_words(symbol)} of {link}'
+def _words_and_link(name: ParameterName, links: Sequence[str]) -> tuple[str, str]:
+    """Return what the first parameter of a group is, and the name of its link if it is known."""
+    symbol, number = _SYMBOL.findall(name.name)[0]
+    known = 0 < int(number) <= len(links)
+    return symbol_in_words(symbol), links[int(number) - 1] if known else ''
 
 
 def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
@@ -117,7 +114,7 @@ def parameter_folds(
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
-    Return a table for each kind of parameters, below a line that opens it.
+    Return a table for each link, and for each kind of effects, below a line that opens it.
 
     Parameters
     ----------
@@ -130,26 +127,34 @@ def parameter_folds(
     links : sequence of str
         Names of the links, in the order of their numbers.
     suffix, opened : callable
-        Return what stands behind the heading of a kind, and whether it is open, for the numbers of
-        its parameters; by default how many there are, and True.
+        Return what stands behind the heading of a table, and whether it is open, for the numbers
+        of its parameters; by default how many there are, and True.
     order : callable
-        Returns what the rows of a kind are sorted by, for the number of a parameter.
+        Returns what the rows of a table are sorted by, for the number of a parameter.
 
     """
+    tables: dict[str, list[int]] = {}
+    for (kind, unit), members in parameter_families(names).items():
+        for k in members:
+            link = _words_and_link(names[k], links)[1] if names[k].rigid else ''
+            body = f'Link of {names[k].joint}{f" ({link})" if link else ""}'
+            tables.setdefault(body if names[k].rigid else f'{kind} [{unit}]', []).append(k)
     folds = []
-    for (title, unit), members in parameter_families(names).items():
+    for title, members in tables.items():
         rigid = names[members[0]].rigid
         rows: list[Cells] = []
         for k in sorted(members, key=order):
-            label = rigid_label(names[k], links) if rigid else names[k].joint or names[k].name
-            note = grouping(names[k], links) if rigid else ''
-            first = TableCell(label, 'words' if rigid else '', note)
-            rows.append((first, *([names[k].joint] if rigid else []), *cells(k)))
-        lead = ('Parameter', 'Joint') if rigid else ('Joint',)
-        table = DataTable((*lead, *heads), rows, tuple(range(len(lead))), 'parameters')
+            name = names[k]
+            lead: Cells = (name.joint or name.name,)
+            if rigid:
+                words, _ = _words_and_link(name, links)
+                lead = TableCell(words, 'words', grouping(name, links)), pretty(name.unit)
+            rows.append((*lead, *cells(k)))
+        columns = ('Parameter', 'Unit') if rigid else ('Joint',)
+        table = DataTable((*columns, *heads), rows, tuple(range(len(columns))), 'parameters')
         count = suffix(members) if suffix else str(len(members))
         shown = opened is None or opened(members)
-        folds.append(Fold(f'{title} [{unit}]: {count}', [table], shown))
+        folds.append(Fold(f'{title}: {count}', [table], shown))
     return folds
 
 

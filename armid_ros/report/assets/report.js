@@ -293,7 +293,7 @@
 
   // A button below each table copies it as CSV; a field above those of parameters filters rows.
   const csv = (table) => [...table.rows].map((row) => [...row.cells].map(
-    (cell) => `"${cell.innerText.trim().replace(/"/g, '""')}"`).join(',')).join('\n');
+    (cell) => `"${cell.innerText.trim().replace(/\s+/g, ' ').replace(/"/g, '""')}"`).join(',')).join('\n');
 
   function addCopy(table) {
     const button = document.createElement('button');
@@ -309,12 +309,32 @@
     const field = document.createElement('input');
     Object.assign(field, {type: 'search', className: 'tool', placeholder: 'filter parameters'});
     field.setAttribute('aria-label', 'Filter parameters');
-    field.addEventListener('input', () => {
-      for (const row of section.querySelectorAll('table.parameters tbody tr')) {
-        row.hidden = !row.innerText.toLowerCase().includes(field.value.toLowerCase());
+    const rows = [...section.querySelectorAll('table.parameters tbody tr')];
+    const words = (row) => (row.closest('details').firstElementChild.textContent + row.textContent).toLowerCase();
+    const keeps = {known: (row) => !row.querySelector('.unknown'), changed: (row) => row.querySelector('.changed')};
+    const tools = [field];
+    const apply = () => {
+      const chosen = tools.slice(1).filter((tool) => tool.ariaPressed === 'true').map((tool) => keeps[tool.textContent]);
+      for (const row of rows) {
+        row.hidden = !words(row).includes(field.value.toLowerCase()) || !chosen.every((keep) => keep(row));
       }
-    });
-    section.querySelector('details').before(field);
+      for (const fold of section.querySelectorAll('details:has(> .scroll > table.parameters)')) {
+        fold.hidden = !fold.querySelector('tbody tr:not([hidden])');
+      }
+    };
+    field.addEventListener('input', apply);
+    for (const [name, keep] of Object.entries(keeps)) {
+      const left = rows.filter(keep).length;
+      if (!left || left === rows.length) continue;
+      const button = document.createElement('button');
+      Object.assign(button, {type: 'button', className: 'tool', textContent: name, ariaPressed: 'false'});
+      button.addEventListener('click', () => {
+        button.ariaPressed = String(button.ariaPressed !== 'true');
+        apply();
+      });
+      tools.push(button);
+    }
+    section.querySelector('details').before(...tools);
   }
 
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', repaint);
