@@ -35,12 +35,12 @@ from armid_ros.report.sections.diagnosed import (
     gap_section,
     minor_section,
     named_section,
-    overlay_section,
     patch_section,
     share_bars,
 )
 from armid_ros.report.sections.fit import forward_section
 from armid_ros.report.sections.frame import next_steps_section, Origin, VerdictSection
+from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 from armid_ros.report.sections.residual_map import residual_map_section
 from armid_ros.residual import JointResidual, Residual
 import numpy as np
@@ -162,9 +162,10 @@ def diagnosis_report(
     residual, patched = extras.residual, bool(diagnosis.findings)
     steps = [*map(printed, extras.steps(diagnosis)), *_of_maps(residual)]
     sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
-    if diagnosis.gap is not None:
+    curves = whole_overlays(diagnosis, [one for one, _ in recordings])
+    if curves is not None and diagnosis.gap is not None:
         sections += [
-            overlay_section(arm.robot, diagnosis.gap, patched, names),
+            overlay_section(arm.robot, curves, patched, names, diagnosis.spans),
             Story(diagnosis, residual),
             gap_section(arm.robot, diagnosis.gap, diagnosis.baseline, patched, diagnosis.harmful),
             *([named_section(diagnosis.findings)] if patched else []),
@@ -286,6 +287,17 @@ class Story(Section):
     def rows(self) -> list[tuple[str, list[str]]]:
         """Questions and answers."""
         answers = [('Where', self._where()), ('Patch', self._patch()), ('Gap', self._gap())]
+        if self.diagnosis.spans:
+            answers.insert(
+                0,
+                (
+                    'When',
+                    [
+                        f'{one.source} from {one.start:.1f} to {one.stop:.1f} s'
+                        for one in self.diagnosis.spans
+                    ],
+                ),
+            )
         rest = self.diagnosis.left
         if self.diagnosis.findings and rest:
             answers.append(('Unexplained', [f'{w.joint}: {w.signature}' for w in rest[:_JOINTS]]))

@@ -7,6 +7,7 @@ import re
 from types import SimpleNamespace
 
 from armid_ros.diagnosis import diagnose
+from armid_ros.diagnosis.search.spans import Span
 from armid_ros.effects import CATALOGUE
 from armid_ros.identification.assess.verification import simulate_held_out
 from armid_ros.identification.rows.signals import conditioning, SignalSettings
@@ -26,10 +27,10 @@ from armid_ros.report.sections.diagnosed import (
     evidence_section,
     gap_section,
     named_section,
-    overlay_section,
     share_bars,
 )
 from armid_ros.report.sections.fit import forward_section
+from armid_ros.report.sections.overlay import overlay_section, whole_overlays
 import numpy as np
 import pytest
 
@@ -244,6 +245,23 @@ def test_a_joint_whose_rows_tell_nothing_is_drawn_all_the_same(found):
     shown = gap.overlays
     assert len(torque.x) > 10
     assert any(torque.x[-1] == pytest.approx(one.trajectory.t[-1], abs=0.1) for one in shown)
+
+
+def test_seconds_of_a_cause_are_marked_in_the_curve_of_the_whole_recording(found, recordings):
+    source = found.gap.overlays[0].source
+    short = [one for one in found.gap.overlays if one.source == source]
+    read = [replace(recordings[0], source=source)]
+    some = replace(found, spans=(Span(source, 2.0, 3.0, False),))
+    gap = whole_overlays(replace(some, gap=replace(found.gap, overlays=tuple(short))), read)
+    (whole,) = gap.overlays
+    assert whole.trajectory.t[0] < 2.0 and whole.trajectory.t[-1] > 3.0
+    acts = (whole.trajectory.t >= 2.0) & (whole.trajectory.t <= 3.0)
+    differs = np.any(whole.after != whole.before, axis=1)
+    assert differs[acts].any() and not differs[~acts].any()
+    _, torque, residual = overlay_section(found.arm.robot, gap, True, {}, some.spans).blocks
+    for chart in (torque, residual):
+        assert [mark.x for mark in chart.marks] == [2.0, 3.0]
+    assert '2.0 to 3.0 s' in dict(Story(some).rows)['When'][0]
 
 
 def test_curves_of_where_it_lives_are_without_the_mean_which_is_said(found):

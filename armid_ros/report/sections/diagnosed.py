@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 
 from armid_ros.diagnosis import Diagnosis, Finding
 from armid_ros.diagnosis.search.patch import room
 from armid_ros.diagnosis.search.trial import Trial
 from armid_ros.diagnosis.verdict.document import Detectable
-from armid_ros.diagnosis.verdict.finding import Gap, Overlay
+from armid_ros.diagnosis.verdict.finding import Gap
 from armid_ros.diagnosis.verdict.where import Where
 from armid_ros.diagnosis.verdict.words import by_cause, share_interval_in_words
 from armid_ros.effects import CATALOGUE
@@ -29,7 +29,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     TableCell,
 )
-from armid_ros.report.charts import Chart, Role, Series, thinned
+from armid_ros.report.charts import Chart, Role, Series
 from armid_ros.report.notation import (
     counted,
     digits,
@@ -39,7 +39,6 @@ from armid_ros.report.notation import (
     value_of,
     with_interval,
 )
-from armid_ros.report.sections.fit import ZOOM
 from armid_ros.robots import Robot
 import numpy as np
 
@@ -351,76 +350,5 @@ def gap_section(
                 f"joint's floor. The floor is {floor}.{kept}"
             ),
             BarChart(rows, [(role, label) for role, label, _ in roles]),
-        ],
-    )
-
-
-def overlay_section(
-    robot: Robot, gap: Gap, patched: bool, names: Mapping[str, str]
-) -> ContentSection:
-    """
-    Return measured and modelled torque, in the joint and recording where the gap was largest.
-
-    Parameters
-    ----------
-    robot : Robot
-        Gives joints and units.
-    gap : Gap
-        The curves.
-    patched : bool
-        Whether anything was added to the model.
-    names : mapping of str to str
-        What each recording is called.
-
-    """
-    j = int(np.argmax(gap.chi2_before))
-
-    def size(overlay: Overlay) -> float:
-        residual = (overlay.measured - overlay.before)[:, j] / overlay.sigma[j]
-        return float(np.mean(residual**2))
-
-    shown = max(gap.overlays, key=size)
-    source = names.get(shown.source, shown.source) or 'the recording'
-    counted = np.flatnonzero(shown.trajectory.informative[:, j])
-    moving = slice(counted[0], counted[-1] + 1) if len(counted) else slice(None)
-    measured, before, after = (x[moving, j] for x in (shown.measured, shown.before, shown.after))
-    t, unit = shown.trajectory.t[moving], robot.torque_units[j]
-    kept = thinned(measured, measured - before, measured - after)
-    band: FloatArray = np.full(len(kept), 2.0 * shown.sigma[j])
-
-    def models(first: FloatArray, second: FloatArray) -> list[Series]:
-        if not patched:
-            return [Series('model', second[kept], 'before')]
-        return [Series('before', first[kept], 'before'), Series('after', second[kept], 'after')]
-
-    dashes = ', dashes on it are the model after' * patched
-    return ContentSection(
-        'Measured and modelled',
-        [
-            Paragraph(f'{robot.joints[j]} in {source}, where the error is largest.'),
-            Chart(
-                t[kept],
-                [Series('measured', measured[kept], 'measured'), *models(before, after)],
-                '',
-                f'torque [{unit}]',
-                link='overlay',
-            ),
-            Chart(
-                t[kept],
-                [
-                    Series('twice the floor', -band, 'floor', 'band', band),
-                    *models(measured - before, measured - after),
-                ],
-                'time [s]',
-                f'residual [{unit}]',
-                height=170,
-                link='overlay',
-                symmetric=True,
-            ),
-            Paragraph(
-                f'The broad line is what was measured{dashes}. {ZOOM} Where the joint turns '
-                'round, friction is undetermined and nothing is judged.',
-                'hint',
-            ),
         ],
     )
