@@ -13,11 +13,19 @@ from armid_ros.diagnosis.verdict import words
 from armid_ros.diagnosis.verdict.finding import Finding
 from armid_ros.estimate import ParameterName
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
+from markupsafe import escape, Markup
 
 #: What is no number, or one that stands for none.
 DASH = '\N{EN DASH}'
 #: No quantity of an arm in SI units is as large.
 _NO_NUMBER = 1e12
+#: Words that a page explains where they stand.
+TERMS = {
+    'floor': 'Error that a perfect model would have: noise, or what the model before had.',
+    'gap': 'Squared torque error of the given model, each joint in units of its floor.',
+    'held out': 'Not used to fit the model.',
+    'condition number': 'How unevenly the motion shows the parameters; below 100 is good.',
+}
 #: Letters of a prefix of names that is worth leaving out.
 _SHORT = 5
 
@@ -167,6 +175,15 @@ def many_counted(text: str, names: Sequence[str]) -> str:
     one = f'(?:{"|".join(map(re.escape, names))})(?!\\w)'
     run = rf'(?<![\w/.-]){one}(?:, {one}){{3,}}'
     return re.sub(run, lambda found: f'{found[0].count(",") + 1} joints', text)
+
+
+def explained(text: str) -> Markup:
+    """Return a text as HTML, in which the first of each of the `TERMS` has its explanation."""
+    html = str(escape(text))
+    for term, said in TERMS.items():
+        words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'
+        html = re.sub(words, rf'<abbr title="{said}">\1</abbr>', html, count=1, flags=re.I)
+    return Markup(html)
 
 
 def with_names(text: str, names: Mapping[str, str]) -> str:

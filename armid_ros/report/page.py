@@ -22,6 +22,7 @@ from armid_ros.report.notation import (
     common_prefix,
     counted,
     digits,
+    explained,
     many_counted,
     plain,
     pretty,
@@ -154,7 +155,9 @@ def _environment(package: str) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(digits=digits, pretty=pretty, short=_short, few=_few)
+    environment.filters.update(
+        digits=digits, pretty=pretty, short=_short, few=_few, explained=explained
+    )
     environment.globals['counted'] = counted
     environment.globals['plain'] = plain
     return environment
