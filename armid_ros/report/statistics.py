@@ -190,7 +190,8 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
     most = [max(own, default=0.0) for own in shares]
     rows: list[Cells] = []
     folds = []
-    for joint, name in enumerate(robot.joints):
+    for joint in np.argsort(-np.array(most), kind='stable'):
+        name = robot.joints[joint]
         cells: Cells = [
             TableCell(f'{100 * share:.0f} %', 'telling' if share > TELLING_SHARE else '')
             for share in shares[joint]
@@ -214,9 +215,9 @@ def residual_section(robot: Robot, fits: Sequence[Fit], role: str) -> ContentSec
         'Residual by variable',
         [
             Paragraph(
-                f'Share of the {role} residual that one variable explains, beyond chance. Noise '
-                'depends on none. Wrong friction depends on speed; wrong gravity or masses on '
-                'position; gears and drives on load.'
+                f'Share of the {role} residual that one variable explains, beyond chance, the '
+                'worst joint first. Noise depends on none. Wrong friction depends on speed; wrong '
+                'gravity or masses on position; gears and drives on load.'
             ),
             DataTable(('Joint', 'Speed', 'Position', 'Load'), rows),
             *folds,

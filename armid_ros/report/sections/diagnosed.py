@@ -98,6 +98,17 @@ def named_rows(
             )
             for name, value, std in values
         ]
+        masses = [row[1] for row in values if row[0].unit == 'kg' and excludes_zero(*row[1:])]
+        rows += [
+            (
+                finding.name.replace('_', ' '),
+                name.words.replace('first moment', 'centre of mass'),
+                finding.place_of(name.joint) or 'whole arm',
+                with_interval(value / masses[0], std / abs(masses[0]), 'm'),
+            )
+            for name, value, std in values
+            if finding.weighs and masses and name.unit == 'kg m' and not certain
+        ]
     return rows
 
 
@@ -329,8 +340,9 @@ def gap_section(
     ]
     if not patched:
         roles = [('before', 'error', gap.after), roles[-1]]
-    rows = []
-    for joint, name in enumerate(robot.joints):
+    rows, first = [], roles[0][2]
+    for joint in np.argsort(-first / np.maximum(gap.floor, 1e-12)):
+        name = robot.joints[joint]
         if not any(errors[joint] for _, _, errors in roles):  # at rest: no row counts
             rows.append((name, [Bar(0.0, 'floor', 'not judged')]))
             continue
@@ -346,8 +358,8 @@ def gap_section(
         'Gap',
         [
             Paragraph(
-                f'Root mean square error of each joint on {where}. Each bar is in units of the '
-                f"joint's floor. The floor is {floor}.{kept}"
+                f'Root mean square error of each joint on {where}, the worst joint first. '
+                f"Each bar is in units of the joint's floor. The floor is {floor}.{kept}"
             ),
             BarChart(rows, [(role, label) for role, label, _ in roles]),
         ],

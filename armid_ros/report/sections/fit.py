@@ -193,9 +193,9 @@ def forward_section(
     """
     blocks: list[PageBlock] = [
         Paragraph(
-            f'Root mean square errors of position and torque of two models: {labels[0]} and '
-            f'{labels[1]}. The recorded torques drive both. The same 8 Hz feedback keeps both at '
-            'the recorded motion, because commanded positions are not recorded.'
+            f'Root mean square errors of position of two models, {labels[0]} and {labels[1]}, the '
+            'worst joint first. The recorded torques drive both. The same 8 Hz feedback keeps '
+            'both at the recorded motion, because commanded positions are not recorded.'
         )
     ]
     for number, pair in enumerate(pairs):
@@ -209,20 +209,16 @@ def forward_section(
         comment = pair.comment()
         if comment:
             own.append(Paragraph(f'{comment[:1].upper()}{comment[1:]}.'))
+        errors = [1e3 * score.position_error for *_, score in models]
         rows = [
             (
-                name,
+                robot.joints[joint],
                 [
-                    Bar(
-                        1e3 * float(score.position_error[joint]),
-                        role,
-                        f'{digits(1e3 * score.position_error[joint])} m{score.units[joint]}, '
-                        f'{digits(score.torque_error[joint])} {robot.torque_units[joint]}',
-                    )
-                    for role, _, score in models
+                    Bar(error[joint], role, f'{digits(error[joint])} m{pair.after.units[joint]}')
+                    for error, (role, *_) in zip(errors, models, strict=True)
                 ],
             )
-            for joint, name in enumerate(robot.joints)
+            for joint in np.argsort(-np.max(errors, axis=0))
         ]
         own.append(BarChart(rows, [(role, label) for role, label, _ in models], True))
         own += _worst_joint(robot, pair, models)
