@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Drawings of an arm: outlines of its collision bodies from a corner, far ones first.
+Drawings of an arm as it hangs: outlines of its collision bodies from a corner, far ones first.
 
 An arm without bodies is drawn as bars from each joint to the joints that it carries; the last bar
 ends beyond its centre of mass.
@@ -34,8 +34,8 @@ _BAR = 0.02
 OBSTACLE = 'var(--line)'
 #: What is smaller stands for a link without a body and cannot be seen [m].
 _POINT = 1e-3
-#: Height of a line of text, width of a letter, length of the arrow of gravity [px].
-_LINE, _LETTER, _ARROW = 16.0, 9.5, 26.0
+#: Height of a line of text, width of a letter [px].
+_LINE, _LETTER = 16.0, 9.5
 #: Poses that a single drawing is tried in.
 _POSES = 12
 #: Joint range beyond which a joint counts as endless [rad or m].
@@ -85,8 +85,8 @@ class ArmDrawing(Templated):
         Where each pose is, and when.
     labels : tuple of (float, float, float, float, str)
         A line from a joint to its name, and the name [px].
-    gravity : tuple of float
-        Direction of gravity [px]; zero for none.
+    gravity : bool
+        Whether an arrow shows gravity, which points down.
     label : str
         The drawing in words.
 
@@ -102,7 +102,7 @@ class ArmDrawing(Templated):
     paths: tuple[str, ...] = ()
     captions: tuple[tuple[float, str], ...] = ()
     labels: tuple[tuple[float, float, float, float, str], ...] = ()
-    gravity: tuple[float, float] = (0.0, 0.0)
+    gravity: bool = False
     label: str = 'Poses of the arm'
 
 
@@ -190,7 +190,6 @@ def draw_arm(
         y = max(top, y + _LINE)
         labels.append((x, top, round(strip.pitch, 1), round(y, 1), name))
     letters = max((len(name) for *_, name in labels), default=0)
-    down = flat(CORNER, robot.gravity / max(float(np.linalg.norm(robot.gravity)), _POINT))
     return ArmDrawing(
         round(strip.pitch + _LETTER * letters, 1),
         round(max(strip.height, y + _LINE), 1),
@@ -200,7 +199,7 @@ def draw_arm(
             for x, top, name in sorted(dots, key=lambda dot: dot[2] in marked)
         ),
         labels=tuple(labels),
-        gravity=(round(_ARROW * float(down[0]), 1), round(-_ARROW * float(down[1]), 1)),
+        gravity=bool(np.any(robot.gravity)),
         label=label,
     )
 
@@ -276,10 +275,13 @@ def _solids(collision: CollisionModel) -> list[_Solid]:
 
 
 def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
-    """Return where the joints of a model are in a pose."""
-    data = model.createData()
+    """Return where the joints of a model are in a pose, seen upright: gravity points down."""
+    data, upright = model.createData(), pin.SE3.Identity()
     pin.forwardKinematics(model, data, np.asarray(q, dtype=float))
-    return [pin.SE3(placement) for placement in data.oMi]
+    if np.any(model.gravity.linear):
+        down = np.array([0.0, 0.0, -1.0])
+        upright.rotation = pin.Quaternion.FromTwoVectors(model.gravity.linear, down).matrix()
+    return [upright * placement for placement in data.oMi]
 
 
 def flat(seen: FloatArray, points: FloatArray) -> FloatArray:

@@ -40,12 +40,7 @@ from armid_ros.report.blocks import (
     TableCell,
 )
 from armid_ros.report.charts import Chart, Level, Role, Series
-from armid_ros.report.families import (
-    effects_in_words,
-    full_label,
-    parameter_families,
-    parameter_folds,
-)
+from armid_ros.report.families import effects_in_words, full_label, parameter_folds
 from armid_ros.report.judgement import GOOD_CONDITION, WEAK_CONDITION
 from armid_ros.report.notation import counted, digits, pretty, robot_label
 from armid_ros.report.page import Page, Section
@@ -352,16 +347,13 @@ def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
     """Return what a planned run will determine of every parameter, the best known first."""
     information, described = design.information, design.described
     size = information.std / information.scale
-    longest: dict[int, float] = {}
-    for members in parameter_families(information.parameters).values():
-        own = max((float(size[k]) for k in members if np.isfinite(size[k])), default=1.0)
-        longest.update(dict.fromkeys(members, own))
+    longest = float(np.max(size, where=np.isfinite(size), initial=1e-12))
 
     def cells(k: int) -> Cells:
         name, std, value = information.parameters[k], information.std[k], described[k]
         seen, known = bool(np.isfinite(std)), name.rigid or bool(value)
         relative = f'{digits(100.0 * std / abs(value))} %' if value and seen else ''
-        share = 100.0 * float(size[k]) / longest[k] if seen else 100.0
+        share = 100.0 * float(size[k]) / longest if seen else 100.0
         return (
             f'{value:.3g}' if known else 'not known',
             digits(float(std)) if seen else TableCell('not seen', 'unknown'),
@@ -374,8 +366,7 @@ def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSecti
         [
             Paragraph(
                 'Predicted standard deviation of each parameter after the run, for the stated '
-                'torque noise and a correct model. Bars compare the torque uncertainty within '
-                'each kind.'
+                'torque noise and a correct model. Bars compare the torque uncertainty.'
             ),
             *parameter_folds(
                 information.parameters,

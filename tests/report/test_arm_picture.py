@@ -47,3 +47,15 @@ def test_names_are_not_printed_over_one_another_or_over_the_arm():
     assert 0.0 <= min(heights) and max(heights) <= drawn.height
     points = [float(p.split(',')[0]) for body, _ in drawn.bodies for p in body.split()]
     assert min(x for _, _, x, _, _ in drawn.labels) > max(points)
+
+
+def test_an_arm_on_a_ceiling_hangs():
+    """What the base carries is at the bottom; without gravity it is drawn as described."""
+    below = {}
+    for up in (-9.81, 9.81, 0.0):
+        drawn = draw_arm(robot_from_urdf(ENDLESS, gravity=(0.0, 0.0, up)), [])
+        corners = [float(p.split(',')[1]) for body, _ in drawn.bodies for p in body.split()]
+        below[up] = max(corners) - next(y for _, y, _, name in drawn.dots if name == 'lift')
+        assert drawn.gravity == bool(up)
+    assert 0.0 < below[9.81] < 0.2 * below[-9.81]
+    assert below[0.0] == below[-9.81]
