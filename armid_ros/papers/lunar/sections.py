@@ -44,27 +44,21 @@ def _table(one: Repeated) -> DataTable:
             one.ratio(whole.held_out),
         )
     ]
+    peaks = {'paper': one.table.peak, 'largest': one.peak}
+    errors = {'paper': one.table.error, 'weight': slow.held_out, 'whole': whole.held_out}
     rows = [
-        (
-            joint,
-            digits(1e3 * one.table.peak[k], 3),
-            digits(1e3 * one.peak[k], 3),
-            digits(1e3 * one.table.error[k]),
-            digits(1e3 * slow.held_out[k]),
-            digits(1e3 * whole.held_out[k]),
-            *(digits(float(ratio[k])) for ratio in ratios),
-        )
-        for k, joint in enumerate(one.joints)
+        *((f'Peak, {by} [N mm]', *_cells(1e3 * x, 3), '') for by, x in peaks.items()),
+        *((f'{error}, {by} [N mm]', *_cells(1e3 * x), '') for by, x in errors.items()),
+        *(
+            (f'{share}, {by}', *_cells(ratio), digits(float(np.mean(ratio))))
+            for by, ratio in zip(('paper', 'noisy', 'weight', 'whole'), ratios, strict=True)
+        ),
     ]
-    mean = ('mean', *[''] * 5, *(digits(float(np.mean(ratio))) for ratio in ratios))
-    heads = (
-        'Joint',
-        'Peak, paper [N mm]',
-        'Peak, largest [N mm]',
-        *(f'{error}, {by} [N mm]' for by in ('paper', 'weight', 'whole')),
-        *(f'{share}, {by}' for by in ('paper', 'noisy', 'weight', 'whole')),
-    )
-    return DataTable(heads, [*rows, mean])
+    return DataTable(('quantity', *one.joints, 'mean'), rows)
+
+
+def _cells(values: FloatArray, count: int = 2) -> list[str]:
+    return [digits(float(value), count) for value in values]
 
 
 def curves_section(repeated: Sequence[Repeated]) -> ContentSection:

@@ -109,8 +109,8 @@ def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...
 
 
 def _marks(spans: Sequence[Span]) -> list[Mark]:
-    ends = [(span.start, f'from {span.start:.1f} s', True) for span in spans]
-    return [Mark(*end) for end in (*ends, *((s.stop, f'to {s.stop:.1f} s') for s in spans))]
+    starts = [Mark(span.start, f'from {span.start:.1f} s', before=True) for span in spans]
+    return [*starts, *(Mark(span.stop, f'to {span.stop:.1f} s') for span in spans)]
 
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
