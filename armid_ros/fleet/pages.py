@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+import math
 from typing import Any
 from urllib.parse import quote
 
@@ -21,14 +22,22 @@ from armid_ros.fleet.watch import (
     change_rows,
     day_text,
     parameter_label,
+    RESIDUAL,
     Watch,
     WatchedArm,
     wear_rows,
 )
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
-from armid_ros.report.blocks import ContentSection, DataTable, Paragraph, SmallMultiples
-from armid_ros.report.notation import counted, digits, with_interval
+from armid_ros.report.blocks import (
+    ContentSection,
+    DataTable,
+    Fold,
+    PageBlock,
+    Paragraph,
+    SmallMultiples,
+)
+from armid_ros.report.notation import counted, digits, pretty, printed, with_interval
 from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import escape, Markup
@@ -62,7 +71,10 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
         'dashed line is where it changed. Error: median of 100 |residual torque| / |torque| '
         'over the bags of an arm, each fitted by itself.'
     )
-    sections: list[Section] = [_verdict(found), _table('Arms', heads, rows, (3, 4, 5), hint)]
+    sections: list[Section] = [
+        _verdict(found, diagnoses),
+        _table('Arms', heads, rows, (3, 4, 5), hint),
+    ]
     refused = [row for arm in found.arms for row in arm.refused]
     if refused:
         more = len(refused) > _SHOWN
@@ -79,30 +91,43 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
 
 def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     """Return the page of an arm."""
-    texts = [row['text'] for row in change_rows(arm)]
-    tone = {'changed': 'bad', 'wearing': 'fair', 'healthy': 'good'}.get(arm.health, 'fair')
-    first = (texts or ['No parameter has changed more than noise and other bags explain.'])[0]
+    texts = [printed(row['text']) for row in change_rows(arm)]
+    diagnosis = diagnoses.get(arm.arm)
+    diagnosed = _diagnosed(arm, diagnosis)
+    tone = {'changed': 'bad', 'healthy': 'fair' if diagnosed else 'good'}.get(arm.health, 'fair')
+    quiet = 'No parameter has changed more than noise and other bags explain.'
+    if diagnosis is not None and diagnosed:
+        quiet = printed(diagnosis['summary'])
+    sentence = (texts or [quiet])[0]
+    sentence = f'{sentence[0].upper()}{sentence[1:]}'
     beware = [*texts[1:6]]
     if len(texts) > 6:
         beware.append(f'... and {len(texts) - 6} more')
-    diagnosis = diagnoses.get(arm.arm)
     step = '' if diagnosis or not arm.named else f'armid fleet diagnose --arm {arm.arm}.'
     sections: list[Section] = [
-        VerdictSection(arm.health, tone, [f'{first[0].upper()}{first[1:]}'], beware, step=step)
+        VerdictSection(diagnosed or arm.health, tone, [sentence], beware, step=step)
     ]
     if diagnosis is not None:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
-        cells = _link(report, diagnosis['verdict'].replace('_', ' ')), diagnosis['summary']
+        cells = (
+            _link(report, diagnosis['verdict'].replace('_', ' ')),
+            printed(diagnosis['summary']),
+        )
         sections.append(_table('Diagnosis', ('Verdict', 'Summary'), [cells]))
     order = {change.series.parameter: k for k, change in enumerate(arm.named)}
     shown = [one for one in arm.series if len(one.values)]
     shown.sort(key=lambda one: order.get(one.parameter, len(order)))
+    cut = sum(one.parameter in order for one in shown)
     said = (
         'Every point is a bag with its 95 % interval; it leads to the bag below. The range is '
         'that of the ordinate.'
     )
-    curves = SmallMultiples([_curve(arm, one) for one in shown])
-    sections.append(ContentSection('Parameters over time', [curves, Paragraph(said, 'hint')]))
+    first, rest = ([_curve(arm, one) for one in part] for part in (shown[:cut], shown[cut:]))
+    curves: list[PageBlock] = [SmallMultiples(first)] if first else []
+    if rest:
+        line = f'{counted(len(rest), "parameter")} without a change'
+        curves.append(Fold(line, [SmallMultiples(rest)]))
+    sections.append(ContentSection('Parameters over time', [Paragraph(said, 'hint'), *curves]))
     rows = []
     for row in wear_rows(found, arm):
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
@@ -124,26 +149,39 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     return Page(arm.arm, subtitle, sections, charts=False).html()
 
 
-def _verdict(found: Watch) -> VerdictSection:
+def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
     counts = Counter(arm.health for arm in found.arms)
+    blamed = [arm.arm for arm in found.arms if _diagnosed(arm, diagnoses.get(arm.arm))]
     ill = counts['changed'] + counts['wearing']
-    sentences = [f'None of {counted(len(found.arms), "arm")} changed.']
+    sentences = [f'No parameter of {counted(len(found.arms), "arm")} changed.']
     if ill:
         sentences = [
             f'{counted(ill, "arm")} of {len(found.arms)} changed: {counts["changed"]} '
             f'suddenly, {counts["wearing"]} gradually.',
             f'At most {100.0 * found.alpha:g} % of the named arms are false alarms, on average.',
         ]
+    if blamed:
+        names = ', '.join(blamed)
+        some = names if len(names) < _LISTED else counted(len(blamed), 'arm')
+        sentences.insert(0, f'The diagnosis found a fault in {some}.')
     beware = []
     if counts['too few bags']:
         beware.append(f'{counted(counts["too few bags"], "arm")} with too few bags to be tested')
     refused = sum(len(arm.refused) for arm in found.arms)
     if refused:
         beware.append(f'{counted(refused, "bag")} refused')
-    grade, tone = ('changes', 'fair') if ill else ('quiet', 'good')
+    grade = 'changes' if ill else 'diagnosed' if blamed else 'quiet'
+    tone = 'fair' if ill or blamed else 'good'
     named = ', '.join(arm.arm for arm in found.arms if arm.named)
     step = f'open the page of {named}.' if ill and len(named) < _LISTED else ''
     return VerdictSection(grade, tone, sentences, beware, step=step)
+
+
+def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
+    """Return the verdict of a diagnosis that found more than the tests of parameters, or ''."""
+    if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
+        return ''
+    return str(diagnosis['verdict']).replace('_', ' ')
 
 
 def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
@@ -152,18 +190,22 @@ def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
     what = Markup('')
     for row in change_rows(arm)[:1]:
         bag = _link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
-        what = Markup('{} {}').format(row['text'], bag)
+        what = Markup('{} {}').format(printed(row['text']), bag)
     if diagnosis is not None and diagnosis['verdict'] != 'failed':
         report = _link(diagnosis['report'], 'Diagnosis')
-        what += Markup('<br>{}: {}').format(report, diagnosis['summary'])
+        what += Markup('<br>' * bool(what) + '{}: {}').format(
+            report, printed(diagnosis['summary'])
+        )
     for first in arm.named[:1]:
         series = first.series
         label, last = parameter_label(*series.parameter), digits(series.values[-1], 3)
         order = np.arange(len(series.values), dtype=float)
-        title = f'{label}: {last} {series.unit}'
+        title = f'{label}: {last} {pretty(series.unit)}'
         what += _drawing(order, series.values, series.std, first.index, title=title)[0]
     errors = sorted(e for row in arm.bags if (e := row['relative_error_percent']) is not None)
-    mark = Markup('<span class="mark {}">{}</span>').format(arm.health.split(' ')[0], arm.health)
+    found = _diagnosed(arm, diagnosis)
+    tone = 'wearing' if found else arm.health.split(' ')[0]
+    mark = Markup('<span class="mark {}">{}</span>').format(tone, found or arm.health)
     return [
         _link(page, arm.arm),
         mark,
@@ -181,7 +223,10 @@ def _curve(arm: WatchedArm, series: ParameterHistory) -> tuple[str, str, Markup,
         links.append(f'#{BagFile(arm.arm, nearest["bag"]).name}')
     cuts = [one.index for one in arm.named if one.series.parameter == series.parameter]
     svg, ends = _drawing(series.days, series.values, series.std, sum(cuts), links)
-    shown = f'{digits(ends[0], 3)} to {digits(ends[1], 3)} {series.unit}'.rstrip()
+    unit = pretty(series.unit)
+    if series.name == RESIDUAL:  # of which the series has the logarithm
+        ends, unit = (math.exp(ends[0]), math.exp(ends[1])), 'N m'
+    shown = f'{digits(ends[0], 3)} to {digits(ends[1], 3)} {unit}'.rstrip()
     return parameter_label(*series.parameter), shown, svg, 'changed' if cuts else ''
 
 

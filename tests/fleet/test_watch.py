@@ -6,10 +6,11 @@ import json
 import re
 
 from armid_ros.fleet.bags import find_bags
-from armid_ros.fleet.diagnose import cases, diagnose_fleet
+from armid_ros.fleet.diagnose import cases, diagnose_fleet, DIAGNOSES
 from armid_ros.fleet.pages import write_pages
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.watch import watch_fleet, write_watch
+import pyarrow as pa
 import pytest
 
 from benchmarks.fleet import generate
@@ -104,4 +105,21 @@ def test_the_diagnosis_names_what_happened_with_the_arms_own_past_as_baseline(li
     assert store.read(row['report']) is not None
     write_pages(store, found)
     page = store.read(f'pages/{arm}.html').decode()
-    assert 'payload' in page and 'diagnosis/report.html' in page
+    assert 'Payload' in page and 'diagnosis/report.html' in page
+
+
+def test_an_arm_whose_diagnosis_found_something_is_not_shown_as_healthy(lived):
+    store, found, truth = lived
+    arm = next(arm.arm for arm in found.arms if arm.arm not in truth['arms'])
+    row = dict.fromkeys(DIAGNOSES.names) | {'arm': arm, 'verdict': 'named', 'report': ''}
+    row['summary'] = 'Payload of 0.25 +- 0.01 kg'
+    store.write_table('watch/diagnoses.parquet', pa.Table.from_pylist([row], DIAGNOSES))
+    write_pages(store, found)
+    page, index = (store.read(name).decode() for name in (f'pages/{arm}.html', 'index.html'))
+    for text in (page, index):
+        assert '0.25 ± 0.01 kg' in text
+    assert '>healthy<' not in page and f'fault in {arm}' in index
+    changed = store.read(f'pages/{next(iter(truth["arms"]))}.html').decode()
+    assert changed.count('<figure class="changed"') == changed.split('<details')[0].count(
+        '<figure'
+    )
