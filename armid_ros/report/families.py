@@ -148,7 +148,10 @@ def parameter_folds(
             lead: Cells = (name.joint or name.name,)
             if rigid:
                 words, _ = _words_and_link(name, links)
-                lead = TableCell(words, 'words', grouping(name, links)), pretty(name.unit)
+                lead = (
+                    TableCell(words, 'words', grouping(name, links)),
+                    TableCell(pretty(name.unit), 'unit'),
+                )
             rows.append((*lead, *cells(k)))
         columns = ('Parameter', 'Unit') if rigid else ('Joint',)
         table = DataTable((*columns, *heads), rows, tuple(range(len(columns))), 'parameters')

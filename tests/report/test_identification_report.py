@@ -379,9 +379,9 @@ def test_parameters_are_filtered_and_tables_are_copied(browser, first_plot):
         'document.querySelector("#data-quality button.tool").click()'
     )
     assert browser.run('window.copied').startswith('"Recording","Used for"')
-    browser.run(
-        'URL.createObjectURL = blob => { blob.text().then(text => { window.saved = text; });'
-        ' return "#"; };'
-        'document.querySelectorAll("figure.chart .tool")[1].click()'
+    saved = browser.run(
+        'new Promise(done => {'
+        'URL.createObjectURL = blob => { blob.text().then(done); return "#"; };'
+        'document.querySelectorAll("figure.chart .tool")[1].click(); })'
     )
-    assert browser.run('window.saved').startswith('"x","measured: torque [N m]",')
+    assert saved.startswith('"x","measured: torque [N m]",')
