@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from armid_ros.api.arguments import read_recording
     from armid_ros.api.comparison import compare, ComparisonResult
     from armid_ros.api.diagnosis import diagnose, DiagnosisResult
-    from armid_ros.api.excitation import design_excitation, ExcitationResult
+    from armid_ros.api.excitation import design_excitation, ExcitationResult, excite
     from armid_ros.api.identification import IdentificationResult, identify
     from armid_ros.api.inspection import check, inspect, InspectionResult
     from armid_ros.api.simulation import simulate
@@ -73,6 +73,7 @@ _HOMES = {
     'ComparisonResult': 'armid_ros.api.comparison',
     'simulate': 'armid_ros.api.simulation',
     'design_excitation': 'armid_ros.api.excitation',
+    'excite': 'armid_ros.api.excitation',
     'ExcitationResult': 'armid_ros.api.excitation',
     'Estimate': 'armid_ros.estimate',
     'ArmidError': 'armid_ros.errors',
@@ -106,6 +107,7 @@ __all__ = [
     'ComparisonResult',
     'simulate',
     'design_excitation',
+    'excite',
     'ExcitationResult',
     'Estimate',
     'ArmidError',

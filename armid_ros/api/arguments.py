@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import wraps
+from inspect import signature
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import ParamSpec, TypeVar
 
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
-from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray
+from armid_ros.errors import meant, RecordingError, TrajectoryError
 from armid_ros.recording import ReadSettings, Recording, Topic
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.message_types import JOINT_STATE
@@ -27,7 +28,7 @@ from armid_ros.recording.tables import (
     TablePlan,
 )
 from armid_ros.recording.tables.settings import numbers
-from armid_ros.robots import load_robot, Robot, shipped_robots
+from armid_ros.robots import joints_beside_arms, load_robot, Robot, shipped_robots
 from armid_ros.robots.shipped import shipped_path
 import numpy as np
 
@@ -41,25 +42,29 @@ Rng = np.random.Generator | int
 #: Is called with the share of the work that is done and, where it changes, what is being done.
 Progress = Callable[..., None]
 
+#: A number, one a joint, or these as text: '1798/7, 50'.
+_Numbers = float | str | Sequence[float]
+_Given = ParamSpec('_Given')
+_Result = TypeVar('_Result')
+
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
 
 
-class DesignKeywords(TypedDict, total=False):
-    """Further keywords of `armid_ros.design_excitation`, which has what they are."""
+def spelled(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
+    """Let a function answer a keyword that it does not have with the one that was meant."""
+    known = signature(function).parameters
 
-    speed: str | float
-    criterion: str
-    target: str
-    focus: tuple[str, ...]
-    harmonics: int
-    acceleration: FloatArray | None
-    noise: FloatArray | None
-    clearance: float
-    starts: int
-    iterations: int
-    candidates: int
-    time_budget: float
+    @wraps(function)
+    def called(*values: _Given.args, **keywords: _Given.kwargs) -> _Result:
+        for name in keywords.keys() - known.keys():
+            raise TypeError(
+                f"{function.__name__}() has no keyword '{name}'{meant(name, known)}; it takes "
+                f'{", ".join(known)}'
+            )
+        return function(*values, **keywords)
+
+    return called
 
 
 def robot_of(robot: RobotLike) -> Robot:
@@ -91,6 +96,19 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
     if not isinstance(arm, Robot) and is_model(arm):
         return load_model(arm)
     return ArmModel.of(arm if isinstance(arm, Robot) else str(arm), effects=effects)
+
+
+def drivable(arm: RobotLike) -> ArmModel:
+    """Return the model that is to move; TrajectoryError where joints of it belong to no arm."""
+    model = arm_of(arm)
+    others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
+    if others:
+        kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
+        raise TrajectoryError(
+            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
+            f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
+        )
+    return model
 
 
 def recordings_of(
@@ -140,12 +158,26 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
     return tuple([named(recording) for recording in group] for group in groups)
 
 
+@spelled
 def read_recording(
     path: str | Path,
     robot: RobotLike | Sequence[str] | None = None,
     *,
     topic: str | None = None,
-    **columns: Any,
+    time: str | None = None,
+    position: str | None = None,
+    velocity: str | None = None,
+    effort: str | None = None,
+    time_unit: str | None = None,
+    rate_hz: float | None = None,
+    degrees: bool = False,
+    position_scale: _Numbers = (),
+    effort_scale: _Numbers = (),
+    zero: _Numbers = (),
+    gear: _Numbers = (),
+    coupling: Sequence[tuple[str, str, float]] = (),
+    rename: Mapping[str, str] | Sequence[tuple[str, str]] = (),
+    episode: int | None = None,
 ) -> Recording:
     """
     Read the joints of a robot from a bag or a table.
@@ -160,10 +192,30 @@ def read_recording(
         with one topic of JointState, or of ``topic``.
     topic : str, optional
         JointState topic, where a bag has several.
-    **columns
-        Of a table, as in ColumnSettings: ``position='q{}'``, ``effort='tau{}'``, ``time='t'``,
-        ``degrees=True``, ``effort_scale=(11.2, ...)``, ``rename={'fer_': 'panda_'}``. What is not
-        said is guessed. Units, scales, zeros, gears and names are those of a bag, too.
+    time, position, velocity, effort : str, optional
+        Columns of a table: a name, names with commas, ``'q{}'`` for the joint's name or number,
+        ``'[3..9]'`` for columns by number from 1; ``'none'`` for what is not to be read. Guessed
+        by default.
+    time_unit : {'s', 'ms', 'us', 'ns'}, optional
+        Unit of the column of time; guessed by default.
+    rate_hz : float, optional
+        Sample rate of a table without a column of time [Hz].
+    degrees : bool
+        Whether positions and velocities are in degrees.
+    position_scale, effort_scale : float or sequence of float
+        Factors to rad or m, and to N m or N: one, or one a joint. Of a current, the torque
+        constant [N m/A].
+    zero : float or sequence of float
+        Added to the positions after all [rad or m].
+    gear : float or sequence of float
+        Turns of the motor for one of the joint, where values are those of motors.
+    coupling : sequence of (str, str, float)
+        Motor, joint, and turns of that motor for one of that other joint, for wrists.
+    rename : mapping of str to str
+        Beginnings of joint names in the file, and what to put there instead:
+        ``{'fer_': 'panda_'}``.
+    episode : int, optional
+        Number of the episode of a LeRobot dataset.
 
     Returns
     -------
@@ -183,7 +235,22 @@ def read_recording(
     True
 
     """
-    said = _settings(columns)
+    said = ColumnSettings(
+        time=time,
+        position=position,
+        velocity=velocity,
+        effort=effort,
+        time_unit=time_unit,
+        rate_hz=rate_hz,
+        degrees=degrees,
+        position_scale=_numbers(position_scale),
+        effort_scale=_numbers(effort_scale),
+        zero=_numbers(zero),
+        gear=_numbers(gear),
+        coupling=tuple(coupling),
+        rename=tuple(rename.items() if isinstance(rename, Mapping) else rename),
+        episode=episode,
+    )
     if robot is None:
         topics = topics_of(Path(path))
         named = [one.name for one in topics if one.joints]
@@ -258,17 +325,5 @@ def read_all_joints(
     return read_anything(path, joints=list(joints), topic=topic, columns=said, settings=settings)
 
 
-def _settings(columns: dict[str, Any]) -> ColumnSettings:
-    said = dict(columns)
-    if isinstance(said.get('rename'), dict):
-        said['rename'] = tuple(said['rename'].items())
-    for name in ('position_scale', 'effort_scale', 'zero', 'gear'):
-        value = said.get(name)
-        if value is not None:
-            listed = numbers(value) if isinstance(value, str) else np.atleast_1d(value).tolist()
-            said[name] = tuple(listed)
-    try:
-        return ColumnSettings(**said)
-    except TypeError as error:
-        known = ', '.join(ColumnSettings.__dataclass_fields__)
-        raise RecordingError(f'{str(error).split(" ", 1)[1]}; columns take {known}') from None
+def _numbers(given: _Numbers) -> tuple[float, ...]:
+    return numbers(given) if isinstance(given, str) else tuple(np.atleast_1d(given).tolist())

@@ -19,6 +19,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
+    spelled,
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
@@ -270,6 +271,7 @@ class DiagnosisResult(ShownModel):
         return [f'baseline: {sources}'] if sources else []
 
 
+@spelled
 def diagnose(
     arm: RobotLike | IdentificationResult,
     recordings: RecordingLike | Sequence[RecordingLike],

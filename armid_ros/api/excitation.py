@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING, Unpack
+from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
-    arm_of,
-    DesignKeywords,
+    drivable,
     RecordingLike,
     recordings_of,
     Rng,
     RobotLike,
+    spelled,
 )
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel
@@ -47,7 +47,6 @@ from armid_ros.identification.rows.signals import conditioning, segments
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.recording import Recording, write_joint_trajectory
 from armid_ros.recording.curves import draw_joints
-from armid_ros.robots import joints_beside_arms
 import numpy as np
 import numpy.typing as npt
 
@@ -160,7 +159,7 @@ class ExcitationResult(Shown):
         core = replace(self.core, excitation=self.run.excitation)
         information, settings = core.information, core.settings
         used = core.limits_used(self.arm)
-        nearest, floor = self.fitness.nearest, self.scene.floor
+        nearest, low, floor = self.fitness.nearest, self.fitness.lowest, self.scene.floor
         return {
             'schema': SCHEMA,
             'robot': origin.of(self.arm.robot).robot,
@@ -175,23 +174,19 @@ class ExcitationResult(Shown):
             'approach': self.run.approach.duration,
             'trajectory_duration': self.run.duration,
             'floor': {'height': floor.height, 'source': floor.source},
-            'lowest_point': {
-                'height': _finite(self.fitness.lowest.height),
-                'link': self.fitness.lowest.link,
-                'time': self.fitness.lowest.time,
-            },
+            'lowest_point': {'height': low.height, 'link': low.link, 'time': low.time},
             'speed': settings.speed,
             'criterion': settings.criterion,
             'cost': core.cost,
             'stopped': core.stopped,
             'seed': self.seed,
-            'condition_number': _finite(information.condition),
-            'log_det': _finite(information.log_det),
+            'condition_number': information.condition,
+            'log_det': information.log_det,
             'rank': int(np.count_nonzero(np.isfinite(information.std))),
             'clearance': None if nearest is None else nearest.distance,
             'limits_used': {name: share.tolist() for name, share in used.items()},
             'parameters': [
-                {'name': name.name, 'joint': name.joint, 'std': _finite(std), 'unit': name.unit}
+                {'name': name.name, 'joint': name.joint, 'std': std, 'unit': name.unit}
                 for name, std in zip(information.parameters, information.std, strict=True)
             ],
         }
@@ -226,8 +221,8 @@ class ExcitationResult(Shown):
             save_excitation(self.core.excitation, folder / name)
         for name in ('excitation.yaml', 'excitation.csv'):  # where a way there is found
             save_excitation(self.run.excitation, folder / name)
-        urdf = self.arm.robot.urdf
-        write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=urdf)
+        robot = self.arm.robot
+        write_joint_trajectory(folder / BAG, self.run.motion(), robot_description=robot.urdf)
         document = self.document(origin)
         write_file(folder / 'excitation.json', json_text(document, indent=1))
         page = folder / 'report.html'
@@ -262,23 +257,19 @@ class ExcitationResult(Shown):
             return [f'there is no way to the trajectory: {error}']
         robot = self.arm.robot
         fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
-        pose = [
-            f'{joint} {value:.3g} {unit}'
-            for joint, value, unit in zip(
-                robot.joints, self.start, robot.position_units, strict=True
-            )
-            if value
-        ]
+        parts = zip(robot.joints, self.start, robot.position_units, strict=True)
+        pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
         why = f' (the zero of the description is not free: {fault})' if fault else ''
         begin = f'starts at rest at {", ".join(pose) or "zero"}{why}'
         on = f'is on the trajectory after {run.approach.duration:.1f} s'
         lines = ['not checked: ' + '; '.join(fit.unchecked)] if fit.unchecked else []
-        lines.append(str(fit).partition('; not checked: ')[0])
-        lines.append(f'{begin}, {on} and back after {run.duration:.1f} s')
+        end = f'{begin}, {on} and back after {run.duration:.1f} s'
+        lines += [str(fit).partition('; not checked: ')[0], end]
         early = f'stopped early ({self.core.stopped}): not what the seed would give'
         return [*lines, early] if self.core.stopped else lines
 
 
+@spelled
 def design_excitation(
     arm: RobotLike,
     *,
@@ -293,7 +284,18 @@ def design_excitation(
     after: RecordingLike | Sequence[RecordingLike] = (),
     rival: ArmModel | None = None,
     progress: Callable[[DesignProgress], None] | None = None,
-    **settings: Unpack[DesignKeywords],
+    speed: str | float = 'fast',
+    criterion: str = 'D',
+    target: str = 'all',
+    focus: tuple[str, ...] = (),
+    harmonics: int = 5,
+    acceleration: FloatArray | None = None,
+    noise: FloatArray | None = None,
+    clearance: float = 0.01,
+    starts: int | None = None,
+    iterations: int = 200,
+    candidates: int = 60,
+    time_budget: float | None = None,
 ) -> ExcitationResult:
     """
     Find a trajectory that shows the parameters, inside all limits and free of collisions.
@@ -316,8 +318,8 @@ def design_excitation(
     environment : str or Path, optional
         YAML with what stands around the arm, or a planning scene of MoveIt.
     joint_limits : str, Path or mapping of str to float, optional
-        ``joint_limits.yaml`` of MoveIt, or the velocity limit of joints by name [rad/s or m/s].
-        A joint without any velocity limit gets a slow one, which the summary names.
+        ``joint_limits.yaml`` of MoveIt (position, velocity, acceleration), or velocity limits by
+        name [rad/s or m/s]. A joint without any gets a slow one, which the summary names.
     scene : CollisionScene, optional
         Bodies, floor and surroundings, in place of ``floor`` and ``environment``.
     start : ndarray, shape (n,), optional
@@ -348,8 +350,6 @@ def design_excitation(
         that they begin with.
     time_budget : float
         Processor time [s]: by default 120, and above 20 joints 25.
-    **settings
-        Any of those from `speed` on.
 
     Returns
     -------
@@ -370,23 +370,34 @@ def design_excitation(
     12.0
 
     """
-    model = arm_of(arm)
-    others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
-    if others:
-        kept = ', '.join(repr(joint) for joint in model.robot.joints if joint not in others)
-        raise TrajectoryError(
-            f'{arm}: {", ".join(others)} belong to no arm; choose what is driven with '
-            f'ar.load_robot({str(arm)!r}, joints=[{kept}])'
-        )
+    model = drivable(arm)
     if joint_limits is not None:
-        model, known = _limited(model, joint_limits)
-        settings.setdefault('acceleration', known)
-    many = model.robot.n_joints > _MANY_JOINTS
-    usual: DesignKeywords = {'time_budget': 25.0, 'starts': 1} if many else {'time_budget': 120.0}
+        named = joint_limits if isinstance(joint_limits, Mapping) else {}
+        file = None if isinstance(joint_limits, Mapping) else joint_limits
+        velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
+        robot, known = with_joint_limits(model.robot, file, velocity)
+        model = replace(model, robot=robot)
+        acceleration = known if acceleration is None else acceleration
+    searches, seconds = (1, 25.0) if model.robot.n_joints > _MANY_JOINTS else (4, 120.0)
     run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
     period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
-    usual.update(settings)
-    asked = DesignSettings(period=period, n_periods=periods, run_in=run_in, **usual)
+    asked = DesignSettings(
+        period=period,
+        n_periods=periods,
+        run_in=run_in,
+        speed=speed,
+        criterion=criterion,
+        target=target,
+        focus=focus,
+        harmonics=harmonics,
+        acceleration=acceleration,
+        noise=noise,
+        clearance=clearance,
+        starts=searches if starts is None else starts,
+        iterations=iterations,
+        candidates=candidates,
+        time_budget=seconds if time_budget is None else time_budget,
+    )
     if scene is None:
         height = None if floor is None else str(floor)
         scene = CollisionScene.of(model.robot, asked.clearance, height, environment)
@@ -405,19 +416,11 @@ def design_excitation(
         rival=rival,
         progress=progress,
     )
-    names = tuple(recording.source for recording in earlier)
+    names = tuple(one.source for one in earlier)
     return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
 
 
-def _limited(
-    model: ArmModel, given: str | Path | Mapping[str, float]
-) -> tuple[ArmModel, FloatArray | None]:
-    """Return the model with velocity limits of a file or by name, and acceleration limits."""
-    named = given if isinstance(given, Mapping) else {}
-    file = None if isinstance(given, Mapping) else given
-    velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
-    robot, acceleration = with_joint_limits(model.robot, file, velocity)
-    return replace(model, robot=robot), acceleration
+excite = design_excitation  # as the command is called
 
 
 def _planner(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -> TransferPlanner:
@@ -440,11 +443,5 @@ def _information(
     for recording in recordings:
         for motion in segments(recording, used):
             thinned = motion.select(slice(None, None, used.decimation))
-            duration = float(motion.t[-1] - motion.t[0])
-            matrix += problem.information(thinned, duration * settings.rate).matrix
+            matrix += problem.information(thinned, np.ptp(motion.t) * settings.rate).matrix
     return matrix
-
-
-def _finite(value: float) -> float | None:
-    """Return a number, or None where JSON has none for it."""
-    return float(value) if np.isfinite(value) else None

@@ -16,6 +16,7 @@ from armid_ros.api.arguments import (
     Rng,
     robot_of,
     RobotLike,
+    spelled,
     topics_of,
 )
 from armid_ros.api.identification import identify
@@ -109,6 +110,7 @@ class InspectionResult(Shown):
         )
 
 
+@spelled
 def inspect(
     recording: RecordingLike,
     robot: RobotLike | None = None,
@@ -234,6 +236,7 @@ class CheckResult(Shown):
         return Summary(first, '', heads, [row[:3] for row in rows], lines)
 
 
+@spelled
 def check(
     robot: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike] = (),

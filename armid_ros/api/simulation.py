@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from armid_ros.api.arguments import arm_of, Rng, RobotLike
+from armid_ros.api.arguments import arm_of, Rng, RobotLike, spelled
 from armid_ros.api.excitation import ExcitationResult
 from armid_ros.arm import ArmModel
 from armid_ros.excitation import design, DesignSettings, Excitation, load_excitation
@@ -22,6 +22,7 @@ import numpy as np
 _FINE = 1000.0
 
 
+@spelled
 def simulate(
     arm: RobotLike,
     trajectory: ExcitationResult | Excitation | Motion | str | Path | None = None,
