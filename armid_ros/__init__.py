@@ -29,8 +29,9 @@ from armid_ros.version import __version__ as __version__
 if TYPE_CHECKING:
     from armid_ros.api.arguments import read_recording
     from armid_ros.api.comparison import compare, ComparisonResult
+    from armid_ros.api.design import design_excitation, excite
     from armid_ros.api.diagnosis import diagnose, DiagnosisResult
-    from armid_ros.api.excitation import design_excitation, ExcitationResult, excite
+    from armid_ros.api.excitation import ExcitationResult
     from armid_ros.api.identification import IdentificationResult, identify
     from armid_ros.api.inspection import check, inspect, InspectionResult
     from armid_ros.api.simulation import simulate
@@ -72,8 +73,8 @@ _HOMES = {
     'compare': 'armid_ros.api.comparison',
     'ComparisonResult': 'armid_ros.api.comparison',
     'simulate': 'armid_ros.api.simulation',
-    'design_excitation': 'armid_ros.api.excitation',
-    'excite': 'armid_ros.api.excitation',
+    'design_excitation': 'armid_ros.api.design',
+    'excite': 'armid_ros.api.design',
     'ExcitationResult': 'armid_ros.api.excitation',
     'Estimate': 'armid_ros.estimate',
     'ArmidError': 'armid_ros.errors',

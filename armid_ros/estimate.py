@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import re
 from statistics import NormalDist
 
@@ -30,12 +30,15 @@ class ParameterName:
         The joint it belongs to; empty for a parameter of the whole arm.
     unit : str
         SI unit, such as 'kg m^2' or 'N m s/rad'.
+    effect : str
+        Name of the effect it belongs to; empty for the rigid body.
 
     """
 
     name: str
     joint: str
     unit: str
+    effect: str = field(default='', compare=False)
 
     @property
     def words(self) -> str:
@@ -81,6 +84,8 @@ class Estimate:
     --------
     >>> import armid_ros as ar
     >>> estimate = ar.identify('my_arm.urdf', 'monday').estimate
+    >>> bool(0.29 < estimate['viscous_friction', 'elbow'] < 0.31)
+    True
     >>> k = estimate.index('viscous_coefficient', 'elbow')
     >>> low, high = estimate.interval()[k]  # 95 %
     >>> bool(0.29 < low < high < 0.31)
@@ -122,6 +127,16 @@ class Estimate:
         """Return lower and upper ends of confidence intervals, shape (P, 2)."""
         reach = NormalDist().inv_cdf(0.5 + confidence / 2.0) * self.std
         return np.column_stack([self.values - reach, self.values + reach])
+
+    def __getitem__(self, key: str | tuple[str, str]) -> float:
+        """Return a value by name and joint: of a parameter, or of an effect that has one."""
+        name, joint = (key, '') if isinstance(key, str) else key
+        own = [
+            k
+            for k, one in enumerate(self.parameters)
+            if (one.effect, one.joint) == (name, joint) and one.name.isidentifier()
+        ]
+        return float(self.values[own[0] if len(own) == 1 else self.index(name, joint)])
 
     def index(self, name: str, joint: str = '') -> int:
         """Return the position of a parameter; ModelError lists those that exist."""

@@ -115,6 +115,14 @@ class Motion:
                     f'{expected[1]} joints need {expected}'
                 )
 
+    @classmethod
+    def of_states(
+        cls, joints: tuple[str, ...], q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike
+    ) -> Motion:
+        """Return states as a motion, one a second; arrays of shape (N, n) or (n,), or numbers."""
+        parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
+        return cls(joints, np.arange(len(parts[0]), dtype=float), *parts)
+
     def __len__(self) -> int:
         """Return the number of samples N."""
         return len(self.t)

@@ -14,6 +14,9 @@ from typing import ParamSpec, TypeVar
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import meant, RecordingError, TrajectoryError
+from armid_ros.identification import SignalSettings
+from armid_ros.identification.rows.signals import conditioning, no_stretch, segments
+from armid_ros.motion import Motion
 from armid_ros.recording import ReadSettings, Recording, Topic
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.message_types import JOINT_STATE
@@ -156,6 +159,17 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
         return replace(recording, source=source if count == 1 else f'{source} {count}')
 
     return tuple([named(recording) for recording in group] for group in groups)
+
+
+def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
+    """Return the longest stretch of a recording as identification takes it: `Recording.motion`."""
+    measured = recording.tau is not None
+    taken = recording if measured else replace(recording, tau=np.zeros_like(recording.q))
+    used = conditioning([taken], SignalSettings(cutoff))
+    found = max(segments(taken, used), key=len, default=None)
+    if found is None:
+        raise no_stretch(recording, used)
+    return found if measured else replace(found, tau=None)
 
 
 @spelled

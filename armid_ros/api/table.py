@@ -140,6 +140,10 @@ class Shown(ABC):
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return the result for programs."""
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result for programs, as its JSON file has it."""
+        return self.document()
+
     @abstractmethod
     def page(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> str:
         """Return the report, one HTML file."""

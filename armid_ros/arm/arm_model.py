@@ -253,48 +253,47 @@ class ArmModel:
         return inverse_dynamics_derivatives(self.body, self.felt(motion))
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
-        """
-        Differentiate what holds the links by their position and velocity.
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (N, n, n), or None
-            None where nothing does.
-
-        """
+        """Differentiate what holds the links by q and dq, each (N, n, n); None if nothing does."""
         law = self.along(motion).action().link_torque
         return None if law is None else law_derivatives(law, self.link_motion(motion))
 
     def joint_torque(self, motion: Motion) -> FloatArray:
-        """
-        Return the true torques of a recorded motion: what sensors of no error would read.
-
-        Returns
-        -------
-        ndarray, shape (N, n)
-            Actuator torque [N m].
-
-        """
+        """Return what sensors of no error would read along a motion, shape (N, n) [N m or N]."""
         link = self.link_motion(motion)
         load = self.load(link)
         return load + self.along(motion).action().effort(motion, link, load)
 
-    def torque(self, motion: Motion) -> FloatArray:
+    def torque(
+        self, motion: Motion | npt.ArrayLike, dq: npt.ArrayLike = 0.0, ddq: npt.ArrayLike = 0.0
+    ) -> FloatArray:
         """
         Predict what the torque sensors read along a recorded motion, all effects included.
 
         Parameters
         ----------
-        motion : Motion
-            As the position sensors have it. Its torque, if it has one, counts only for drives
-            that report more than they give.
+        motion : Motion, or array of shape (N, n) or (n,)
+            As the position sensors have it, or positions alone [rad or m]. The torque of a motion
+            counts only for drives that report more than they give.
+        dq, ddq : array_like of the same shape
+            Velocities and accelerations at positions; zero by default.
 
         Returns
         -------
-        ndarray, shape (N, n)
-            Actuator torque as read [N m].
+        ndarray, shape (N, n) or (n,)
+            Actuator torque as read [N m or N].
+
+        Raises
+        ------
+        ModelError
+            An effect needs more than the moment: positions have no times.
 
         """
+        if not isinstance(motion, Motion):
+            past = [effect.name for effect in self.effects if not effect.instantaneous]
+            if past:
+                raise ModelError(f'{", ".join(past)} of {self.robot.name}: pass an ar.Motion')
+            states = Motion.of_states(self.robot.joints, motion, dq, ddq)
+            return self.torque(states).reshape(np.shape(motion))
         tau = self.joint_torque(motion)
         reading = self._acting.reading
         return tau if reading is None else reading(motion, tau)

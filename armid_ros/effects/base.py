@@ -255,7 +255,7 @@ class Effect(ABC):
     def parameters(self, robot: Robot) -> tuple[ParameterName, ...]:
         """Name the P parameters, owner by owner."""
         return tuple(
-            ParameterName(q.name, owner, joint_unit(q.unit, owner, robot))
+            ParameterName(q.name, owner, joint_unit(q.unit, owner, robot), self.name)
             for owner in self.owners
             for q in self.quantities
         )

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 import re
 from typing import Any
@@ -63,7 +62,9 @@ def identification_document(
         'scatter': result.scatter.tolist(),
         'grouping': list(result.base.terms),
         'not_identified': [
-            {**asdict(lost.parameter), 'reason': lost.reason} for lost in result.unidentified
+            {'name': one.name, 'joint': one.joint, 'unit': one.unit, 'reason': lost.reason}
+            for lost in result.unidentified
+            for one in [lost.parameter]
         ],
         'condition_number': result.condition_number,
         'rank': result.base.rank,

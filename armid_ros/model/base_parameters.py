@@ -12,7 +12,7 @@ factorisation in which the length that is left of each column reveals the rank.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from armid_ros.estimate import ParameterName
 from armid_ros.model.rigid_body import (
@@ -197,9 +197,7 @@ def _named(
 ) -> BaseParameters:
     grouping = np.where(np.abs(grouping) < RANK_TOLERANCE, 0.0, grouping)
     parameters = tuple(
-        ParameterName(
-            _expression(row, leader, standard), standard[leader].joint, standard[leader].unit
-        )
+        replace(standard[leader], name=_expression(row, leader, standard))
         for row, leader in zip(grouping, independent, strict=True)
     )
     return BaseParameters(standard, parameters, independent, read_only(grouping))

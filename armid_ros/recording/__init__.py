@@ -20,13 +20,11 @@ from armid_ros.recording.message_types import string_cdr
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.reader import read_recording, read_robot_description
 from armid_ros.recording.recording import (
-    given_twice,
     PartnerMotion,
     PositionRange,
     ReadReport,
     recorded_together,
     Recording,
-    require_once,
     TimeGap,
 )
 from armid_ros.recording.settings import ReadSettings
@@ -36,6 +34,7 @@ from armid_ros.recording.trajectory import (
     read_waypoints,
     write_joint_trajectory,
 )
+from armid_ros.recording.twice import given_twice, require_once
 from armid_ros.recording.writer import BagWriter
 
 __all__ = [

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import Literal, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
-from armid_ros.motion import FloatArray, read_only
+from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.recording.curves import draw_joints
 from armid_ros.robots import Robot
 import numpy as np
@@ -352,6 +353,32 @@ class Recording:
             raise RecordingError(f'{self.source or "recording"}: {quantity} was not recorded')
         return draw_joints(self.joints, {'measured': (self.t, values)}, _LABELS[quantity])
 
+    def motion(self, cutoff: float | None = None) -> Motion:
+        """
+        Return filtered positions, velocities and accelerations, with the torque as recorded.
+
+        Parameters
+        ----------
+        cutoff : float, optional
+            Cut-off of the position filter [Hz]; from the noise by default.
+
+        Returns
+        -------
+        Motion
+            The longest stretch without a gap, on even times, without both ends, where the filter
+            has no neighbours.
+
+        Raises
+        ------
+        IdentificationError
+            No stretch is long enough, or the cut-off is beyond half of the rate.
+
+        """
+        # the filters of identification are above this package
+        filtered = import_module('armid_ros.api.arguments').motion_of(self, cutoff)
+        assert isinstance(filtered, Motion)
+        return filtered
+
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
         """Return the recording at some of its samples, on the same time base."""
         return replace(
@@ -404,43 +431,3 @@ def recorded_together(
         )
     q = CubicSpline(other.t, other.q)(t[inside])
     return replace(recording.select(inside), partner=PartnerMotion(robot, tuple(ties), q))
-
-
-def given_twice(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> str:
-    """
-    Say which recordings are among those that are fitted already.
-
-    What is fitted twice counts twice, and what is fitted is not held out. Two runs of a simulated
-    trajectory have the same positions; only the same torques as well make them one.
-
-    Parameters
-    ----------
-    fitted, held_out : sequence of Recording
-        What a model is fitted to, and what it is only to predict.
-
-    Returns
-    -------
-    str
-        Their names, and those of what they are the same as; empty if there are none.
-
-    """
-    again = [
-        a.source if a.source == b.source else f'{a.source} (is {b.source})'
-        for k, a in enumerate([*fitted, *held_out])
-        for b in fitted[:k]
-        if _same(a, b)
-    ]
-    return f'given twice, or in two roles: {", ".join(dict.fromkeys(again))}' if again else ''
-
-
-def require_once(fitted: Sequence[Recording], held_out: Sequence[Recording] = ()) -> None:
-    """Raise a RecordingError that names the recordings that are given twice."""
-    said = given_twice(fitted, held_out)
-    if said:
-        raise RecordingError(f'{said}; give each recording once')
-
-
-def _same(a: Recording, b: Recording) -> bool:
-    if a.tau is None or b.tau is None:
-        return a.tau is b.tau and np.array_equal(a.q, b.q)
-    return np.array_equal(a.q, b.q) and np.array_equal(a.tau, b.tau)

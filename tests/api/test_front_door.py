@@ -240,3 +240,38 @@ def test_a_bag_is_read_without_a_robot(tmp_path, runs):
     np.testing.assert_array_equal(read.tau, runs[0].tau)
     with pytest.raises(ar.ArmidError, match='/joint_states'):
         ar.read_recording(tmp_path / 'run', topic='/other')
+
+
+def test_a_recording_is_a_motion_whose_torque_an_arm_predicts(arm, runs):
+    motion = runs[0].motion()
+    np.testing.assert_allclose(arm.torque(motion), motion.tau, atol=0.05)
+    bare = ar.Recording(joints=runs[0].joints, t=runs[0].t, q=runs[0].q).motion(cutoff=20.0)
+    assert bare.tau is None and bare.ddq.shape == bare.q.shape
+    with pytest.raises(ar.ArmidError, match='no stretch'):
+        runs[0].select(slice(50)).motion()
+
+
+def test_an_arm_predicts_torques_of_arrays(arm, excitation):
+    motion = excitation.motion()
+    whole = arm.torque(motion)
+    np.testing.assert_allclose(arm.torque(motion.q, motion.dq, motion.ddq), whole)
+    np.testing.assert_allclose(arm.torque(motion.q[9], motion.dq[9], motion.ddq[9]), whole[9])
+    assert arm.torque(np.zeros(6)).shape == (6,)
+    with pytest.raises(ar.ArmidError, match=r'\(1, 5\)'):
+        arm.torque(np.zeros(5))
+    late = arm.with_effect(ar.make_effect('torque_lag', arm.robot), [0.01] * 6)
+    with pytest.raises(ar.ArmidError, match=r'torque_lag .*Motion'):
+        late.torque(motion.q)
+
+
+def test_a_value_has_the_name_of_its_effect_or_parameter(model):
+    estimate = model.estimate
+    value = estimate['viscous_friction', 'elbow_pitch']
+    assert value == estimate['viscous_coefficient', 'elbow_pitch'] == pytest.approx(0.1, abs=0.01)
+    with pytest.raises(ar.ArmidError, match='viscous_coefficient'):
+        _ = estimate['viscous_friction', 'elbow']
+
+
+def test_every_result_is_a_dict(model, excitation, runs):
+    for result in (model, excitation, ar.inspect(runs[0])):
+        assert result.to_dict() == result.document()

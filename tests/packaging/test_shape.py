@@ -15,7 +15,7 @@ LONG: set[str] = set()
 MANY = {
     'api/arguments.py:read_recording',  # what a user types is spelled out
     'api/diagnosis.py:diagnose',
-    'api/excitation.py:design_excitation',
+    'api/design.py:design_excitation',
     'api/identification.py:identify',
     'diagnosis/diagnose.py:diagnose',  # what may be known of a gap is spelled out
 }

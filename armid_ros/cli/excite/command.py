@@ -205,7 +205,8 @@ def excite(
     **settings: Any,
 ) -> None:
     """Design a trajectory that shows the parameters, inside all limits and free of collisions."""
-    from armid_ros.api.excitation import design_excitation, SCHEMA
+    from armid_ros.api.design import design_excitation
+    from armid_ros.api.excitation import SCHEMA
     from armid_ros.api.table import ResultOrigin
     from armid_ros.cli import options
     from armid_ros.cli.excite.springs import (

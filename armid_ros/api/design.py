@@ -1,0 +1,230 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The search for a trajectory that shows the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from armid_ros.api.arguments import (
+    drivable,
+    RecordingLike,
+    recordings_of,
+    Rng,
+    RobotLike,
+    spelled,
+)
+from armid_ros.api.excitation import ExcitationResult, planner_of, WAYPOINT_RATE
+from armid_ros.arm import ArmModel
+from armid_ros.errors import TrajectoryError
+from armid_ros.excitation import (
+    CollisionScene,
+    design,
+    DesignProblem,
+    DesignProgress,
+    DesignSettings,
+    whole_period,
+    with_joint_limits,
+)
+from armid_ros.identification import SignalSettings
+from armid_ros.identification.rows.signals import conditioning, segments
+from armid_ros.motion import FloatArray
+from armid_ros.recording import Recording
+import numpy as np
+
+#: Of more joints one search is made by default: each step of it takes seconds.
+_MANY_JOINTS = 20
+#: Of the run-in and the run-out [s], and at most this share of the duration.
+_RUN_IN, _RUN_IN_SHARE = 2.0, 0.1
+
+
+@spelled
+def design_excitation(
+    arm: RobotLike,
+    *,
+    duration: float = 24.0,
+    periods: int = 2,
+    rng: Rng = 0,
+    floor: str | float | None = None,
+    environment: str | Path | None = None,
+    joint_limits: str | Path | Mapping[str, float] | None = None,
+    scene: CollisionScene | None = None,
+    start: FloatArray | None = None,
+    after: RecordingLike | Sequence[RecordingLike] = (),
+    rival: ArmModel | None = None,
+    progress: Callable[[DesignProgress], None] | None = None,
+    speed: str | float = 'fast',
+    criterion: str = 'D',
+    target: str = 'all',
+    focus: tuple[str, ...] = (),
+    harmonics: int = 5,
+    acceleration: FloatArray | None = None,
+    noise: FloatArray | None = None,
+    clearance: float = 0.01,
+    starts: int | None = None,
+    iterations: int = 200,
+    candidates: int = 60,
+    time_budget: float | None = None,
+) -> ExcitationResult:
+    """
+    Find a trajectory that shows the parameters, inside all limits and free of collisions.
+
+    The arm, its floor and its surroundings are checked as by ``armid excite``.
+
+    Parameters
+    ----------
+    arm : model, robot, name or path
+        What is to be identified.
+    duration : float
+        Of the whole run [s].
+    periods : int
+        How often the trajectory is run through; two tell noise from what a model lacks.
+    rng : int or Generator
+        Seed, or source of randomness.
+    floor : str or float, optional
+        Height of the floor above the origin of the base [m], or 'none'; by default the base plane
+        of an arm that stands, or what is shipped with the robot.
+    environment : str or Path, optional
+        YAML with what stands around the arm, or a planning scene of MoveIt.
+    joint_limits : str, Path or mapping of str to float, optional
+        ``joint_limits.yaml`` of MoveIt (position, velocity, acceleration), or velocity limits by
+        name [rad/s or m/s]. A joint without any gets a slow one, which the summary names.
+    scene : CollisionScene, optional
+        Bodies, floor and surroundings, in place of ``floor`` and ``environment``.
+    start : ndarray, shape (n,), optional
+        Pose to leave from and to return to [rad or m]; the free pose nearest to zero by default.
+    after : recording or path, or several
+        Recordings whose information the trajectory adds to.
+    rival : ArmModel, optional
+        With ``criterion='T'``: what may be there in place of the effects of ``arm``.
+    progress : callable, optional
+        Called with the progress of the search.
+    speed : str or float
+        'slow', 'medium', 'fast' or a share of the velocity and acceleration limits.
+    criterion : {'D', 'A', 'E', 'condition', 'T'}
+        What is made best; 'T' tells the arm from ``rival``.
+    target : {'all', 'gravity', 'effects'}
+        Of which parameters.
+    focus : tuple of str
+        Names of effects to see best, everything else being fitted too.
+    harmonics : int
+        Fourier harmonics per joint.
+    acceleration, noise : ndarray, shape (n,)
+        Acceleration limits [rad/s^2 or m/s^2], by default the top speed in 0.25 s; standard
+        deviation of the torque noise [N m or N], by default 1 % of the torque limits.
+    clearance : float
+        Distance between bodies that may touch [m].
+    starts, iterations, candidates : int
+        Searches, by default 4, and 1 above 20 joints; iterations of each; random trajectories
+        that they begin with.
+    time_budget : float
+        Processor time [s]: by default 120, and above 20 joints 25.
+
+    Returns
+    -------
+    ExcitationResult
+        Prints as a table; ``motion``, ``report``, ``save``.
+
+    Raises
+    ------
+    TrajectoryError
+        No trajectory is inside the limits, with the limit or the bodies that touch; or the height
+        of the floor is unknown.
+
+    Examples
+    --------
+    >>> import armid_ros as ar
+    >>> plan = ar.design_excitation('my_arm.urdf', duration=12.0, starts=1, iterations=5)
+    >>> round(plan.duration, 1)
+    12.0
+
+    """
+    model = drivable(arm)
+    if joint_limits is not None:
+        model, known = _limited(model, joint_limits)
+        acceleration = known if acceleration is None else acceleration
+    searches, seconds = (1, 25.0) if model.robot.n_joints > _MANY_JOINTS else (4, 120.0)
+    run_in = min(_RUN_IN, _RUN_IN_SHARE * duration)
+    period = whole_period(duration, periods, run_in, WAYPOINT_RATE)
+    asked = DesignSettings(
+        period=period,
+        n_periods=periods,
+        run_in=run_in,
+        speed=speed,
+        criterion=criterion,
+        target=target,
+        focus=focus,
+        harmonics=harmonics,
+        acceleration=acceleration,
+        noise=noise,
+        clearance=clearance,
+        starts=searches if starts is None else starts,
+        iterations=iterations,
+        candidates=candidates,
+        time_budget=seconds if time_budget is None else time_budget,
+    )
+    if scene is None:
+        height = None if floor is None else str(floor)
+        scene = CollisionScene.of(model.robot, asked.clearance, height, environment)
+    earlier = recordings_of(after, model.robot)
+    return _searched(model, asked, scene, start, earlier, rng, rival, progress)
+
+
+excite = design_excitation  # as the command is called
+
+
+def _searched(
+    model: ArmModel,
+    asked: DesignSettings,
+    scene: CollisionScene,
+    start: FloatArray | None,
+    earlier: Sequence[Recording],
+    rng: Rng,
+    rival: ArmModel | None,
+    progress: Callable[[DesignProgress], None] | None,
+) -> ExcitationResult:
+    """Search for the trajectory, once a way to it can be planned."""
+    planner = planner_of(model, asked, scene)
+    if start is None:
+        planner.free_start()  # where there is none, that is said before the search
+    elif fault := planner.fault(start):
+        raise TrajectoryError(f'--start: {fault}')
+    prior = _information(model, asked, earlier, rng) if earlier else None
+    found = design(
+        model,
+        asked,
+        np.random.default_rng(rng),
+        collision=scene.bodies,
+        prior_information=prior,
+        rival=rival,
+        progress=progress,
+    )
+    names = tuple(one.source for one in earlier)
+    return ExcitationResult(found, model, scene, start, names, rng if isinstance(rng, int) else 0)
+
+
+def _limited(
+    model: ArmModel, given: str | Path | Mapping[str, float]
+) -> tuple[ArmModel, FloatArray | None]:
+    """Return the model with velocity limits of a file or by name, and acceleration limits."""
+    named = given if isinstance(given, Mapping) else {}
+    file = None if isinstance(given, Mapping) else given
+    velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
+    robot, acceleration = with_joint_limits(model.robot, file, velocity)
+    return replace(model, robot=robot), acceleration
+
+
+def _information(
+    arm: ArmModel, settings: DesignSettings, recordings: Sequence[Recording], rng: Rng
+) -> FloatArray:
+    """Return the information that recordings hold already, shape (r, r)."""
+    used = conditioning(list(recordings), SignalSettings())
+    problem = DesignProblem.of(arm, settings, np.random.default_rng(rng))
+    matrix = np.zeros(2 * [len(problem.base.parameters)])
+    for recording in recordings:
+        for motion in segments(recording, used):
+            thinned = motion.select(slice(None, None, used.decimation))
+            matrix += problem.information(thinned, np.ptp(motion.t) * settings.rate).matrix
+    return matrix
