@@ -19,6 +19,8 @@ ESTIMATORS = ('ols', 'wls', 'irls', 'iv')
 TIME_UNITS = ('s', 'ms', 'us', 'ns')
 #: `armid_ros.excitation.SPEED_CLASSES`.
 SPEED_CLASSES = ('slow', 'medium', 'fast')
+#: `armid_ros.diagnosis.search.priors.HOW_OFTEN`.
+HOW_OFTEN = ('often', 'usual', 'seldom', 'never')
 #: The longest run [s]; `armid_ros.excitation.schedule.MAX_DURATION`.
 MAX_DURATION = 86400.0
 #: What a design makes best, with what it is; `armid_ros.excitation.CRITERIA`.

@@ -62,8 +62,16 @@ _OPTIONS = (
         help="Columns of positions: 'q{}' where {} is a joint's name or number, 'q[1..7]', or "
         'names with commas; guessed by default.',
     ),
-    _option('--velocity', metavar='C', help="The same of velocities; 'none' leaves them out."),
-    _option('--effort', metavar='C', help='The same of torques, forces or currents.'),
+    _option(
+        '--velocity',
+        metavar='C',
+        help="Columns of velocities, written as for --position; 'none' leaves them out.",
+    ),
+    _option(
+        '--effort',
+        metavar='C',
+        help='Columns of torques, forces or currents, written as for --position.',
+    ),
     _option(
         '--time-unit', type=click.Choice(TIME_UNITS), help='Unit of the time column of a table.'
     ),
@@ -118,7 +126,7 @@ _OPTIONS = (
         metavar='OLD:NEW',
         help='Beginning of joint names in the file, and in the description; of bags too.',
     ),
-    _option('--episode', type=int, metavar='N', help='Of a LeRobot dataset.'),
+    _option('--episode', type=int, metavar='N', help='Episode of a LeRobot dataset.'),
 )
 
 

@@ -36,12 +36,12 @@ import click
     help='Fit links that can be bodies, for identified.urdf and identified.mjcf.xml. By default '
     'where the torque error grows by a tenth at most.',
 )
-@click.option('--total-mass', type=float, help='Of all moving links [kg], with --physical.')
+@click.option('--total-mass', type=float, help='Mass of all moving links [kg], with --physical.')
 @click.option(
     '--mass-range',
     type=float,
     metavar='FACTOR',
-    help='By which a link is lighter or heavier than described at most, with --physical.',
+    help='Factor by which a link may be lighter or heavier than described, with --physical.',
 )
 @click.option(
     '--box',

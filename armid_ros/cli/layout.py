@@ -14,7 +14,7 @@ import click
 @click.command(epilog='Example: armid layout --robot ur10.urdf --namespace left --out layouts')
 @parameters.robot
 @parameters.folder
-@click.option('--namespace', default='', help='Of the nodes, such as left_arm.')
+@click.option('--namespace', default='', help='Namespace of the nodes, as left_arm.')
 @parameters.joints
 def layout(robot_source: str, out: Path, namespace: str, joints: str | None) -> None:
     """Write layouts for PlotJuggler, Foxglove and RViz that show this robot's joints by name."""

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 import shlex
 from typing import Any, TypeVar
 
-from armid_ros.cli.choices import USUAL_EFFECTS
+from armid_ros.cli.choices import HOW_OFTEN, SPEED_CLASSES, USUAL_EFFECTS
 import click
 
 _Command = TypeVar('_Command', bound=Callable[..., Any])
@@ -29,22 +29,28 @@ class OutPath(click.Path):
         return super().convert(value, param, ctx)
 
 
-def _completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Complete the last name of a list with commas: of a shipped robot, or of an effect."""
-    if parameter.name == 'effects':
-        from armid_ros.effects import CATALOGUE
-
-        names = list(CATALOGUE)
-    else:
+def completed(_: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Complete the last name of a list: a shipped robot, an effect, or a word of the option."""
+    before, sign, last = incomplete.rpartition('=' if parameter.name == 'priors' else ',')
+    words = {'gravity': ('earth', 'moon'), 'speed': SPEED_CLASSES, 'priors': HOW_OFTEN}
+    names: Iterable[str] = words.get(str(parameter.name), ())
+    if parameter.name == 'robot_source':
         from armid_ros.robots import shipped_robots
 
-        names = list(shipped_robots())
-    before, comma, last = incomplete.rpartition(',')
-    return [f'{before}{comma}{name}' for name in names if name.startswith(last)]
+        names = shipped_robots()
+    elif not names or (names is HOW_OFTEN and not sign):
+        from armid_ros.effects import CATALOGUE
+
+        names = CATALOGUE
+    return [f'{before}{sign}{name}' for name in names if name.startswith(last)]
 
 
 gravity = click.option(
-    '--gravity', default='earth', show_default=True, help='earth, moon, or a vector x,y,z [m/s^2].'
+    '--gravity',
+    shell_complete=completed,
+    default='earth',
+    show_default=True,
+    help='Gravity: earth, moon, or x,y,z in the base frame [m/s^2].',
 )
 joints = click.option(
     '--joints',
@@ -57,8 +63,8 @@ effects = click.option(
     default=','.join(USUAL_EFFECTS),
     show_default=True,
     metavar='E,...',
-    shell_complete=_completed,
-    help="What acts beside the rigid body; 'E@joint+joint' for some joints only.",
+    shell_complete=completed,
+    help="Effects beside the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
     '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
@@ -98,7 +104,7 @@ validate = click.option(
     help='A bag to predict and not to fit; may be given several times.',
 )
 cutoff = click.option(
-    '--cutoff', type=float, help='Of the position filter [Hz]; from the data by default.'
+    '--cutoff', type=float, help='Cut-off of the position filter [Hz]; from the data by default.'
 )
 decimation = click.option('--decimation', type=int, help='Keep one sample of this many.')
 topic = click.option('--topic', help='JointState topic, where a bag has several.')
@@ -129,7 +135,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         '--robot',
         'robot_source',
         metavar='R',
-        shell_complete=_completed,
+        shell_complete=completed,
         callback=with_packages,
         **values,
     )

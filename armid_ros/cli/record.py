@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @click.option(
     '--effect',
     'texts',
+    shell_complete=parameters.completed,
     multiple=True,
     metavar='NAME:k=v',
     help=f'Such as {EFFECT_EXAMPLES}. Every joint gets the values; for others in single joints '
@@ -36,20 +37,24 @@ if TYPE_CHECKING:
 @click.option(
     '--trajectory', type=click.Path(path_type=Path), help='A YAML, CSV or bag of armid excite.'
 )
-@click.option('--rate', default=1000.0, show_default=True, help='Recorded samples per second.')
+@click.option('--rate', default=1000.0, show_default=True, help='Sample rate to record at [Hz].')
 @click.option(
     '--loop-gain',
     default=1.0,
     show_default=True,
     help='Share of the gains of the velocity loops that drive elastic joints.',
 )
-@click.option('--torque-noise', default=0.0, help='Standard deviation [N m].')
-@click.option('--position-noise', default=0.0, help='Standard deviation [rad].')
-@click.option('--velocity-noise', default=0.0, help='Standard deviation [rad/s].')
+@click.option('--torque-noise', default=0.0, help='Torque noise (std) [N m or N]; default 0.')
+@click.option('--position-noise', default=0.0, help='Position noise (std) [rad or m]; default 0.')
 @click.option(
-    '--acceleration-noise', default=0.0, help='Of accelerometers on links with springs [m/s^2].'
+    '--velocity-noise', default=0.0, help='Velocity noise (std) [rad/s or m/s]; default 0.'
 )
-@click.option('--resolution', default=0.0, help='Step of the encoders [rad].')
+@click.option(
+    '--acceleration-noise',
+    default=0.0,
+    help='Noise (std) of accelerometers on links with springs [m/s^2].',
+)
+@click.option('--resolution', default=0.0, help='Encoder resolution [rad or m]; default 0, none.')
 @parameters.gravity
 @parameters.joints
 @parameters.seed

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from armid_ros.diagnosis.search.priors import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, Kind
 from armid_ros.effects.tied import Partner, TiedInteraction, TiedSlack
-from armid_ros.errors import ModelError
+from armid_ros.errors import meant, ModelError
 from armid_ros.identification import SignalSettings
 
 
@@ -139,8 +139,8 @@ class DiagnosisSettings:
             for word, known, what in ((name, names, 'effect'), (how, HOW_OFTEN, 'frequency')):
                 if word not in known:
                     raise ModelError(
-                        f"prior '{name}={how}': there is no {what} '{word}'; known are: "
-                        f'{", ".join(known)}'
+                        f"prior '{name}={how}': there is no {what} '{word}'"
+                        f'{meant(word, known)}; known are: {", ".join(known)}'
                     )
 
     def without_small_print(self) -> DiagnosisSettings:

@@ -34,12 +34,12 @@ def _out(command: Callable[..., None]) -> Callable[..., None]:
 _scheduler = click.option(
     '--scheduler',
     metavar='ADDRESS',
-    help='Of a Dask cluster, as tcp://host:8786; processes of this machine by default.',
+    help='Address of a Dask cluster, as tcp://host:8786; processes of this machine by default.',
 )
 _workers = click.option(
     '--workers',
     type=click.IntRange(min=1),
-    help='Processes of this machine; one a core by default.',
+    help='Number of processes of this machine; one a core by default.',
 )
 _alpha = click.option(
     '--alpha',
@@ -99,26 +99,34 @@ def _print_json(name: str, **document: Any) -> None:
     'what the first wildcard stands for is the arm.'
 )
 @click.argument('globs', nargs=-1, required=True, metavar='GLOB...')
-@click.option('--robot', 'robot_source', metavar='R', help='Of all arms: shipped name or path.')
+@click.option(
+    '--robot', 'robot_source', metavar='R', help='Robot of all arms: shipped name or path.'
+)
 @click.option(
     '--robots',
     'table',
     metavar='CSV',
-    help='Of each arm: columns arm and robot, if wanted gravity, joints and effects.',
+    help='Table of the arms: columns arm, robot; optional are gravity, joints, effects.',
 )
 @_out
 @_scheduler
 @_workers
-@click.option('--arm', metavar='REGEX', help='Its first group is the arm, in the URL of a bag.')
+@click.option(
+    '--arm',
+    metavar='REGEX',
+    help='Regular expression whose first group is the arm, in the URL of a bag.',
+)
 @options.effects
 @click.option(
     '--method',
     type=click.Choice(['ols', 'wls']),
     default='wls',
     show_default=True,
-    help='All joints alike, or weighted by their noise.',
+    help='Least squares: all joints alike (ols), or weighted by their noise (wls).',
 )
-@click.option('--cutoff', type=float, help='Of the position filter [Hz]; from a few bags, once.')
+@click.option(
+    '--cutoff', type=float, help='Position filter cut-off [Hz]; default: from a few bags.'
+)
 @click.option('--decimation', type=int, help='Keep one sample of this many.')
 @options.topic
 @options.gravity
@@ -240,7 +248,9 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
 @_out
 @_scheduler
 @_workers
-@click.option('--arm', 'arms', multiple=True, help='Which arm; those that `watch` names, if none.')
+@click.option(
+    '--arm', 'arms', multiple=True, help='Arm to diagnose; by default those that `watch` names.'
+)
 @click.option('--all', 'everyone', is_flag=True, help='All arms, whether they changed or not.')
 @_alpha
 @options.as_json

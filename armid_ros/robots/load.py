@@ -13,7 +13,7 @@ import shlex
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
-from armid_ros.errors import RobotError
+from armid_ros.errors import meant, RobotError
 from armid_ros.files import read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots.description import Description, Joint, parse_description, parse_xml, Vector
@@ -86,8 +86,9 @@ def load_robot(
     shipped = isinstance(source, str) and source in shipped_robots()
     path = shipped_path(str(source)) if shipped else Path(source).expanduser()
     if not os.path.lexists(path):
+        guess = meant(str(source), shipped_robots())
         raise RobotError(
-            f'{source}: neither a file nor a shipped robot; shipped are '
+            f'{source}: neither a file nor a shipped robot{guess}; shipped are '
             f'{", ".join(shipped_robots())}'
         )
     if path.is_dir():

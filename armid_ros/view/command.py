@@ -23,9 +23,9 @@ import click
     help='A model.yaml, or the folder that identify or diagnose wrote: its torque is predicted, '
     'and joints that the diagnosis names are coloured.',
 )
-@parameters.robot_described(help='As elsewhere; of the model by default.')
+@parameters.robot_described(help='Shipped name or path; that of the model by default.')
 @click.option('--out', type=click.Path(path_type=Path), help='File to write, .rrd; no window.')
-@click.option('--mark', metavar='A,B,...', help='Joints to be coloured.')
+@click.option('--mark', metavar='A,B,...', help='Joints to colour; default: those named.')
 @columns.options
 @parameters.topic
 @parameters.gravity

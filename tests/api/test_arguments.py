@@ -64,3 +64,11 @@ def test_a_misspelt_keyword_is_answered_with_the_one_that_was_meant(call, wrong,
     assert right in inspect.signature(call).parameters
     with pytest.raises(TypeError, match=rf"{call.__name__}.*'{wrong}'.*'{right}'"):
         call('humanoid_arm', **{wrong: 1})
+
+
+def test_a_misspelt_robot_or_prior_is_answered_with_what_was_meant(run):
+    with pytest.raises(ar.ArmidError, match=r"mean 'humanoid_arm'"):
+        ar.load_robot('humanoid_am')
+    for prior in ({'viscus_friction': 'often'}, {'viscous_friction': 'ofen'}):
+        with pytest.raises(ar.ArmidError, match=r"did you mean '(viscous_friction|often)'"):
+            ar.diagnose('humanoid_arm', run, prior=prior)

@@ -11,6 +11,7 @@ import sys
 from armid_ros.cli import choices
 from armid_ros.cli.commands import main
 from armid_ros.cli.excite.springs import COURSES
+from armid_ros.diagnosis.search.priors import HOW_OFTEN
 from armid_ros.effects import CATALOGUE, USUAL_EFFECTS
 from armid_ros.effects.catalogue import EXAMPLES
 from armid_ros.excitation import CRITERIA, load_excitation, SPEED_CLASSES, TARGETS
@@ -94,6 +95,7 @@ sys.exit(', '.join(sys.modules.keys() & set({HEAVY!r})) or 0)
     [
         (choices.USUAL_EFFECTS, USUAL_EFFECTS),
         (choices.EFFECT_EXAMPLES, EXAMPLES),
+        (choices.HOW_OFTEN, tuple(HOW_OFTEN)),
         (choices.ESTIMATORS, ESTIMATORS),
         (choices.TIME_UNITS, tuple(TIME_UNITS)),
         (choices.MAX_DURATION, MAX_DURATION),

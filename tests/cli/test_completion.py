@@ -8,6 +8,7 @@ import sys
 
 from armid_ros.cli import main
 from click.shell_completion import ShellComplete
+import pytest
 
 
 def completed(*words):
@@ -28,6 +29,22 @@ def test_values_are_completed():
     assert completed('identify', '--effects', 'viscous_friction,stribeck') == [
         'viscous_friction,stribeck_friction'
     ]
+
+
+@pytest.mark.parametrize(
+    ('words', 'found'),
+    [
+        (['simulate', '--effect', 'stri'], ['stribeck_friction']),
+        (['excite', '--effect', 'stri'], ['stribeck_friction']),
+        (['demo', '--hide', 'stri'], ['stribeck_friction']),
+        (['diagnose', '--prior', 'stri'], ['stribeck_friction']),
+        (['diagnose', '--prior', 'stribeck_friction=o'], ['stribeck_friction=often']),
+        (['excite', '--speed', 'm'], ['medium']),
+        (['identify', '--gravity', ''], ['earth', 'moon']),
+    ],
+)
+def test_values_of_an_option_are_completed(words, found):
+    assert completed(*words) == found
 
 
 def test_names_are_completed_without_importing_what_computes(pytestconfig):

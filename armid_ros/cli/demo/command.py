@@ -25,10 +25,17 @@ OUTPUTS = ('bag', 'excitation.yaml', 'model.yaml', 'identification.json', 'repor
 
 
 @click.command(epilog='Example: armid demo --gravity earth --out demo')
-@click.option('--gravity', type=click.Choice(['moon', 'earth']), default='moon', show_default=True)
-@click.option('--rate', default=200.0, show_default=True, help='Joint states per second.')
+@click.option(
+    '--gravity',
+    type=click.Choice(['moon', 'earth']),
+    default='moon',
+    show_default=True,
+    help='Gravity that the arm moves in.',
+)
+@click.option('--rate', default=200.0, show_default=True, help='Sample rate [Hz].')
 @click.option(
     '--hide',
+    shell_complete=parameters.completed,
     default='',
     metavar='E@joint',
     help='Effect that is hidden in the arm and has to be found; random by default.',

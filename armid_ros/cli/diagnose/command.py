@@ -77,6 +77,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     '--prior',
     'priors',
+    shell_complete=parameters.completed,
     multiple=True,
     metavar='E=HOW',
     help='How often an effect happens to this arm: often, usual, seldom or never; may be given '
@@ -84,6 +85,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 )
 @click.option(
     '--effects',
+    shell_complete=parameters.completed,
     default='',
     metavar='E,...',
     help="Effects that the model has already, fitted anew; 'E@joint+joint' for some joints only.",

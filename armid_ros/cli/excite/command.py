@@ -51,14 +51,14 @@ class Speed(click.ParamType[str | float]):
     type=click.Choice([FOURIER, *COURSES]),
     default=FOURIER,
     show_default=True,
-    help='Designed; or for elastic joints, a bag alone: multisines of torque on the move, steps.',
+    help='Kind of trajectory; multisine (of torque) and steps are for elastic joints.',
 )
 @click.option(
     '--share',
     type=click.FloatRange(0.0, 1.0, min_open=True),
     default=0.1,
     show_default=True,
-    help='Of the torque limits (multisine, rms) or of the velocity limits (steps).',
+    help='Share of the torque limits (multisine, rms) or of the velocity limits (steps) to use.',
 )
 @click.option(
     '--duration',
@@ -72,11 +72,14 @@ class Speed(click.ParamType[str | float]):
     type=click.IntRange(min=2),
     default=2,
     show_default=True,
-    help='Identical periods in it; their difference is the noise.',
+    help='Number of identical periods in it; their difference is the noise.',
 )
-@click.option('--harmonics', default=5, show_default=True, help='Fourier harmonics per joint.')
+@click.option(
+    '--harmonics', default=5, show_default=True, help='Number of Fourier harmonics per joint.'
+)
 @click.option(
     '--speed',
+    shell_complete=parameters.completed,
     type=Speed(),
     metavar='S',
     default='fast',
@@ -99,22 +102,25 @@ class Speed(click.ParamType[str | float]):
 )
 @click.option(
     '--focus',
+    shell_complete=parameters.completed,
     default='',
     metavar='E,...',
-    help='Effects to see best, everything else being fitted too.',
+    help='Effects to show best while everything else is fitted too; none by default.',
 )
 @parameters.effects
 @click.option(
     '--effect',
     'texts',
+    shell_complete=parameters.completed,
     multiple=True,
     metavar='NAME:k=v',
-    help='An effect of known size, which counts against the torque limits.',
+    help='Effect of known size, which counts against torque limits. May be given several times.',
 )
 @click.option(
     '--rival',
+    shell_complete=parameters.completed,
     metavar='E,...|none',
-    help='With --criterion T: what may be there in place of --effect.',
+    help='With --criterion T: effects that may be there in place of --effect.',
 )
 @click.option(
     '--model', type=click.Path(path_type=Path), help='model.yaml with what is known of the arm.'
@@ -127,7 +133,7 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--acceleration',
     metavar='A[,...]',
-    help='Limit of each joint [rad/s^2 or m/s^2]; top speed in 0.25 s by default.',
+    help='Acceleration limit of each joint [rad/s^2 or m/s^2]; default: top speed in 0.25 s.',
 )
 @click.option(
     '--joint-limits',
@@ -143,9 +149,11 @@ class Speed(click.ParamType[str | float]):
 @click.option(
     '--torque-noise',
     metavar='N[,...]',
-    help='Standard deviation at each joint [N m or N]; 1 % of the torque limit by default.',
+    help='Torque noise (std) of each joint [N m or N]; default 1 % of the torque limit.',
 )
-@click.option('--clearance', default=0.01, show_default=True, help='Between links [m].')
+@click.option(
+    '--clearance', default=0.01, show_default=True, help='Distance to keep between bodies [m].'
+)
 @click.option(
     '--environment',
     type=click.Path(path_type=Path),
@@ -165,13 +173,17 @@ class Speed(click.ParamType[str | float]):
     help='A bag recorded already: add most to what it tells. May be given several times.',
 )
 @click.option(
-    '--starts', type=click.IntRange(min=1), help='Searches to begin; 4, above 20 joints 1.'
+    '--starts',
+    type=click.IntRange(min=1),
+    help='Number of random restarts; default 4, 1 above 20 joints.',
 )
-@click.option('--iterations', default=150, show_default=True, help='Of each search.')
+@click.option(
+    '--iterations', default=150, show_default=True, help='Number of iterations of each restart.'
+)
 @click.option(
     '--time-budget',
     type=click.FloatRange(min=0.0),
-    help='At most so much processor time for a search [s]; 120, above 20 joints 25.',
+    help='Limit of processor time for the search [s]; default 120, 25 above 20 joints.',
 )
 @parameters.gravity
 @parameters.joints

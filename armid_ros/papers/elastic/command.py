@@ -22,21 +22,25 @@ import click
 )
 @click.option('--demo', is_flag=True, help='Simulate the shipped arm first, and identify that.')
 @click.option(
-    '--experiments', default=48, show_default=True, help='Of 4 s each, that --demo simulates.'
+    '--experiments', default=48, show_default=True, help='Number that --demo simulates, 4 s each.'
 )
-@options.robot_described(default='two_link_elastic', show_default=True, help='The arm.')
+@options.robot_described(
+    default='two_link_elastic', show_default=True, help='Robot: shipped name or path.'
+)
 @click.option(
     '--start',
     type=click.Choice(['found', 'before', 'after']),
     help='What the tuning begins with: what was found by then, or a printed set. By default '
     "the former, with --demo the set 'before', as in the source.",
 )
-@click.option('--accelerometers', metavar='R1,R2', help='Distances from their joints [m].')
+@click.option('--accelerometers', metavar='R1,R2', help='Distances from the joints [m].')
 @click.option('--gear', metavar='N1,N2', help='Turns of the motors per turn of the joints.')
-@click.option('--kp', metavar='K1,K2', help='Of the velocity loop, at the joints [N m s/rad].')
-@click.option('--ki', metavar='K1,K2', help='Of the velocity loop, at the joints [N m/rad].')
 @click.option(
-    '--model', type=click.Path(path_type=Path), help='A model.yaml with inertias, of other arms.'
+    '--kp', metavar='K1,K2', help='Gains of the velocity loops, at the joints [N m s/rad].'
+)
+@click.option('--ki', metavar='K1,K2', help='Integral gains of the same [N m/rad].')
+@click.option(
+    '--model', type=click.Path(path_type=Path), help='model.yaml with inertias, for other arms.'
 )
 @options.folder
 @options.reading

@@ -32,8 +32,15 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     show_default=True,
     help="Whether the machine's inertias are those of its description, or estimated as well.",
 )
-@click.option('--gait', 'gait_file', type=click.Path(path_type=Path), help='CSV; level walking.')
-@click.option('--stiffness', type=float, help='Of simulated springs [N/m]; as assumed by default.')
+@click.option(
+    '--gait',
+    'gait_file',
+    type=click.Path(path_type=Path),
+    help='Gait (CSV); default level walking.',
+)
+@click.option(
+    '--stiffness', type=float, help='Stiffness of simulated springs [N/m]; default: as assumed.'
+)
 @click.option(
     '--motion',
     type=click.Choice(list(EXERCISES)),
@@ -41,9 +48,9 @@ EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
     show_default=True,
     help='What the simulated pair does on one foot.',
 )
-@click.option('--duration', default=10.0, show_default=True, help='Simulated recording [s].')
-@click.option('--torque-noise', default=0.5, show_default=True, help='Simulated [N m].')
-@click.option('--angle-noise', default=0.05, show_default=True, help='Simulated [deg].')
+@click.option('--duration', default=10.0, show_default=True, help='Length of the simulation [s].')
+@click.option('--torque-noise', default=0.5, show_default=True, help='Torque noise (std) [N m].')
+@click.option('--angle-noise', default=0.05, show_default=True, help='Angle noise (std) [deg].')
 @options.seed
 @options.reading
 @options.as_json
