@@ -46,10 +46,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for uri, text in pages.items():
         files.append(File.generated(config, uri, content=text))
     for path in sorted(NOTEBOOKS.glob('*.py')):
-        page, pictures = executed(path)
+        page, beside = executed(path)
         uri = f'notebooks/{path.stem}.md'
         files.append(File.generated(config, uri, content=page))
-        for name, content in pictures.items():
+        for name, content in beside.items():
             files.append(File.generated(config, f'notebooks/{name}', content=content))
     return files
 

@@ -20,7 +20,9 @@ CELL_TIMEOUT = 600
 
 def executed(path: Path) -> tuple[str, dict[str, bytes]]:
     """
-    Return the page of a notebook with what its cells show, and pictures by their names on it.
+    Return the page of a notebook with what its cells show, and files by their names on it.
+
+    The files are its pictures, and the notebook itself as .ipynb.
 
     It runs in its own folder, as an editor would run it.
 
@@ -39,10 +41,13 @@ def executed(path: Path) -> tuple[str, dict[str, bytes]]:
     with _own_kernel():
         run = ExecutePreprocessor(timeout=CELL_TIMEOUT, startup_timeout=CELL_TIMEOUT)
         run.preprocess(notebook, {'metadata': {'path': str(path.parent)}})
+    file = f'{path.stem}.ipynb'
     exporter = MarkdownExporter()
     names = {'unique_key': path.stem, 'output_files_dir': 'pictures'}
     markdown, resources = exporter.from_notebook_node(notebook, resources=names)
-    return markdown, dict(resources['outputs'])
+    link = f'[Download this page as a notebook]({file})\n\n'
+    files = {**resources['outputs'], file: jupytext.writes(notebook, fmt='ipynb').encode()}
+    return link + markdown, files
 
 
 @contextmanager

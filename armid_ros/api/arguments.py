@@ -207,9 +207,9 @@ def read_recording(
     topic : str, optional
         JointState topic, where a bag has several.
     time, position, velocity, effort : str, optional
-        Columns of a table: a name, names with commas, ``'q{}'`` for the joint's name or number,
-        ``'[3..9]'`` for columns by number from 1; ``'none'`` for what is not to be read. Guessed
-        by default.
+        Columns of a table: a name, names with commas, ``'q{}'`` for the joint's name or number;
+        ``'[1..7]'`` for columns without names, counted from 0; ``'none'`` for what is not to be
+        read. Guessed by default.
     time_unit : {'s', 'ms', 'us', 'ns'}, optional
         Unit of the column of time; guessed by default.
     rate_hz : float, optional

@@ -168,6 +168,13 @@ def test_a_recording_is_read_by_robot_or_by_names_from_bags_and_tables(runs, tmp
         )
 
 
+def test_columns_without_names_are_read_by_number_from_zero(runs, tmp_path):
+    path = tmp_path / 'run.csv'
+    np.savetxt(path, np.column_stack([runs[0].t, runs[0].q]), delimiter=',')
+    read = ar.read_recording(path, runs[0].joints, time='[0]', position='[1..6]')
+    np.testing.assert_allclose(read.q, runs[0].q)
+
+
 def test_a_recording_of_other_joints_is_refused(runs):
     with pytest.raises(ar.ArmidError, match='two_link_elastic'):
         ar.identify('two_link_elastic', runs[0])

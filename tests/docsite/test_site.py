@@ -77,4 +77,7 @@ def test_it_can_be_searched(site):
 def test_a_notebook_is_on_the_site_with_what_it_shows(name, site):
     text = (site / 'notebooks' / f'{name}.html').read_text()
     assert text.count('<img') >= 2
+    assert f'href="{name}.ipynb"' in text
+    written = json.loads((site / 'notebooks' / f'{name}.ipynb').read_text())
+    assert any(cell.get('outputs') for cell in written['cells'])
     assert '<iframe' in text or '<table' in text
