@@ -74,7 +74,7 @@ class IdentificationRunNode(ArmidNode):
             'identification',
             'Folder, in which identification and diagnosis get one each.',
         ),
-        NodeParameter('runs', 2, 'How often the excitation is run.', lower=1, upper=20),
+        NodeParameter('runs', 2, 'Number of runs of the excitation.', lower=1, upper=20),
         NodeParameter(
             'rehearse', False, 'Run it slowly first, and go on only if that is as foreseen.'
         ),

@@ -75,7 +75,7 @@ class OnlineIdentifierNode(ListeningNode):
         NodeParameter(
             'estimate_rate',
             10.0,
-            'Of ~/estimate.',
+            'Publishing rate of ~/estimate.',
             'Hz',
             lower=0.1,
             upper=1000.0,

@@ -118,7 +118,13 @@ class SimulatedArmNode(ArmidNode):
     table = (
         *ARM_PARAMETERS,
         NodeParameter(
-            'rate', 1000.0, 'Of joint_states.', 'Hz', lower=0.1, upper=100000.0, read_only=False
+            'rate',
+            1000.0,
+            'Publishing rate of joint_states.',
+            'Hz',
+            lower=0.1,
+            upper=100000.0,
+            read_only=False,
         ),
         NodeParameter(
             'real_time_factor',

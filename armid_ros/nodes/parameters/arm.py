@@ -79,8 +79,10 @@ ARM_PARAMETERS = (
         lower=0.0,
         upper=10.0,
     ),
-    NodeParameter('seed', 0, 'Of the noise.', lower=0, upper=2**62),
-    NodeParameter('time_step', 0.001, 'Of the integration.', 's', lower=1e-5, upper=0.01),
+    NodeParameter('seed', 0, 'Random seed of the noise.', lower=0, upper=2**62),
+    NodeParameter(
+        'time_step', 0.001, 'Time step of the integration.', 's', lower=1e-5, upper=0.01
+    ),
 )
 
 

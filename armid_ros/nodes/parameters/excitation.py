@@ -54,10 +54,12 @@ PUBLISHER_PARAMETERS = (
         '~/start runs next.',
         read_only=False,
     ),
-    NodeParameter('duration', 44.0, 'From rest to rest.', 's', lower=1.0, upper=3600.0),
-    NodeParameter('n_periods', 2, 'Identical periods in it.', lower=1, upper=100),
-    NodeParameter('run_in', 2.0, 'Of the run-in, and the run-out.', 's', lower=0.1, upper=60.0),
-    NodeParameter('harmonics', 5, 'Harmonics of every joint.', lower=1, upper=30),
+    NodeParameter(
+        'duration', 44.0, 'Length of the run, from rest to rest.', 's', lower=1.0, upper=3600.0
+    ),
+    NodeParameter('n_periods', 2, 'Number of identical periods.', lower=1, upper=100),
+    NodeParameter('run_in', 2.0, 'Length of run-in and run-out.', 's', lower=0.1, upper=60.0),
+    NodeParameter('harmonics', 5, 'Number of harmonics per joint.', lower=1, upper=30),
     NodeParameter(
         'speed',
         'slow',
@@ -70,7 +72,7 @@ PUBLISHER_PARAMETERS = (
         list(USUAL_EFFECTS),
         'Effects that are to be seen, beside the rigid body.',
     ),
-    NodeParameter('clearance', 0.01, 'Kept between bodies.', 'm', lower=0.0, upper=1.0),
+    NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', lower=0.0, upper=1.0),
     NodeParameter(
         'floor',
         '',
@@ -84,12 +86,17 @@ PUBLISHER_PARAMETERS = (
         'echo prints it; empty: nothing.',
     ),
     NodeParameter(
-        'design_time', 20.0, 'What the search may take at most.', 's', lower=1.0, upper=86400.0
+        'design_time',
+        20.0,
+        'Limit of processor time of the search.',
+        's',
+        lower=1.0,
+        upper=86400.0,
     ),
     NodeParameter(
         'seed',
         0,
-        'Of the search; the same gives the same, if it has the time.',
+        'Random seed of the search; the same gives the same trajectory.',
         lower=0,
         upper=2**62,
     ),

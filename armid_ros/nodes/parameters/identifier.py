@@ -46,7 +46,7 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'forgetting',
         1.0,
-        'Per sample used; 1 keeps all.',
+        'Forgetting factor per sample used; 1 keeps all.',
         lower=0.9,
         upper=1.0,
         read_only=False,

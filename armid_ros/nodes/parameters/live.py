@@ -38,7 +38,7 @@ LIVE_SETTINGS = (
     NodeParameter(
         'every',
         4.0,
-        'Motion between two diagnoses.',
+        'Length of motion between two diagnoses.',
         's',
         lower=0.5,
         upper=3600.0,
@@ -101,7 +101,7 @@ LIVE_PARAMETERS = (
         'Folder that ~/save writes to: diagnosis.json, model.yaml, report.html.',
         read_only=False,
     ),
-    NodeParameter('seed', 0, 'Of the diagnoses.', lower=0, upper=2**62),
+    NodeParameter('seed', 0, 'Random seed of the diagnoses.', lower=0, upper=2**62),
 )
 
 

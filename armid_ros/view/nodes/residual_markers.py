@@ -51,7 +51,7 @@ class ResidualMarkersNode(ListeningNode):
         NodeParameter(
             'frame', '', 'Frame of the markers; empty: the base link of the description.'
         ),
-        NodeParameter('rate', 20.0, 'Of ~/markers.', 'Hz', lower=0.1, upper=100.0),
+        NodeParameter('rate', 20.0, 'Publishing rate of ~/markers.', 'Hz', lower=0.1, upper=100.0),
         NodeParameter(
             'full',
             0.2,

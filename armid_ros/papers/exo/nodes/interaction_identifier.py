@@ -55,7 +55,7 @@ class InteractionIdentifierNode(ArmidNode):
 
     table = (
         NodeParameter('memory', 10.0, 'How much of the past counts.', 's', lower=3.0, upper=600.0),
-        NodeParameter('period', 2.0, 'Between estimates.', 's', lower=0.1, upper=600.0),
+        NodeParameter('period', 2.0, 'Time between estimates.', 's', lower=0.1, upper=600.0),
         NodeParameter(
             'slack_period',
             30.0,

@@ -38,20 +38,24 @@ class SimulatedPairNode(ArmidNode):
 
     table = (
         NodeParameter('gait', '', 'CSV of one leg over a cycle; empty: level walking.'),
-        NodeParameter('stiffness', 1e4, 'Of all springs.', 'N/m', lower=0.0, upper=1e6),
+        NodeParameter('stiffness', 1e4, 'Stiffness of all springs.', 'N/m', lower=0.0, upper=1e6),
         NodeParameter('segments', list(SEGMENTS), 'Where springs are; without names: none.'),
-        NodeParameter('slack', 0.0, 'Way before springs pull.', 'm', lower=0.0, upper=0.1),
+        NodeParameter('slack', 0.0, 'Slack before springs pull.', 'm', lower=0.0, upper=0.1),
         NodeParameter(
             'driven',
             [''],
             "Joints of the exoskeleton that follow torques, or 'all'; without names: none, all "
             'move as the gait says.',
         ),
-        NodeParameter('torque_rate', 100.0, 'Torque samples.', 'Hz', lower=10.0, upper=1000.0),
+        NodeParameter(
+            'torque_rate', 100.0, 'Sample rate of torques.', 'Hz', lower=10.0, upper=1000.0
+        ),
         NodeParameter('angle_noise', 0.05, 'Standard deviation.', 'deg', lower=0.0, upper=10.0),
         NodeParameter('torque_noise', 0.5, 'Standard deviation.', 'N m', lower=0.0, upper=100.0),
-        NodeParameter('seed', 0, 'Of the noise.', lower=0, upper=2**62),
-        NodeParameter('rate', 1000.0, 'Of both joint states.', 'Hz', lower=50.0, upper=5000.0),
+        NodeParameter('seed', 0, 'Random seed of the noise.', lower=0, upper=2**62),
+        NodeParameter(
+            'rate', 1000.0, 'Publishing rate of both joint states.', 'Hz', lower=50.0, upper=5000.0
+        ),
         NodeParameter(
             'real_time_factor',
             1.0,
