@@ -248,6 +248,7 @@ class Comparison:
         parameters = []
         for change in self.changes:
             row = asdict(change)
+            del row['parameter']['effect']
             parameters.append(row.pop('parameter') | row)
         return {
             'schema': SCHEMA,
