@@ -18,6 +18,7 @@ from armid_ros.api.arguments import (
     Rng,
     RobotLike,
     some_recordings_of,
+    spelled,
     USUAL,
     with_sources_apart,
 )
@@ -185,6 +186,10 @@ class IdentificationResult(ShownModel):
         }
         return draw_joints(self.arm.robot.joints, curves, 'torque [N m or N]')
 
+    def __getitem__(self, key: tuple[str, str]) -> float:
+        """Return a value by effect or parameter and joint: ['viscous_friction', 'elbow']."""
+        return self.estimate[key]
+
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
         return data_frame(self.document()['parameters'])
@@ -301,6 +306,7 @@ class IdentificationResult(ShownModel):
         return [f'no links that are bodies fit as well (torque error {grows} larger): --physical']
 
 
+@spelled
 def identify(
     arm: RobotLike,
     recordings: RecordingLike | Sequence[RecordingLike],

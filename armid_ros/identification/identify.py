@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -235,9 +236,7 @@ def identify(
     _require_samples(theory, recordings, columns, used)
     base, problem = excited(theory, columns)
     notes += check_torque(arm, recordings, problem)
-    certificate, cost, tries = None, None, [settings]
-    if settings.prefers_bodies and not described and settings.method != 'iv':
-        tries.insert(0, replace(settings, physical=PhysicalSettings()))
+    bodies: _Bodies | None = None
     if described:
         problem = through(problem, torques(whole, recordings, used), base.values(whole.theta))
         free = ungrouped(whole, whole.base_parameters(rng))
@@ -245,25 +244,14 @@ def identify(
         fit, remarks = with_uncertain_inertia(whole, fit, recordings, used)
         notes += remarks
     else:
-        for settings in tries:
+        if settings.physical is not None or settings.prefers_bodies:
+            bodies = _bodies(arm, theory, (base, problem, recordings, used), settings, rng)
+        if bodies is None or (bodies.cost > _CHEAP and settings.physical is None):
             fit = _fitted(arm, base, problem, recordings, used, settings)
-            told, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
-            if settings.physical is None:
-                break
-            try:
-                bodies, certificate = fit_to_bodies(
-                    arm, fit, recordings, used, settings.least_squares, settings.physical, rng
-                )
-            except IdentificationError:
-                if settings is tries[-1]:
-                    raise
-                continue
-            cost = max(certificate.misfit_ratio, certificate.held_out_ratio) - 1.0
-            if settings is tries[-1] or cost <= _CHEAP:
-                fit, notes = bodies, notes + certificate.sentences()
-                break
-            certificate = None
-        theory = told
+            theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
+        else:
+            settings, theory, fit = bodies.settings, bodies.theory, bodies.fit
+            notes += bodies.certificate.sentences()
     if settings.method == 'iv':
         fit = fit_by_instruments(fit, recordings, used)
     spread = base_spread(whole, fit.base) if settings.holds_description else None
@@ -280,11 +268,45 @@ def identify(
         settings=settings,
         notes=notes + _remarks(fit, theory),
         halves=halves_error(fit.problem, fit.solution.weights, prior, spread),
-        physical=certificate,
-        bodies_cost=cost,
+        physical=None if bodies is None or settings.physical is None else bodies.certificate,
+        bodies_cost=None if bodies is None else bodies.cost,
         passes=fit.passes,
         scatter=scatter(fit.problem, fit.solution.weights, fit.solution.values),
     )
+
+
+class _Bodies(NamedTuple):
+    """A fit of links that are bodies, and the share by which its torque error is larger."""
+
+    settings: IdentificationSettings
+    theory: BaseParameters
+    fit: FittedValues
+    certificate: PhysicalCertificate
+    cost: float
+
+
+def _bodies(
+    arm: ArmModel,
+    theory: BaseParameters,
+    data: tuple[BaseParameters, Sequence[Regression], Sequence[Recording], Conditioning],
+    settings: IdentificationSettings,
+    rng: np.random.Generator,
+) -> _Bodies | None:
+    """Fit links that are bodies; None where they are not asked for and there are none."""
+    base, problem, recordings, used = data
+    known = settings.physical or PhysicalSettings()
+    if settings.method == 'iv':
+        return None
+    asked = replace(settings, physical=known)
+    fit = _fitted(arm, base, problem, recordings, used, asked)
+    theory, fit = _with_what_shows_now(theory, fit, recordings, used, asked, rng)
+    try:
+        fit, proof = fit_to_bodies(arm, fit, recordings, used, asked.least_squares, known, rng)
+    except IdentificationError:
+        if settings.physical is not None:
+            raise
+        return None
+    return _Bodies(asked, theory, fit, proof, max(proof.misfit_ratio, proof.held_out_ratio) - 1.0)
 
 
 def _fitted(

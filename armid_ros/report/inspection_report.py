@@ -89,9 +89,10 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
     """Return the finding in one sentence, and the numbers behind it in others."""
     count = Counter(one.weight for one in remarks)
     values = 'No impossible or suspicious value in the description.'
-    for weight, word in (('doubt', 'Suspicious'), ('bad', 'Impossible')):
-        if count[weight]:
-            values = f'{word} in the description: {counted(count[weight], "value")}.'
+    if count['doubt']:
+        values = f'Suspicious in the description: {counted(count["doubt"], "value")}.'
+    if count['bad']:
+        values = f'Impossible in the description: {counted(count["bad"], "value")}.'
     if found is None:
         return values, 'Add a recording to check the masses.'
     errors = (

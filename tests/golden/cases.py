@@ -132,8 +132,8 @@ CASES = {
     ),
     'emps_identify': Case(
         (
-            f'identify {_EMPS} --validate {{data}}/emps/DATA_EMPS_PULSES.mat --no-physical --no-verify'
-            ' --out {out}/r --json',
+            f'identify {_EMPS} --validate {{data}}/emps/DATA_EMPS_PULSES.mat --no-physical'
+            ' --no-verify --out {out}/r --json',
         )
     ),
     'emps_inspect': Case((f'inspect {_EMPS} --json',)),

@@ -293,7 +293,8 @@ def first_plot(browser, tmp_path, html):
         browser.open(path, width)
         browser.run('document.querySelector("#torque figure.chart").scrollIntoView()')
         return browser.run(
-            '(() => { const box = document.querySelector("#torque .u-over").getBoundingClientRect();'
+            '(() => { const over = document.querySelector("#torque .u-over");'
+            ' const box = over.getBoundingClientRect();'
             ' return [box.left, box.top + box.height / 2, box.width]; })()'
         )
 

@@ -112,7 +112,8 @@ def _mistaken(
     # a baseline gives the factor of all torques by itself
     since = bool(before) and bool(np.any(factors_since(arm, motions, before) > 0.0))
     found = [find_mistake(arm.body, recording, used) for recording in recordings]
-    of_data = [one for one in found if one is not None and one.of_data]
+    # and the body: a mistake that only another body shows is a change of the arm
+    of_data = [one for one in found if one and one.of_data and not (before and one.fitted)]
     texts = {one.text for one in of_data if not (since and one.hypotheses[0].kind == 'scale')}
     alike = len(of_data) == len(found) and len(texts) == 1
     return list(texts) if alike else unit_faults(arm, motions, before)
