@@ -87,7 +87,7 @@ def test_the_story_comes_first_and_what_was_looked_at_last(html):
         body.index(text)
         for text in (
             'Quadratic friction',
-            'share of the gap',
+            'block bootstrap',
             '>Measured and modelled<',
             '>In short<',
             '<svg class="arm"',
@@ -262,7 +262,7 @@ def test_seconds_of_a_cause_are_marked_in_the_curve_of_the_whole_recording(found
     acts = (whole.trajectory.t >= 2.0) & (whole.trajectory.t <= 3.0)
     differs = np.any(whole.after != whole.before, axis=1)
     assert differs[acts].any() and not differs[~acts].any()
-    _, torque, residual = overlay_section(found.arm.robot, gap, True, {}, some.spans).blocks
+    _, torque, residual, _ = overlay_section(found.arm.robot, gap, True, {}, some.spans).blocks
     for chart in (torque, residual):
         assert [mark.x for mark in chart.marks] == [2.0, 3.0]
     assert '2.0 to 3.0 s' in dict(Story(some).rows)['When'][0]
