@@ -354,7 +354,7 @@ def _with_file(robot: Robot, path: Path) -> tuple[Robot, FloatArray]:
     if not entries.keys() & set(robot.joints):
         raise TrajectoryError(f'{path}: no limits for any of {", ".join(robot.joints)}')
     for j, joint in enumerate(robot.joints):
-        entry = entries.get(joint, {})
+        entry = {} if entries.get(joint) is None else entries[joint]
         if not isinstance(entry, dict):
             raise TrajectoryError(f'{path}: joint {joint}: no mapping of limits')
         if entry.get('has_position_limits'):

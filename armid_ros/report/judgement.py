@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from armid_ros.diagnosis.settings import DiagnosisSettings
 from armid_ros.identification import Fit, Identification, Score, Verification
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.fitting.identifiability import excludes_zero
@@ -17,8 +18,6 @@ import numpy as np
 
 #: Ratio of the held-out to the training error from which the model is fitted to the noise.
 _OVERFIT = 1.3
-#: Torque error [%] below which an effect does not matter, as of `diagnose`.
-_MATERIAL = 1.0
 #: Condition numbers below which an excitation is good, as is the usual advice (Presse and Gautier
 #: 1993), and from which on it is weak.
 GOOD_CONDITION, WEAK_CONDITION = 100.0, 1000.0
@@ -166,7 +165,8 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
     """Return a sentence on joints whose residual depends on speed, position or load; or none."""
     depends: dict[str, list[str]] = {}
     errors = Score.of(fits).joint_relative_error_percent
-    matters = [(joint, name) for joint, name in enumerate(joints) if errors[joint] >= _MATERIAL]
+    least = 100.0 * DiagnosisSettings.material
+    matters = [(joint, name) for joint, name in enumerate(joints) if errors[joint] >= least]
     for joint, name in matters:
         for key, share in explained_shares(fits, joint).items():
             if share > TELLING_SHARE:

@@ -81,7 +81,7 @@ def test_moveit_position_limits_narrow_those_of_the_description(
 ):
     path = tmp_path / 'joint_limits.yaml'
     limits = f'has_position_limits: true, min_position: {least}, max_position: {most}'
-    path.write_text(f'joint_limits: {{waist: {{{limits}}}}}')
+    path.write_text(f'joint_limits: {{waist: {{{limits}}}, shoulder: }}')  # null: none
     robot, _ = with_joint_limits(robot_from_urdf(arm_urdf(limit=2.0)), path)
     np.testing.assert_array_equal(robot.lower, [lower, -1, -1])
     np.testing.assert_array_equal(robot.upper, [upper, 1, 1])
