@@ -9,6 +9,7 @@ from pathlib import Path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+from docsite.architecture import architecture_page
 from docsite.commands import commands_page
 from docsite.effects import effects_page
 from docsite.examples import examples_page
@@ -33,6 +34,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are generated."""
     reference = Path(config.docs_dir) / 'reference'
     pages = {
+        'explanation/architecture.md': architecture_page(ROOT / 'armid_ros'),
         'reference/commands.md': commands_page(),
         'reference/effects.md': effects_page(),
         'reference/examples.md': examples_page(ROOT / 'examples'),

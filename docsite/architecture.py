@@ -1,0 +1,158 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page that follows each job through the rooms, drawn from the calls in the code."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from html import escape
+from pathlib import Path
+import re
+
+#: The command of each job, by its module and name.
+JOBS = {
+    'identify': ('armid_ros.cli.identify', 'identify'),
+    'diagnose': ('armid_ros.cli.diagnose.command', 'diagnose'),
+    'excite': ('armid_ros.cli.excite.command', 'excite'),
+    'compare': ('armid_ros.cli.compare', 'compare'),
+}
+#: Whose calls are listed as well: the workflow of a job, and the function that it is named for.
+_OPENED = re.compile(r'api\.(?!arguments|table)|identification\.identify|diagnosis\.diagnose')
+#: What every job uses, and how a result is printed.
+_EVERYWHERE = re.compile(
+    r'errors|motion|files|estimate|cli|api\.(arguments|table)|recording\.(curves|twice)'
+    r'|report\.(notation|families|judgement|compare_report)'
+)
+#: A row, the distance of two lanes, the width of a name, and that of the text beside it [px].
+_ROW, _LANE, _NAME, _TEXT = 18, 22, 240, 560
+_BEGINNING = """# Architecture
+
+Each diagram follows one command, from top to bottom. A lane is a room: a folder of the package.
+The dot of a function is in the lane of its room, and a line leads to it from its caller. The text
+beside it is the first line of its docstring. Each function is shown once, helpers are left out.
+"""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A call: how deep it is, the room and the name of the function, and what it does."""
+
+    depth: int
+    room: str
+    name: str
+    summary: str
+
+
+@dataclass(frozen=True)
+class Module:
+    """A parsed module: functions and classes by name, and whence the other names are."""
+
+    defined: dict[str, ast.stmt]
+    imported: dict[str, tuple[str, str]]
+
+
+@cache
+def module(package: Path, dotted: str) -> Module | None:
+    """Parse a module of the package, or its folder; None where there is none."""
+    place = package.parent.joinpath(*dotted.split('.'))
+    path = place / '__init__.py' if place.is_dir() else place.with_suffix('.py')
+    if not path.is_file():
+        return None
+    tree = ast.parse(path.read_text(encoding='utf-8'))
+    kinds = ast.FunctionDef | ast.ClassDef
+    imported = {
+        alias.asname or alias.name: (node.module, alias.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or '').startswith('armid_ros')
+        for alias in node.names
+    }
+    return Module({one.name: one for one in tree.body if isinstance(one, kinds)}, imported)
+
+
+def found(package: Path, dotted: str, name: str) -> tuple[str, str] | None:
+    """Return the module in which a name is defined, however often it is passed on."""
+    here = module(package, dotted)
+    if here is None:
+        return None
+    if name in here.defined:
+        return dotted, name
+    return found(package, *here.imported[name]) if name in here.imported else None
+
+
+def calls(body: ast.AST) -> Iterator[str]:
+    """Yield the names that are called, arguments before the call that takes them."""
+    for child in ast.iter_child_nodes(body):
+        yield from calls(child)
+    if isinstance(body, ast.Call):
+        called = body.func.value if isinstance(body.func, ast.Attribute) else body.func
+        if isinstance(called, ast.Name):
+            yield called.id
+
+
+def steps(package: Path, dotted: str, name: str) -> list[Step]:
+    """Return the calls from room to room that a function leads to, each once, in its order."""
+    seen: set[tuple[str, str]] = set()
+
+    def follow(dotted: str, name: str, depth: int) -> Iterator[Step]:
+        here = module(package, dotted)
+        assert here is not None
+        function = ast.Module([*getattr(here.defined[name], 'body', [])], [])
+        for called in calls(function):
+            place = found(package, dotted, called)
+            if place is None or place in seen:
+                continue
+            seen.add(place)
+            room = place[0].removeprefix('armid_ros.')
+            if place[0] == dotted and called.startswith('_'):
+                yield from follow(*place, depth)
+            elif not _EVERYWHERE.match(room) and not called.startswith('_'):
+                theirs = module(package, place[0])
+                assert theirs is not None
+                text = ast.get_docstring(theirs.defined[place[1]]) or ''
+                summary = ' '.join(text.partition('\n\n')[0].split())
+                yield Step(depth, room.partition('.')[0], place[1], summary)
+                if _OPENED.match(room):
+                    yield from follow(*place, depth + 1)
+
+    return list(follow(dotted, name, 1))
+
+
+def diagram(job: str, calls_of_it: list[Step]) -> Iterator[str]:
+    """Yield the lines of an SVG image with a lane for each room and a row for each call."""
+    rows = [Step(0, 'cli', job, f'The command armid {job}.'), *calls_of_it]
+    rooms = list(dict.fromkeys(('cli', 'api', *(one.room for one in rows))))
+    lane = {room: 8 + _LANE * k for k, room in enumerate(rooms)}
+    names, top = 12 + _LANE * len(rooms), 78
+    beside = names + _NAME
+    width, height = beside + _TEXT, top + _ROW * len(rows)
+    yield (
+        f'<div class="diagram"><svg viewBox="0 0 {width} {height}" width="{width}" role="img" '
+        f'aria-label="Calls of armid {job} from room to room">'
+    )
+    for room, x in lane.items():
+        turned = f'translate({x + 4} {top - 14}) rotate(-40)'
+        yield f'<text class="room" transform="{turned}">{room}</text>'
+        yield f'<path class="lane" d="M{x} {top - 10}V{height - 4}"/>'
+    last: list[tuple[int, int]] = []
+    for k, one in enumerate(rows):
+        x, y = lane[one.room], top + _ROW * k
+        last = last[: one.depth]
+        if last:
+            yield f'<path class="call" d="M{last[-1][0]} {last[-1][1]}V{y}H{x}"/>'
+        last.append((x, y))
+        yield f'<circle cx="{x}" cy="{y}" r="4"/>'
+        yield f'<text class="name" x="{names + 10 * one.depth}" y="{y + 4}">{one.name}</text>'
+        yield f'<text x="{beside}" y="{y + 4}">{escape(one.summary)}</text>'
+    yield '</svg></div>'
+    yield ''
+
+
+def architecture_page(package: Path) -> str:
+    """Return the page: a diagram for each job."""
+    lines = [_BEGINNING]
+    for job, (dotted, name) in JOBS.items():
+        lines += [f'## {job}', '', *diagram(job, steps(package, dotted, name))]
+    return '\n'.join(lines)

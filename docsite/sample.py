@@ -1,0 +1,90 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""
+A sample of the project's language, for a reader who has not written it.
+
+``python -m docsite.sample [--seed 0] [--count 100]`` prints docstrings, messages and sentences of
+the pages, as many of each. The reader marks each item: clear, clear on second reading, or unclear.
+
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+import re
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+_SENTENCE = re.compile(r'(?<=[.!?]) +(?=[A-Z])')
+#: Fewest words of a message.
+_FEWEST = 4
+
+
+def docstrings(package: Path) -> Iterator[tuple[str, str]]:
+    """Yield where each function and class is, and the first paragraph of its docstring."""
+    for place, node in _nodes(package):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            text = (ast.get_docstring(node) or '').partition('\n\n')[0]
+            if text:
+                yield f'{place}: {node.name}', ' '.join(text.split())
+
+
+def messages(package: Path) -> Iterator[tuple[str, str]]:
+    """Yield where errors are raised, and what they say; values are in braces."""
+    for place, node in _nodes(package):
+        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
+            for given in node.exc.args:
+                if isinstance(given, ast.JoinedStr | ast.Constant):
+                    text = ast.unparse(given).lstrip('f').strip('\'"')
+                    if len(text.split()) >= _FEWEST:
+                        yield f'{place}:{node.lineno}', text
+
+
+def sentences(pages: Path) -> Iterator[tuple[str, str]]:
+    """Yield the sentences of the pages, without code, tables and headings."""
+    for path in sorted(pages.rglob('*.md')):
+        text = re.sub(r'^```.*?^```$', '', path.read_text('utf-8'), flags=re.MULTILINE | re.DOTALL)
+        for paragraph in re.split(r'\n\s*\n', text):
+            if paragraph.strip() and not re.match(r'\s*[#|<!\-]', paragraph):
+                for one in _SENTENCE.split(' '.join(paragraph.split())):
+                    yield path.relative_to(pages).as_posix(), one
+
+
+def _nodes(package: Path) -> Iterator[tuple[str, ast.AST]]:
+    for path in sorted(package.rglob('*.py')):
+        place = path.relative_to(package).as_posix()
+        for node in ast.walk(ast.parse(path.read_text('utf-8'))):
+            yield place, node
+
+
+def drawn(seed: int, count: int) -> list[tuple[str, str]]:
+    """Draw as many items of each kind, all together a number of them."""
+    rng = np.random.default_rng(seed)
+    package = ROOT / 'armid_ros'
+    kinds = [
+        list(kind) for kind in (docstrings(package), messages(package), sentences(ROOT / 'docs'))
+    ]
+    parts = np.array_split(np.arange(count), len(kinds))
+    return [
+        kind[k]
+        for kind, part in zip(kinds, parts, strict=True)
+        for k in sorted(rng.choice(len(kind), len(part), replace=False).tolist())
+    ]
+
+
+def main() -> None:
+    """Print the sample."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().partition('\n')[0])
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--count', type=int, default=100)
+    asked = parser.parse_args()
+    for number, (place, text) in enumerate(drawn(asked.seed, asked.count), start=1):
+        print(f'{number:3} [{place}]\n    {text}')
+
+
+if __name__ == '__main__':
+    main()
