@@ -158,7 +158,7 @@ def diagnose(
 
 
 def _hardly_explained(result: Diagnosis, settings: DiagnosisSettings) -> bool:
-    """Return whether nothing is named, a gap is open, or names take less than half of it."""
+    """Return whether named causes explain less than half of the gap, or leave it open."""
     largest = max((one.share for one in result.findings), default=0.0)
     return result.verdict in OPEN or largest <= settings.thresholds.open_share
 
@@ -169,7 +169,7 @@ def _within(
     explainer: Explainer,
     read: tuple[Sequence[Recording], Sequence[Recording], Sequence[Recording]],
 ) -> Diagnosis | None:
-    """Diagnose the seconds in which a cause acts alone; None if that explains no more."""
+    """Diagnose only the seconds in which a cause acts; None if that explains no more."""
     settings, look = explainer.settings, chosen.look
     recordings, validate, baseline = read
     if not settings.spans or look is None or not _hardly_explained(result, settings):
@@ -214,7 +214,7 @@ def _each_alone(
     used: Conditioning,
     explainer: Explainer,
 ) -> Diagnosis:
-    """Return a result, or that single recordings are at fault, where something stays open."""
+    """Return the result; BAD DATA if it stays open and single recordings turn out faulty."""
     arm = explainer.arm
     open_or_doubted = result.verdict in OPEN or bool(result.doubt)
     if not open_or_doubted or explainer.settings.partner is not None:
@@ -227,7 +227,7 @@ def _each_alone(
 def _apart(
     arm: ArmModel, day: Sequence[Recording], used: Conditioning
 ) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
-    """Yield recordings, and in which joints a model is unusable there and not in all of a day."""
+    """Yield recordings with the joints whose model is unusable in them, and usable in others."""
     unit = np.ones(arm.robot.n_joints)
     bad, sound = np.zeros((2, len(day), len(unit)), dtype=bool)
     for k, one in enumerate(day):
@@ -243,7 +243,7 @@ def _apart(
 def _said(
     chosen: Chosen, notes: Sequence[str], explainer: Explainer, doubt: str, given: ArmModel
 ) -> Diagnosis:
-    """Return the diagnosis of an explanation, measured on held-out data."""
+    """Turn an explanation into a diagnosis; shares are measured on held-out data."""
     arm, settings, before = explainer.arm, explainer.settings, explainer.baseline
     explainer.tell(0.85, 'held-out gap')
     explanation, said = as_bodies(chosen.explanation)
@@ -308,7 +308,7 @@ def _remarks(
     doubt: str,
     explainer: Explainer,
 ) -> list[str]:
-    """Say why a model is not patched or may be wrong, and what is not checked."""
+    """Return remarks: why the model is not patched or in doubt, and what was not checked."""
     still = ', '.join(not_shown(explainer.prepared.data, explainer.arm.robot.joints))
     names = ' and '.join(one.name.replace('_', ' ') for one in found)
     remarks = {
@@ -323,7 +323,7 @@ def _remarks(
 def _unseen(
     data: Sequence[Trajectory], explanation: Explanation, chosen: Chosen
 ) -> Evidence | None:
-    """Return the recordings to validate, which are only predicted, in the unit of the gap."""
+    """Return the held-out recordings in the unit of the gap."""
     if not data:
         return None
     noise = [noise_floor(part, explanation.fitted.arm).sigma for part in data]

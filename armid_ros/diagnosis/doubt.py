@@ -34,7 +34,7 @@ def doubt_of(
     thresholds: Thresholds,
 ) -> str:
     """
-    Say why a model may be wrong itself, in a sentence; empty if it need not be.
+    Return a sentence on why the model itself may be wrong; empty if there is no reason.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def doubt_of(
 
 
 def doubt_of_names(findings: Sequence[Finding]) -> str:
-    """Say that what was named never happens between two days; empty where it may have."""
+    """Return a sentence if a named cause cannot arise between two days; else an empty one."""
     for one in findings:
         if one.name in CATALOGUE and CATALOGUE[one.name].traits.corrects:
             return (
@@ -76,7 +76,7 @@ def _changed(
     misfit: Misfit,
     thresholds: Thresholds,
 ) -> str:
-    """Say that a model leaves much more of a baseline than when it was identified."""
+    """Return a sentence if the baseline residual is much larger than at identification."""
 
     def compared(known: Baseline) -> tuple[FloatArray, FloatArray]:
         times = known.misfit / np.maximum(misfit.of(arm.robot, torque_rms(known.data)), 1e-300)
@@ -101,7 +101,7 @@ def _changed(
 
 
 def _poor(arm: ArmModel, baseline: Baseline) -> str:
-    """Say that a model leaves much of the torque of a baseline."""
+    """Return a sentence if the baseline residual is a large share of the torque."""
     whole, each = baseline.errors
     bad = [
         f'{100.0 * error:.0f} % of the torque of {joint}'

@@ -63,7 +63,7 @@ class Prepared:
 
     @property
     def described(self) -> Evidence:
-        """Return the data in units of their noise in the residual of the arm as described."""
+        """Return the data weighted by the noise in the residual of the given arm."""
         return Evidence.over_noise(self.data, self.as_described)
 
     @property
@@ -128,7 +128,7 @@ def prepare(
 
 
 def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tuple[Effect, ...]]:
-    """Return an arm with all effects that any joint may be taken to have, and those added."""
+    """Add the friction and offsets that any joint may have; return arm and added effects."""
     there = {(effect.name, joint) for effect in arm.effects for joint in effect.joints}
     added: list[Effect] = []
     fuller = arm
@@ -154,7 +154,7 @@ def _measured(
 def _noise_over_friction(
     arm: ArmModel, prepared: Prepared, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the noise of rows over the fitted dry friction, both root mean square, (n,)."""
+    """Return the rms noise divided by the rms dry friction of each joint, (n,)."""
     data, sigma = prepared.data, prepared.sigma
     base, _ = excited(arm, arm.base_parameters(rng), data)
     arm = refitted(arm, base, data, sigma)

@@ -17,7 +17,7 @@ from armid_ros.identification import SignalSettings
 @dataclass(frozen=True)
 class Thresholds:
     """
-    The numbers that decide a name. Shares are of the held-out squares over the unit of the gap.
+    The thresholds of the diagnosis. Shares are of the held-out squares in the unit of the gap.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Thresholds:
 
     @property
     def other_motion(self) -> float:
-        """Factor by which the squares of a misfit may be larger in a motion that was not used."""
+        """Factor by which the squared misfit may be larger in a motion that was not used."""
         return self.predicted * self.same_fit
 
 
@@ -133,7 +133,7 @@ class DiagnosisSettings:
     thresholds: Thresholds = field(default_factory=Thresholds)
 
     def __post_init__(self) -> None:
-        """Check what is said of priors."""
+        """Check the names and frequencies of priors."""
         names = [kind.name for kind in self.kinds]
         for name, how in self.prior.items():
             for word, known, what in ((name, names, 'effect'), (how, HOW_OFTEN, 'frequency')):
@@ -144,7 +144,7 @@ class DiagnosisSettings:
                     )
 
     def without_small_print(self) -> DiagnosisSettings:
-        """Return settings by which all that is there beyond chance is named."""
+        """Return settings that name every significant cause, however small."""
         thresholds = replace(self.thresholds, headline=0.0)
         return replace(self, material=0.0, everything=False, thresholds=thresholds)
 

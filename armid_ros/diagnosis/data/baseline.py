@@ -41,7 +41,7 @@ EXCITED = 1e-4
 def excited(
     arm: ArmModel, theory: BaseParameters, data: Sequence[Trajectory]
 ) -> tuple[BaseParameters, list[FloatArray]]:
-    """Return the base parameters that the motion excites, and their columns in rows."""
+    """Return the base parameters that the motion excites, and their regressor columns."""
     columns = [part.base_columns(arm, arm.effects, theory.independent) for part in data]
     stacked = np.concatenate([block.reshape(-1, theory.rank) for block in columns])
     names = tuple(theory.standard[column] for column in theory.independent)
@@ -61,7 +61,7 @@ def described_precision(
     base: BaseParameters, arm: ArmModel, known: FloatArray | None = None
 ) -> FloatArray:
     """
-    Return the precision of the base parameters in the description, shape (r, r).
+    Return the prior precision of the base parameters by the description, shape (r, r).
 
     The description is believed to a factor or so: data decide what they determine, and what they
     hardly determine stays where it predicts other motions well. A value of zero of an effect is
@@ -94,7 +94,7 @@ def described_precision(
 def refitted(
     arm: ArmModel, base: BaseParameters, data: Sequence[Trajectory], sigma: Sequence[FloatArray]
 ) -> ArmModel:
-    """Return an arm with base parameters fitted to data of noise (n,) [N m] each."""
+    """Return an arm with base parameters fitted to data with noise (n,) [N m] each."""
     columns = [part.base_columns(arm, arm.effects, base.independent) for part in data]
     weight = row_weights(data, sigma)
     x = (np.concatenate(columns) * weight[:, :, np.newaxis]).reshape(-1, base.rank)
@@ -106,7 +106,7 @@ def refitted(
 
 
 def _described_spread(arm: ArmModel) -> FloatArray:
-    """Return how far parameters may be from the description; infinite if it has none, (P,)."""
+    """Return the prior standard deviation of each parameter; infinite if undescribed, (P,)."""
     size = len(arm.robot.rigid_parameters)
     known = np.abs(arm.theta[size:])
     own = np.concatenate([[], *(effect.spread(arm.robot) for effect in arm.effects)])
@@ -177,7 +177,7 @@ class Baseline:
     @property
     def errors(self) -> tuple[float, FloatArray]:
         """
-        Return the residual of the model over the torque, of the arm and of each joint, (n,).
+        Return the relative rms error of the model: of the whole arm, and of each joint, (n,).
 
         Root mean square, where a joint moves: friction holds one at rest with any torque.
 

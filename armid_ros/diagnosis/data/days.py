@@ -21,7 +21,7 @@ _LEAST = 1e-4
 @dataclass(frozen=True)
 class Rows:
     """
-    Recordings in rows over a unit.
+    Weighted regression rows of the recordings of both days.
 
     Attributes
     ----------
@@ -43,13 +43,13 @@ class Rows:
 
     @classmethod
     def over_noise(cls, evidence: Evidence) -> Rows:
-        """Return data of one day over their noise, discrepancies being measured in torque."""
+        """Weight data of one day by their noise; the unit of discrepancies is the rms torque."""
         torque = np.maximum(evidence.torque_rms, 1e-3 * evidence.torque_rms.max())
         amplitude = (torque,) * count_recordings(evidence.data)
         return cls(evidence.data, evidence.sigma, 0, amplitude).not_below_rounding()
 
     def not_below_rounding(self) -> Rows:
-        """Return the same with units of no less than rounding of the torque."""
+        """Raise units to the rounding error of the torque where they are smaller."""
         least = _LEAST * self.torque
         return replace(
             self,
@@ -70,7 +70,7 @@ class Rows:
 
     @property
     def repeated(self) -> bool:
-        """Return whether recordings tell what values of one day differ by."""
+        """Return whether the spread of values between recordings can be estimated."""
         return 0 < self.before and len(self.today) > 2
 
     @cached_property
@@ -92,7 +92,7 @@ class Rows:
         return np.asarray(np.maximum(rms, 1e-3 * rms.max()))
 
     def weighted(self, columns: Sequence[FloatArray], joints: Sequence[int]) -> list[FloatArray]:
-        """Return columns (M, n, p) of trajectories in weighted rows of recordings, (t, M, p)."""
+        """Weight columns (M, n, p) of trajectories; return them per recording, (joints, M, p)."""
         index = list(joints)
         rows = [
             (own[:, index] * weight[:, index, np.newaxis]).swapaxes(0, 1)

@@ -31,7 +31,7 @@ _SPEEDS = (0.03, 0.25, 1.0)
 
 def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray]:
     """
-    Return the torque of the functions of each joint in rows.
+    Return the columns of the discrepancy functions of each joint.
 
     Functions of position and velocity are linear between knots and constant beyond them, with a
     unit torque at a knot; friction has a root mean square torque of one.
@@ -75,11 +75,11 @@ def discrepancy_columns(data: Sequence[Trajectory], arm: Arm) -> list[FloatArray
 
 
 def _unasked_friction(motion: Motion, arm: Arm) -> FloatArray:
-    """Return the torque of a unit of each law of friction in each joint, shape (N, n, L)."""
+    """Return the columns of every friction law for all joints, shape (N, n, L)."""
     laws = [kind(motion.joints).columns(motion, arm) for kind in UNASKED_FRICTION]
     return np.stack([np.diagonal(columns, axis1=1, axis2=2) for columns in laws], axis=2)
 
 
 def _hats(x: FloatArray, knots: FloatArray) -> list[FloatArray]:
-    """Return the share of each knot in linear interpolation at x, each of the shape of x."""
+    """Return the linear B-spline (hat) basis at x, one array of the shape of x per knot."""
     return [np.interp(x, knots, row) for row in np.eye(len(knots))]

@@ -42,7 +42,7 @@ _SLOW_HZ, _FAST_HZ, _WINDOW = 4.0, (6.0, 12.0), 2.5
 @dataclass(frozen=True)
 class Evidence:
     """
-    Data with the unit of the gap.
+    Data with the unit in which the gap is measured.
 
     Attributes
     ----------
@@ -113,12 +113,12 @@ class Evidence:
 
     @property
     def assumed(self) -> bool:
-        """Whether nothing repeats in some of the data, so that their noise is not measured."""
+        """Whether the noise of some data is assumed, as no motion in them repeats."""
         return any(part.period is None for part in self.data)
 
     def limits(self, residual: Sequence[FloatArray], settings: DiagnosisSettings) -> FloatArray:
         """
-        Return the loss of each joint up to which its residual is no gap, shape (n,).
+        Return the largest loss of each joint that counts as no gap, shape (n,).
 
         Noise measured by two periods has as many degrees of freedom as there are independent
         rows, and so have the rows that are compared with it: the ratio of the two has Fisher's
@@ -136,17 +136,17 @@ class Evidence:
         return np.where(misfit, self.as_good(settings), noise) + self.matters(settings)
 
     def as_good(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the loss of each joint within which a misfit varies between motions, (n,)."""
+        """Return the largest loss of each joint that another motion explains, (n,)."""
         varies = np.ones_like(self.count) if self.varies is None else self.varies
         return np.asarray(settings.thresholds.same_fit * np.maximum(varies, 1.0))
 
     def matters(self, settings: DiagnosisSettings) -> FloatArray:
-        """Return the loss of each joint from which a cause is material to the user, (n,)."""
+        """Return the smallest loss of each joint that matters to the user, (n,)."""
         sigma = np.mean([own**2 for own in self.sigma], axis=0)
         return np.asarray((settings.material * self.torque_rms) ** 2 / sigma)
 
     def _lasting(self, residual: Sequence[FloatArray]) -> FloatArray:
-        """Return how many rows of the squared residual make one independent row, shape (n,)."""
+        """Return the correlation length of the squared residual, shape (n,) [rows]."""
         products = np.zeros((_LAGS + 1, len(self.count)))
         for part, own in zip(self.data, residual, strict=True):
             rows = np.where(part.informative, own, 0.0)
@@ -244,7 +244,7 @@ def _difference(
     trajectory: Trajectory, residual: FloatArray, first: npt.NDArray[np.intp], lag: int, joint: int
 ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
     """
-    Return the difference of two periods in one joint, and at which samples it is informative.
+    Return the difference of two equal periods in one joint, and its informative samples.
 
     A drift with time, by itself or in proportion to the velocity, is regressed out: it is an
     effect of its own.
@@ -265,7 +265,7 @@ def _difference(
 def _between_rows(
     trajectory: Trajectory, samples: npt.NDArray[np.intp], joint: int
 ) -> npt.NDArray[np.bool_]:
-    """Return whether the row of a joint that is next to each sample is informative, (K,)."""
+    """Return whether the row nearest to each sample is informative for a joint, (K,)."""
     nearest = np.clip(np.searchsorted(trajectory.rows, samples), 0, len(trajectory.rows) - 1)
     return np.asarray(trajectory.informative[nearest, joint])
 

@@ -107,7 +107,7 @@ class Trajectory:
 
     @property
     def stretch(self) -> Stretch:
-        """Return the rows in the form in which faults of data are looked for."""
+        """Return the rows as the checks of data take them."""
         return Stretch(self.source, self.at_rows.with_torque(self.torque), self.informative)
 
     @cached_property
@@ -205,7 +205,7 @@ def trajectories(
 
 def thinnable(used: Conditioning) -> Conditioning:
     """
-    Return a conditioning whose motion can be thinned out as far as columns allow.
+    Lower the decimation to a multiple of the factor at which columns are computed.
 
     The rate of columns divides that of the recording and is a multiple of that of rows: at most an
     eighth more rows are kept.
@@ -217,7 +217,7 @@ def thinnable(used: Conditioning) -> Conditioning:
 
 def _widest(used: Conditioning) -> int:
     """
-    Return the largest factor by which a motion may be thinned out before columns are computed.
+    Return the largest decimation of a motion before its columns are computed.
 
     Columns contain squares of velocities, which reach to twice the cut-off: half of the rate has
     to be more than that.
@@ -284,7 +284,7 @@ def block_rows(
 
 
 def row_weights(data: Sequence[Trajectory], sigma: Sequence[FloatArray]) -> FloatArray:
-    """Return one over sigma of all rows, zero where uninformative, (R, n) [1/(N m)]."""
+    """Return 1 / sigma of all rows, zero where uninformative, (R, n) [1/(N m)]."""
     return np.concatenate([part.informative / s for part, s in zip(data, sigma, strict=True)])
 
 

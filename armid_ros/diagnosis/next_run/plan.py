@@ -71,12 +71,12 @@ class NextRun:
 
     @property
     def expected_z(self) -> float:
-        """Return the standard deviations between the two names that are separated least."""
+        """Return the z-score of the pair that is separated least."""
         return min(pair.z for pair in self.separations)
 
     @property
     def sentence(self) -> str:
-        """Return what to do and what it would show, in words, the least separated pair first."""
+        """Describe the run and what it would show; the least separated pair comes first."""
         separated = sorted((s for s in self.separations if s.distinct), key=lambda one: one.z)
         parts = [
             f'{one.name} from {one.rival} by {_many(one.z)} standard deviations'
@@ -109,7 +109,7 @@ class NextRun:
 
 
 def _many(deviations: float) -> str:
-    """Return a number of deviations in words, up to the largest that noise is known well for."""
+    """Format a z-score; above the largest that the noise is known well for, "more than"."""
     return f'{deviations:.0f}' if deviations < _CERTAIN else f'more than {_CERTAIN:.0f}'
 
 
@@ -199,7 +199,7 @@ class _Run:
 
 
 def _in_order(runs: Sequence[_Run]) -> list[_Run]:
-    """Return runs, best first; those with a payload last if a motion alone separates as much."""
+    """Sort runs, best first; runs with a payload come last if a motion alone separates as well."""
     most = np.max([[pair.z for pair in run.separations] for run in runs], axis=0, initial=0.0)
     wanted = np.where(most < NOTHING, 0.0, np.minimum(most, _SURE))
     plain = [run for run in runs if not run.template.loaded]

@@ -85,7 +85,7 @@ class Separation:
 
     @property
     def z(self) -> float:
-        """Return the standard deviations between the two."""
+        """Return the z-score of the difference."""
         return float(np.sqrt(self.power))
 
     @property
@@ -151,7 +151,7 @@ class Load:
 
     @staticmethod
     def along(arm: ArmModel, trajectory: FourierTrajectory) -> Load:
-        """Return a load of which no joint takes more than `_LOAD` of its torque along a motion."""
+        """Return a load that takes at most `_LOAD` of any joint torque along a motion."""
         motion = trajectory.one_period(int(trajectory.period * _RATE))
         frame = _tip(arm.robot)
         unit = np.abs(arm.rigid_columns(motion)[:, :, -10:] @ _point(arm.robot, frame)).max(axis=0)
@@ -169,13 +169,13 @@ class Load:
 
 
 def _tip(robot: Robot) -> str:
-    """Return the frame of the last link that is farthest from its joint."""
+    """Return the frame of the last link that is farthest from the last joint."""
     frames = [f for f in robot.model.frames if f.parentJoint == robot.model.njoints - 1]
     return str(max(frames, key=lambda f: float(np.linalg.norm(f.placement.translation))).name)
 
 
 def _point(robot: Robot, frame: str) -> FloatArray:
-    """Return the ten parameters of 1 kg at a frame, or the centre of mass if that is the joint."""
+    """Return the parameters of 1 kg at a frame; at the centre of mass if that is the joint."""
     place = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
     if np.linalg.norm(place) < _NEAR:
         place = robot.model.inertias[robot.model.njoints - 1].lever
@@ -185,7 +185,7 @@ def _point(robot: Robot, frame: str) -> FloatArray:
 
 def _weight(diagnosis: Diagnosis, motion: Motion) -> FloatArray:
     """
-    Return the square root of the rows per sample, over the unit of the gap, shape (N, n).
+    Return the weight of each sample: sqrt(rows per sample) / sigma, shape (N, n).
 
     The noise is white over rows: a higher rate of samples adds no information. A unit that is a
     misfit is taken to be the same in the next run.
@@ -208,7 +208,7 @@ def _stack(columns: list[FloatArray], weight: FloatArray) -> FloatArray:
 
 
 def _free(diagnosis: Diagnosis, arm: ArmModel, named: Effect, motion: Motion) -> FloatArray:
-    """Return the nuisance columns, fitted whichever name is right, shape (N, n, f)."""
+    """Return the columns that are fitted with either name, shape (N, n, f)."""
     assert diagnosis.explanation is not None
     given = diagnosis.explanation.given
     known = zip(given.effects, given.values, strict=True)

@@ -31,7 +31,7 @@ def next_steps(
     worse: Sequence[str] = (),
 ) -> list[str]:
     """
-    Return what to do, in sentences, in the order in which a person would do it.
+    Return the next steps for a person, as sentences in order.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def next_steps(
 
 
 def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> list[str]:
-    """Say which model may be used, or what to do before."""
+    """Return sentences on which model may be used, or what to do before."""
     if diagnosis.not_checked:
         return [f'Move {", ".join(diagnosis.not_checked)} as well, and record again.']
     if worse:
@@ -95,7 +95,7 @@ def _use_of_model(diagnosis: Diagnosis, model: str, worse: Sequence[str]) -> lis
 
 
 def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
-    """Say what to look at on the robot: for a cause, and for each that may stand in its place."""
+    """Return what to inspect on the robot, for a cause and for each of its rivals."""
     steps = []
     own = Rival(finding.name, finding.joints)
     for one in (own, *finding.rivals):
@@ -113,7 +113,7 @@ def _looks(finding: Finding, diagnosis: Diagnosis) -> list[str]:
 
 
 def _centre(finding: Finding) -> str:
-    """Say where the centre of mass of a load is; nothing where the data do not determine it."""
+    """Describe the centre of mass of a load; empty where the data do not determine it."""
     rows = list(zip(finding.parameters, finding.values, finding.std, strict=True))
     mass = [row for row in rows if row[0].unit == 'kg']
     moments = [row for row in rows if row[0].unit == 'kg m']
@@ -125,7 +125,7 @@ def _centre(finding: Finding) -> str:
 
 def _look_at(name: str, diagnosis: Diagnosis) -> str:
     """
-    Return what an effect says is to be looked at; one that is not in the catalogue as well.
+    Return an effect's hint on what to inspect; also for effects outside the catalogue.
 
     What nearly every arm has is nothing to look at where the model was given without it.
 

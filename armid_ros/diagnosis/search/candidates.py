@@ -72,7 +72,7 @@ class Causes:
     )
 
     def causes(self, nuisance: Nuisance, under: Marginal) -> list[Cause]:
-        """Return every cause that is not accepted yet, in every shape a search starts from."""
+        """Return every cause that is not accepted yet, one for each starting shape."""
         arm, result = nuisance.arm, list[Cause]()
         there = [term.cause.effect for term in nuisance.accepted]
         taken = {(one.name, one.joints) for one in there}
@@ -90,12 +90,12 @@ class Causes:
 
     @property
     def effects(self) -> Iterator[Effect]:
-        """Yield every effect in every place."""
+        """Yield every candidate effect."""
         for _, members in candidate_effects(self.nuisance.arm.robot, self.kinds):
             yield from (one for one in members if (one.name, one.joints) not in self.fitted)
 
     def _divided(self, effect: Effect, singles: Sequence[Effect]) -> Iterator[Cause]:
-        """Yield the causes that an effect consists of, whose columns are computed at once."""
+        """Yield the single causes of an effect on several joints."""
         robot, start = self.nuisance.arm.robot, 0
         places: list[tuple[Effect, tuple[int, ...], list[int]]] = []
         for one in singles:
@@ -123,7 +123,7 @@ class Causes:
         return [part.columns(self.nuisance.arm, effect) for part in self._parts]
 
     def reshaped(self, cause: Cause, shape: FloatArray) -> Cause | None:
-        """Return a cause in another shape; None where that is not possible or does not show."""
+        """Return a cause with another shape; None where it is impossible or invisible."""
         try:
             effect = cause.effect.with_shape(shape)
             columns = self._columns(effect)
@@ -137,7 +137,7 @@ class Causes:
     def made(
         self, effect: Effect, kept: tuple[int, ...], columns: Sequence[FloatArray]
     ) -> Cause | None:
-        """Return the cause of an effect with columns, each (M, n, p); None if none is seen."""
+        """Make a cause from an effect and its columns (M, n, p); None if all columns are zero."""
         rows, robot = self.nuisance.rows, self.nuisance.arm.robot
         torque = _torque_of(columns, rows)
         seen = torque.any(axis=0)
@@ -155,7 +155,7 @@ class Causes:
 
 
 def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
-    """Return the torque of a unit of columns (M, n, p) on the day in question, (n, p) [N m]."""
+    """Return the rms torque of a unit of each column on the day in question, (n, p) [N m]."""
     squares = np.zeros((len(rows.torque), columns[0].shape[2]))
     for k in rows.in_question:
         moving = rows.weight[k][:, :, np.newaxis] > 0.0
@@ -164,7 +164,7 @@ def _torque_of(columns: Sequence[FloatArray], rows: Rows) -> FloatArray:
 
 
 def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> FloatArray:
-    """Return values whose torque is that of a joint, or that are as large as such values get."""
+    """Return the scale of each value: that of the joint torque, or the largest plausible value."""
     effect, kept = own.effect, list(own.kept)
     spread = effect.spread(robot)[kept]
     if effect.adds_to(robot):  # a load and an error of a link are bodies alike
@@ -176,7 +176,7 @@ def _unit(own: SelectedEffect, torque: FloatArray, rows: Rows, robot: Robot) -> 
 def value_unit(
     nuisance: Nuisance, own: SelectedEffect, columns: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return the unit of the values of an effect, (p,), of columns (M, n, p) in trajectories."""
+    """Return the scale of the values of an effect, (p,), from its columns (M, n, p)."""
     rows = nuisance.rows
     return _unit(own, _torque_of(columns, rows), rows, nuisance.arm.robot)
 
@@ -236,7 +236,7 @@ def cause_of(
 
 
 def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
-    """Return what is left of the recordings in question, for shapes to begin at."""
+    """Return the residual of the day in question, from which shapes are initialised."""
     rows = nuisance.rows
     values = nuisance.means(under)
     motions = [part.motion for part in rows.data]
@@ -261,7 +261,7 @@ def _unexplained(nuisance: Nuisance, under: Marginal) -> Unexplained:
 def candidate_effects(
     robot: Robot, kinds: Sequence[Kind]
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield effects whose columns are computed at once, and the single ones they consist of."""
+    """Yield effects on several joints, with the effects on single joints that they combine."""
     for kind in with_exact_vector(kinds):
         try:
             places = kind.places(robot)
@@ -279,7 +279,7 @@ def candidate_effects(
 def shaped(
     effect: Effect, members: list[Effect], arm: ArmModel, unexplained: Unexplained
 ) -> Iterator[tuple[Effect, list[Effect]]]:
-    """Yield an effect and its single ones with every shape from which a search starts."""
+    """Yield an effect and its single-joint parts for each starting value of its shape."""
     if not effect.shapes:
         yield effect, members
         return
@@ -338,7 +338,7 @@ def line_search(
 
 def without_measurement(part: Trajectory, arm: ArmModel) -> Trajectory:
     """
-    Return a trajectory with the torque of a model in place of the measured one.
+    Replace the measured torque of a trajectory by that of a model.
 
     A prediction that contains the measurement explains anything.
 

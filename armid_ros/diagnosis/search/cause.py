@@ -54,11 +54,11 @@ class Cause:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
-        """Name, joints and quantities, which causes of different shapes have in common."""
+        """Identity of the cause whatever its shape: name, joints and quantities."""
         return self.effect.name, self.effect.joints, self.kept
 
     def aimed_at(self, residual: Sequence[FloatArray]) -> Cause:
-        """Return the same with products with another residual, (n, M) of each recording."""
+        """Return the cause with its products recomputed for another residual, (n, M) each."""
         joints = list(self.joints)
         pairs = zip(self.columns, residual, strict=True)
         aim = tuple(np.einsum('tmp,tm->p', x, y[joints]) for x, y in pairs)

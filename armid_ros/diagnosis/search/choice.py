@@ -69,7 +69,7 @@ _ONE_EACH = (
 @dataclass(frozen=True)
 class Explainer:
     """
-    Explains the gap of an arm by effects of a library.
+    Finds the explanation of a gap among the effects of a library.
 
     Attributes
     ----------
@@ -102,13 +102,13 @@ class Explainer:
     unseen: Sequence[Trajectory] = ()
 
     def chosen(self) -> Chosen:
-        """Return the explanation that is given of the gap."""
+        """Choose the explanation of the gap."""
         if self.baseline is not None:
             return self._since(self.baseline)
         return self._alone() if self.misfit is None else self._beside(self.misfit)
 
     def _alone(self) -> Chosen:
-        """Explain what a model lacks of which nothing else is known."""
+        """Explain the gap of a model without a baseline or a known misfit."""
         prepared, settings = self.prepared, self.settings
         self.tell(0.2, 'what the model lacks')
         evidence = Evidence.over_noise(prepared.data, prepared.sigma)
@@ -135,7 +135,7 @@ class Explainer:
 
     def _beside(self, written: Misfit) -> Chosen:
         """
-        Explain what has changed since a model was identified, of whose misfit the size is known.
+        Explain the change since identification, whose misfit is known in size only.
 
         Another motion makes another misfit, and without the recordings its form is unknown: where
         the residual is within what a model may leave of motions that were not used, nothing is
@@ -158,7 +158,7 @@ class Explainer:
         return Chosen(found, misfit, WRITTEN_MISFIT, notes, _NO_BASELINE, result.first)
 
     def _since(self, baseline: Baseline) -> Chosen:
-        """Explain what has changed since the baseline."""
+        """Explain the change since the baseline."""
         prepared = self.prepared
         now, then = torque_rms(prepared.data), torque_rms(baseline.data)
         misfit = baseline.misfit * louder(now, then)
@@ -176,7 +176,7 @@ class Explainer:
         return Chosen(found, misfit, OWN_MISFIT, notes, untested, result.first)
 
     def _changes(self, result: Result, evidence: Evidence, spread: float) -> Explanation:
-        """Explain what has changed in a model that stays as given."""
+        """Explain a change while the model stays as given."""
         nuisance = replace(result.nuisance, accepted=())
         fitted = tuple(range(nuisance.rows.before + count_recordings(self.prepared.data)))
         setting = result.under.setting
@@ -187,7 +187,7 @@ class Explainer:
         self, baseline: Baseline, misfit: FloatArray, sigma: Sequence[FloatArray]
     ) -> Rows:
         """
-        Return the rows of both days, those that nothing is fitted to as well.
+        Return the rows of both days, held-out recordings included.
 
         What a model gets wrong grows with what the arm does: with its torque, and its speed.
 
@@ -253,7 +253,7 @@ def _noise_within(
     misfit: FloatArray, prepared: Prepared, period_recorded: float
 ) -> tuple[FloatArray, ...]:
     """
-    Return the noise of data beside a misfit that contains noise, each (n,).
+    Return the noise of each trajectory where the misfit contains noise, (n,).
 
     What periods differ by is more where something happens in one of them, which is a gap: noise
     beyond the misfit differs from row to row. Data that were sampled as often have none beyond it.

@@ -51,7 +51,7 @@ _SAMPLED = 8
 @dataclass(frozen=True)
 class Accepted:
     """
-    A cause that was found, and what the data do not tell from it.
+    An accepted cause with its rivals.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Accepted:
 @dataclass(frozen=True)
 class Result:
     """
-    What a comparison found.
+    Result of a comparison.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Result:
 @dataclass(frozen=True)
 class CauseComparison:
     """
-    Causes of what a model leaves, compared by their evidence.
+    Bayesian comparison of the causes of a residual.
 
     Attributes
     ----------
@@ -130,13 +130,13 @@ class CauseComparison:
         return usual_spread(self._causes_of(self.nuisance)[::_SAMPLED], self.nuisance, under)
 
     def first(self) -> Result:
-        """Look at all causes, and accept none."""
+        """Compare all causes without accepting any."""
         look = self.look(self.nuisance)
         effects = tuple(self.catalogue.effects)
         return Result((), self.nuisance, look.under, look, effects)
 
     def found(self) -> Result:
-        """Accept the best cause as long as any is beyond doubt; drop what others make needless."""
+        """Accept the best cause while one is significant; drop those that no longer are."""
         accepted, nuisance = list[Accepted](), self.nuisance
         result = self.first()
         look = result.first
@@ -153,7 +153,7 @@ class CauseComparison:
         return replace(result, accepted=tuple(accepted), nuisance=nuisance, under=under)
 
     def best(self, look: Look, explained: float) -> Accepted | None:
-        """Return the best cause of a look with its rivals; None if none is beyond doubt."""
+        """Return the best cause of a comparison with its rivals; None if none is significant."""
         levels = self.thresholds
         telling = [
             one
@@ -219,7 +219,7 @@ class CauseComparison:
         return Look(ranking, others, nuisance, likeliest, self.usual)
 
     def ranked(self, cause: Cause, nuisance: Nuisance) -> Ranked:
-        """Compare a cause with nothing over all settings."""
+        """Compare a cause with no cause, over all settings."""
         settings = self._settings(nuisance)
         fits = [(odds(cause, nuisance, one), one) for one in settings]
         nothing = np.logaddexp.reduce([under.evidence for _, under in fits])
@@ -234,7 +234,7 @@ class CauseComparison:
         return Ranked(cause, fit, data, there, under)
 
     def _in_best_shape(self, cause: Cause, nuisance: Nuisance, under: Marginal) -> Cause:
-        """Return a cause in the shape near its own that explains most."""
+        """Refine the shape of a cause to maximise what it explains."""
         best = [(odds(cause, nuisance, under).factor, cause)]
 
         def gain(shape: FloatArray) -> float:
@@ -252,7 +252,7 @@ class CauseComparison:
     def _pruned(
         self, accepted: list[Accepted], nuisance: Nuisance
     ) -> tuple[list[Accepted], Nuisance]:
-        """Drop causes, but the last, whose posterior says that they may be zero."""
+        """Drop causes whose posterior includes zero, except the last one."""
         while len(accepted) > 1:
             values, covariance = nuisance.whole(self._likeliest(nuisance))
             worth = []
@@ -273,7 +273,7 @@ class CauseComparison:
 
 
 def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
-    """Return the amplitudes that maximise the evidence of the baseline."""
+    """Return the discrepancy amplitudes that maximise the evidence of the baseline."""
     before = np.flatnonzero(~nuisance.rows.today).tolist()
     lasting = 1.0
     for _ in range(2):
@@ -287,7 +287,7 @@ def settings_of_baseline(nuisance: Nuisance) -> tuple[Setting, ...]:
 
 
 def settings_alone() -> tuple[Setting, ...]:
-    """Return the amplitudes that are compared without a baseline."""
+    """Return the discrepancy amplitudes to compare without a baseline."""
     return tuple(
         Setting(free, share, share, factor, LASTING, odds + more)
         for free in (False, True)
@@ -297,14 +297,14 @@ def settings_alone() -> tuple[Setting, ...]:
 
 
 def settings_of_misfit(free: bool) -> tuple[Setting, ...]:
-    """Return the amplitudes that are compared where only the size of the misfit is known."""
+    """Return the discrepancy amplitudes to compare where only the size of the misfit is known."""
     return tuple(
         Setting(free, share, share, noise, LASTING) for share, noise in product(_OWN, (0.5, 1.1))
     )
 
 
 def _leading(settings: Sequence[Marginal]) -> list[Marginal]:
-    """Return the best settings of a body as given and of a free one, and those of noise alone."""
+    """Return the best settings with a fixed and with a free body, and those with noise alone."""
     found = []
     for free in (False, True):
         own = [one for one in settings if one.setting.free is free]

@@ -93,7 +93,7 @@ def explain(
 
 
 def _matters(cause: Cause, values: FloatArray, result: Result, material: float) -> bool:
-    """Return whether what a value makes is as large a share of some joint's torque as matters."""
+    """Return whether the torque of a cause is a material share of the torque of any joint."""
     made = np.max(np.abs(values) * cause.torque, axis=1)
     return bool(np.any(made >= material * result.nuisance.rows.torque))
 
@@ -102,7 +102,7 @@ def _open(
     result: Result, unknown: Sequence[Effect], settings: DiagnosisSettings
 ) -> Iterator[Trial]:
     """
-    Yield friction and offsets without given values, which are fitted with all causes.
+    Yield friction and offsets without given values; they are fitted with every cause.
 
     The odds that one is not zero are those of its prior and its posterior at zero (Dickey, The
     weighted likelihood ratio, 1971).
@@ -151,7 +151,7 @@ def survey_of(
     settings: DiagnosisSettings,
     named: Collection[Key] = (),
 ) -> Survey:
-    """Return what the first look showed of all causes, those that were named first."""
+    """Summarise the first comparison of all causes, named ones first."""
     look, material = result.first, settings.material
     ranking = sorted(look.ranking, key=lambda one: one.cause.key not in named)
     every = [

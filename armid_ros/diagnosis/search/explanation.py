@@ -36,7 +36,7 @@ _ALIKE = 1.05
 @dataclass(frozen=True)
 class Explanation:
     """
-    The names that are given, with their values.
+    The named causes with their values.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Explanation:
 @dataclass(frozen=True)
 class Chosen:
     """
-    The explanation that is given.
+    The chosen explanation.
 
     Attributes
     ----------
@@ -147,13 +147,13 @@ class Chosen:
 
 
 def at_floor(explanation: Explanation, settings: DiagnosisSettings) -> bool:
-    """Return whether the residual of an explanation is no gap in any joint."""
+    """Return whether an explanation leaves no gap in any joint."""
     limits = explanation.evidence.limits(explanation.residual, settings)
     return bool(np.all(explanation.chi2_per_row <= limits))
 
 
 def as_bodies(explanation: Explanation) -> tuple[Explanation, tuple[str, ...]]:
-    """Return an explanation with physically consistent links, if any fit as well, and a note."""
+    """Make links physically consistent if that fits as well; return explanation and note."""
     problem, fitted = explanation.problem, explanation.fitted
     if problem is None or not problem.refits_body:
         return explanation, ()

@@ -202,12 +202,12 @@ class Nuisance:
         return found
 
     def among_accepted(self, cause: Cause, k: int) -> FloatArray:
-        """Return products of the columns of accepted causes with those of a cause, (a, p)."""
+        """Return the cross products of accepted causes with a cause, (a, p)."""
         parts = [float(one.acts[k]) * one.cause.products_with(cause, k) for one in self.accepted]
         return np.concatenate([np.zeros((0, len(cause.unit))), *parts])
 
     def products(self, cause: Cause, k: int) -> FloatArray:
-        """Return products of all columns of a recording with those of a cause, (q + a, p)."""
+        """Return the cross products of all columns of a recording with a cause, (q + a, p)."""
         if not self.accepted:
             return cause.products[k]
         return np.concatenate([cause.products[k], self.among_accepted(cause, k)])
@@ -241,7 +241,7 @@ class Nuisance:
     @cached_property
     def reach(self) -> FloatArray:
         """
-        Return by how much more the discrepancy may be where the first day has not been, (n, f).
+        Return the factor of the discrepancy in states that the first day did not visit, (n, f).
 
         A misfit says what a model gets wrong where it was measured. Elsewhere that is a share of
         the torque.
@@ -260,7 +260,7 @@ class Nuisance:
         return np.asarray(np.clip(more, 1.0, most[:, np.newaxis]))
 
     def _precision(self, setting: Setting) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-        """Return the prior precision of the parameters that are fitted, and which these are."""
+        """Return the prior precision of the fitted parameters, and their indices."""
         unit = self.rows.amplitude[0]
         body = self.turn.T @ self.described @ self.turn + _HELD * np.eye(self.rank)
         size = max(setting.shared, _HELD) * unit[:, np.newaxis] * self.reach
@@ -291,7 +291,7 @@ class Nuisance:
         less: tuple[int, FloatArray, FloatArray] | None = None,
     ) -> Marginal:
         """
-        Integrate out the discrepancies d_k, and fit what is left.
+        Integrate out the discrepancies d_k and fit the other parameters.
 
         Parameters
         ----------
@@ -342,7 +342,7 @@ class Nuisance:
         scale: float,
         size: FloatArray,
     ) -> tuple[MotionDiscrepancy, float]:
-        """Return what d_k of a size (n,) takes up, and the logarithm of its integral."""
+        """Marginalise d_k of a prior size (n,); return it with the log of its integral."""
         place, functions = self.discrepancy, self.discrepancy.shape[1]
         own = square[place[:, :, np.newaxis], place[:, np.newaxis, :]] * scale
         held = own + np.eye(functions) * size[:, np.newaxis, np.newaxis] ** -2.0
@@ -355,14 +355,14 @@ class Nuisance:
         )
 
     def whole(self, under: Marginal) -> tuple[FloatArray, FloatArray]:
-        """Return all values under a setting and their covariance, zero of what is not fitted."""
+        """Return all values under a setting and their covariance; both zero where not fitted."""
         size = len(self.cross[0])
         covariance = np.zeros((size, size))
         covariance[np.ix_(under.used, under.used)] = under.root.T @ under.root
         return self.means(under), covariance
 
     def means(self, under: Marginal) -> FloatArray:
-        """Return all values under a setting, zero of what is not fitted."""
+        """Return all values under a setting; zero where not fitted."""
         values = np.zeros(len(self.cross[0]))
         values[under.used] = under.values
         return values
@@ -377,7 +377,7 @@ class Nuisance:
         return rest
 
     def unexplained(self, values: FloatArray, setting: Setting, k: int) -> FloatArray:
-        """Return the same without what the discrepancy d_k of that motion takes up, (n, M)."""
+        """Return the weighted residual of a recording without its discrepancy d_k, (n, M)."""
         rest = self.rest(values, k)
         if not setting.own:
             return rest
@@ -395,7 +395,7 @@ class Nuisance:
         return np.asarray(self.turn @ values[: self.rank])
 
     def lasting(self, under: Marginal, recordings: Sequence[int], least: float) -> float:
-        """Return how many rows of what is left make one independent row, at the median."""
+        """Return the median correlation length of the residual [rows]."""
         found = []
         values = self.means(under)
         for k in recordings:

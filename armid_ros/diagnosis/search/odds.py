@@ -40,7 +40,7 @@ _ROUNDING = 1e-7
 @dataclass(frozen=True)
 class CauseFit:
     """
-    Values of a cause and what they are worth.
+    Posterior of the values of a cause, with its evidence.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class CauseFit:
 @dataclass(frozen=True)
 class CauseInformation:
     """
-    What groups of recordings tell of the values of a cause, over its unit.
+    Information on the values of a cause, per group of recordings, in its unit.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class CauseInformation:
         return replace(self, matrix=matrix, vector=self.vector[kept], today=self.today[of_it])
 
     def apart(self, spread: float) -> list[FloatArray]:
-        """Return the root of the covariance of what values differ by between recordings."""
+        """Return the Cholesky-like root of the covariance between recordings."""
         if not spread:
             return []
         p, groups = self.size, len(self.today)
@@ -156,7 +156,7 @@ class CauseInformation:
         return [np.kron(np.eye(groups), axes * np.sqrt(np.minimum(spread / size, THERE**2)))]
 
     def there(self) -> FloatArray:
-        """Return the root of the covariance of values that were there before."""
+        """Return the root of the covariance of values that act on both days."""
         return np.tile(THERE * np.eye(self.size), (len(self.today), 1))
 
 
@@ -169,7 +169,7 @@ def odds(
     bounded: bool = True,
 ) -> CauseFit:
     """
-    Return the log Bayes factor of a cause, with its values.
+    Return the log Bayes factor of a cause and its posterior values.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def odds(
 
 
 def allowed(cause: Cause, fit: CauseFit, nuisance: Nuisance) -> float:
-    """Return the log of the share of the posterior within bounds, over that of the prior."""
+    """Return the log ratio of posterior to prior probability within the bounds."""
     arm, kept = nuisance.arm, list(cause.kept)
     whole, std = np.zeros((2, len(cause.effect.parameters(arm.robot))))
     whole[kept], std[kept] = fit.values, fit.std

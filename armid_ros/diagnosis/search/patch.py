@@ -94,7 +94,7 @@ class Patch:
 
 
 def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
-    """Return the bounds of values, less what the arm has of the effect already, each (P,)."""
+    """Return the bounds of the change of values, given what the arm already has, each (P,)."""
     lower, upper = effect.bounds()
     there = place_in(arm, effect)
     if there is None:
@@ -105,7 +105,7 @@ def room(effect: Effect, arm: ArmModel) -> tuple[FloatArray, FloatArray]:
 
 
 def _shape_bounds(effect: Effect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return lower and upper bounds of a shape and steps for finite differences, per value."""
+    """Return the bounds of a shape and the finite-difference steps, per value."""
     owners = len(effect.owners)
     low = np.tile([s.lower for s in effect.shapes], owners)
     high = np.tile([s.upper for s in effect.shapes], owners)
@@ -127,7 +127,7 @@ def patch_columns(state: Patch, part: Trajectory) -> list[FloatArray]:
 
 
 def _shape_columns(model: ArmModel, position: int, motion: Motion) -> FloatArray:
-    """Return the columns of the shape of a model's effect by finite differences, (N, n, S)."""
+    """Differentiate the torque of an effect by its shape with finite differences, (N, n, S)."""
     effect = model.effects[position]
     low, high, step = _shape_bounds(effect)
     shape = np.array(effect.shape)

@@ -115,7 +115,7 @@ class JointFit:
         known: FloatArray | None = None,
     ) -> JointFit:
         """
-        Return the fit of an arm beside nothing but noise, its body being fitted anew.
+        Set up the fit where the residual is noise alone; the body is refitted.
 
         Parameters
         ----------
@@ -136,7 +136,7 @@ class JointFit:
 
     @property
     def refits_body(self) -> bool:
-        """Whether the body of the arm is not that of the given one."""
+        """Whether the body of the arm is refitted."""
         return self.stated and self.setting.free
 
     def fit(
@@ -191,7 +191,7 @@ class JointFit:
         )
 
     def _arm(self, state: Patch, means: FloatArray) -> ArmModel:
-        """Return the arm with names, and with the means of body and friction if stated."""
+        """Return the arm with the named causes, and with fitted body and friction if stated."""
         change = self.nuisance.body_change(means)
         if not (self.stated and np.any(change)):
             return state.model
@@ -202,18 +202,18 @@ class JointFit:
     def with_names_at(
         self, named: Sequence[SelectedEffect], values: Sequence[FloatArray]
     ) -> ArmModel:
-        """Return the arm with names at given values, all else fitted."""
+        """Return the arm with named causes at given values, all other parameters fitted."""
         state = Patch(self.arm, tuple(named), tuple(values))
         there = self.nuisance.with_residual(self._weighted(state.model))
         return self._arm(state, there.means(there.marginal(self.setting, self.recordings)))
 
     def as_described(self) -> JointFit:
-        """Return the same with the body as it is described."""
+        """Return the fit with the body held at the description."""
         return replace(self, setting=replace(self.setting, free=False))
 
     def rest(self, fitted: Fitted) -> list[FloatArray]:
         """
-        Return what is left beside body and discrepancy on the day in question.
+        Return the residual of the day in question without body and discrepancy.
 
         Returns
         -------
@@ -236,7 +236,7 @@ class JointFit:
         return found
 
     def _weighted(self, model: ArmModel) -> list[FloatArray]:
-        """Return the weighted residual of each recording, (n, M), with an arm as it is today."""
+        """Return the weighted residual of each recording, (n, M), for the arm of today."""
         rows = self.nuisance.rows
         rest = [
             part.residual(model) if rows.today[part.fold] else np.zeros_like(part.unsure)
@@ -258,7 +258,7 @@ class JointFit:
 
     def _moved(self, linear: Nuisance, means: FloatArray) -> FloatArray:
         """
-        Return how far values move if they had been there before, and still are.
+        Return the change of the values if the cause had acted on the first day as well.
 
         No value is expected to have been larger than now: its present size is the standard
         deviation of its prior, about zero.
@@ -275,7 +275,7 @@ class JointFit:
         return both.means(under)[size : len(means)] - means[size:]
 
     def linear(self, state: Patch) -> Nuisance:
-        """Return the nuisance columns with those of the names, linear in values at a state."""
+        """Return the nuisance columns with those of the named causes, linearised at a state."""
         if not state.named:
             return self.nuisance
         rows, result = self.nuisance.rows, self.nuisance

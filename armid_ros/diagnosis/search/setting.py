@@ -17,7 +17,7 @@ LASTING = 2.0
 @dataclass(frozen=True)
 class Setting:
     """
-    Whether the body is free, and amplitudes.
+    Whether the body is free, and the amplitudes of discrepancy and noise.
 
     Attributes
     ----------
@@ -43,13 +43,13 @@ class Setting:
 
     @property
     def precision(self) -> float:
-        """Precision of a row."""
+        """Precision of a row, 1 / variance."""
         return 1.0 / (self.lasting * self.noise**2)
 
 
 @dataclass(frozen=True)
 class MotionDiscrepancy:
-    """What the discrepancy d_k of one recording leaves: see `Nuisance.marginal`."""
+    """The marginalised discrepancy d_k of one recording; see `Nuisance.marginal`."""
 
     inverse: FloatArray
     aim: FloatArray

@@ -36,7 +36,7 @@ Spans: TypeAlias = Mapping[int, tuple[int, int]]
 @dataclass(frozen=True)
 class Span:
     """
-    Seconds of a recording in which a cause acts.
+    Time span of a recording in which a cause acts.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Span:
 
 @dataclass(frozen=True)
 class _Timed:
-    """A cause in the recordings of the day in question, divided at change points."""
+    """A cause with candidate change points in each recording of the day in question."""
 
     ranked: Ranked
     look: Look
@@ -129,7 +129,7 @@ class _Timed:
         return {k: (0, len(edges) - 1) for k, edges in self.edges.items()}
 
     def coarse(self) -> tuple[Ranked, Spans]:
-        """Return the likeliest spans of coarse pairs of edges."""
+        """Return the likeliest spans on a coarse grid of edges."""
         found, spans = self.throughout, self._whole
         for k, edges in self.edges.items():
             coarse = np.unique(np.linspace(0, len(edges) - 1, _COARSE).astype(int)).tolist()
@@ -155,7 +155,7 @@ class _Timed:
         recording: int,
         tried: Iterable[tuple[int, int]],
     ) -> tuple[Ranked, Spans]:
-        """Return the likeliest of spans that are tried for one recording."""
+        """Return the likeliest of the spans tried for one recording."""
         last, least = len(self.edges[recording]) - 1, round(_SHORTEST / _STEP)
         for a, b in tried:
             if 0 <= a <= b <= last and (b - a >= least or a == b == 0):

@@ -24,7 +24,7 @@ Key: TypeAlias = tuple[str, tuple[str, ...], tuple[int, ...]]
 @dataclass(frozen=True)
 class Trial:
     """
-    What a cause is worth.
+    A cause with its values, its evidence and its rivals.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Trial:
 @dataclass(frozen=True)
 class Ranked:
     """
-    A cause that was compared.
+    A cause with its evidence.
 
     Attributes
     ----------
@@ -113,17 +113,17 @@ class Ranked:
 
     @property
     def worth(self) -> float:
-        """Log posterior probability, but for a constant."""
+        """Log posterior probability up to a constant."""
         return self.data + self.cause.prior
 
     @property
     def left(self) -> float:
-        """Half of the weighted squares that it leaves."""
+        """Half of the weighted residual squares that remain."""
         return self.under.loss - self.fit.explained
 
     def ahead(self, other: Ranked, levels: Thresholds) -> float:
         """
-        Return the log odds to another cause.
+        Return the log odds against another cause.
 
         A lead of a share of what is explained is none, as laws are inexact, unless one leaves so
         little that the other is no fit then. Then what freedom costs and what is commoner
@@ -142,7 +142,7 @@ class Ranked:
 @dataclass(frozen=True)
 class Look:
     """
-    A look at all causes.
+    One comparison of all causes.
 
     Attributes
     ----------
@@ -166,13 +166,13 @@ class Look:
     usual: float
 
     def worth(self, one: Ranked, material: float) -> Trial:
-        """Return what a cause of a ranking is worth; see `trial`."""
+        """Return a ranked cause as a trial, with its own odds and probability."""
         own = self.trial(one.cause, material, one.under)
         return replace(own, gain=2.0 * one.data, odds=one.odds, probability=one.probability)
 
     def trial(self, cause: Cause, material: float, under: Marginal | None = None) -> Trial:
         """
-        Return what any cause is worth.
+        Evaluate any cause.
 
         Parameters
         ----------
@@ -223,7 +223,7 @@ class Look:
 @dataclass(frozen=True)
 class Survey:
     """
-    What the first look at all causes showed.
+    Summary of the first comparison of all causes.
 
     Attributes
     ----------

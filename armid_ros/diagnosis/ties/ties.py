@@ -92,7 +92,7 @@ def diagnose_ties(
 @dataclass(frozen=True)
 class _Ties:
     """
-    Recordings of an arm and of another machine, as a regression of the ties.
+    Regression of the ties between an arm and another machine.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class _Ties:
     partner: Partner
 
     def significant(self) -> tuple[list[SelectedEffect], list[FloatArray]]:
-        """Return the significant ties, as straps where a common slack is, with their values."""
+        """Return the significant ties with their values; as straps if they share a slack."""
         arm = self.explainer.arm
         tried: list[tuple[float, InteractionProblem, Interaction]] = []
         for slack in (0.0, *TiedSlack.shapes[0].grid):
@@ -143,7 +143,7 @@ class _Ties:
 
     def without_bias(self, found: Explanation) -> Explanation:
         """
-        Return an explanation whose springs are as the regression has them.
+        Replace the springs of an explanation by those of the unbiased regression.
 
         The body is as described where that explains the torques as well as a fitted one.
 
@@ -173,7 +173,7 @@ class _Ties:
         return replace(found, fitted=_with_springs(found, fitted))
 
     def _springs(self, bare: ArmModel, inertias: Inertias, joints: set[str]) -> Interaction | None:
-        """Identify the springs of some joints, the effects of a bare arm being subtracted."""
+        """Identify the springs of some joints after subtracting the effects of a bare arm."""
         try:
             problem = self._problem(bare, inertias)
             kept = [k for k, joint in enumerate(problem.spring_joints) if joint in joints]
@@ -184,7 +184,7 @@ class _Ties:
     def _problem(
         self, bare: ArmModel, inertias: Inertias, slack: float = 0.0
     ) -> InteractionProblem:
-        """Set up the regression of all ties, with the effects of a bare arm subtracted."""
+        """Set up the regression of all ties after subtracting the effects of a bare arm."""
 
         def rest(motion: Motion) -> FloatArray:
             return np.asarray(bare.torque(motion) - inverse_dynamics(bare.robot, motion))
@@ -242,7 +242,7 @@ def _with_springs(explanation: Explanation, found: Interaction) -> Fitted:
 def _as_one_cause(
     explainer: Explainer, evidence: Evidence, partner: Partner, fitted: Fitted
 ) -> tuple[Trial, Survey]:
-    """Compare all ties as one cause with the library; return what they are worth, and the rest."""
+    """Compare all ties, as one cause, with the library; return their trial and the survey."""
     settings, robot = explainer.settings, explainer.arm.robot
     free = [one for one in settings_alone() if one.free]
     comparison = explainer.comparison(Rows.over_noise(evidence), free)

@@ -31,7 +31,7 @@ _RESAMPLINGS = 500
 @dataclass(frozen=True)
 class Attribution:
     """
-    The gap and the gains of the names, block by block.
+    The gap and the gain of each name, per block of rows.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Attribution:
     taken: FloatArray
 
     def share(self, names: Sequence[int]) -> float:
-        """Return the share of the gap that some of the names explain together, at most all."""
+        """Return the share of the gap that some names explain together, at most 1."""
         share = self.taken[list(names)].sum() / max(float(self.whole.sum()), 1e-300)
         return min(float(share), 1.0)
 
@@ -66,7 +66,7 @@ def headline(
     explanation: Explanation, least: float, settings: DiagnosisSettings
 ) -> tuple[Explanation, Attribution]:
     """
-    Return an explanation without names that are small print, and the shares of the others.
+    Move names of a small share to the small print; return the shares of the others.
 
     A name is small print if it takes less than a share of the gap, each fold being predicted from
     the others, and no gap opens in any joint without it.
@@ -94,7 +94,7 @@ def headline(
 
 
 def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) -> Attribution:
-    """Predict held-out data with the first name, the first two, and so on, fitted to the data."""
+    """Measure on held-out data what each further name explains, in a given order."""
     fewer = [explanation.only(order[:count]) for count in range(1, len(order))]
     every = [explanation.reference, *(one.fitted for one in fewer), explanation.fitted]
     arms = [one.arm for one in every[: len(order) + 1]]
@@ -106,7 +106,7 @@ def predicted(explanation: Explanation, order: Sequence[int], unseen: Evidence) 
 
 
 def left_out(explanation: Explanation) -> Attribution:
-    """Predict each fold from all other data, adding the name with the largest gain at a time."""
+    """Cross-validate: add the name with the largest gain, one at a time."""
     assert explanation.problem is not None
     problem, own = explanation.problem, explanation.fitted
     linear = problem.linear(Patch(problem.arm, own.named, own.values))
@@ -124,7 +124,7 @@ def left_out(explanation: Explanation) -> Attribution:
 
 
 def _left(problem: JointFit, linear: Nuisance, names: Sequence[int]) -> FloatArray:
-    """Return the squares that some of the names leave of each block, beside the other folds."""
+    """Return the residual squares of each block, predicted from the other folds."""
     fewer = replace(linear, accepted=tuple(linear.accepted[k] for k in names))
     rows = linear.rows
     said = np.zeros(len(fewer.cross[0]), dtype=bool)

@@ -146,7 +146,7 @@ def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
-    """Return how recordings were filtered, rates and frequencies in Hz; None of bad data."""
+    """Return the filters of the recordings, rates and frequencies in Hz; None for bad data."""
     if not diagnosis.data:
         return None
     used = diagnosis.data[0].used
@@ -158,7 +158,7 @@ def _filters(diagnosis: Diagnosis) -> dict[str, float] | None:
 
 
 def _candidates(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the best candidates of the first look, in the order of their ranking."""
+    """Return the best candidates of the first comparison, best first."""
     explanation = diagnosis.explanation
     if explanation is None or explanation.survey is None:
         return []
@@ -229,7 +229,7 @@ def _sizes(trial: Trial, robot: Robot) -> Iterator[tuple[int, float]]:
 
 def _said_size(trial: Trial, arm: ArmModel) -> tuple[ParameterName, float]:
     """
-    Return a parameter of the effect that a cause is said as, and its smallest detectable size.
+    Return a parameter of the effect that a cause is named as, with its detectable size.
 
     It is inf where no size that the effect can have is detectable.
 

@@ -30,7 +30,7 @@ SAID = 0.01
 
 @dataclass(frozen=True)
 class Rival:
-    """A name that the data do not exclude in place of another, where, and how likely it is."""
+    """A competing cause that the data do not exclude, with joints and probability."""
 
     name: str
     joints: tuple[str, ...]
@@ -101,18 +101,18 @@ class Finding:
 
     @property
     def had(self) -> tuple[float, ...]:
-        """Return what each value is added to; zero where none is known."""
+        """Return the value that each change is added to; zero where none is known."""
         return self.added_to or (0.0,) * len(self.values)
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
-        """Names that the data do not exclude in its place."""
+        """Names of the rivals."""
         return tuple(rival.name for rival in self.rivals)
 
     @property
     def experiment(self) -> str:
         """
-        Say which experiment separates it from its likeliest rival; empty if there is none.
+        Return the experiment that separates it from its likeliest rival; empty without rival.
 
         No motion separates a payload from the link that carries it: it has to be taken off.
 
@@ -275,14 +275,14 @@ class Diagnosis:
     spans: tuple[Span, ...] = ()
 
     def acting_in(self, spans: Sequence[Span]) -> Diagnosis:
-        """Return the same of causes that act for a part of the time."""
+        """Return the diagnosis with the time spans in which its causes act."""
         seconds = [f'{one.source} from {one.start:.1f} to {one.stop:.1f} s' for one in spans]
         summary = f'In {", ".join(seconds)}: {self.summary} Other seconds were not diagnosed.'
         return replace(self, summary=summary, spans=tuple(spans))
 
     @property
     def estimate(self) -> Estimate | None:
-        """Values of the fit, and those of the headline in the words of the catalogue."""
+        """Estimate of the fit, followed by the named causes in terms of the catalogue."""
         if self.explanation is None:
             return None
         fit = self.explanation.fitted.estimate
@@ -300,7 +300,7 @@ class Diagnosis:
 
     @property
     def not_checked(self) -> tuple[str, ...]:
-        """Joints that show nothing: at rest throughout, or turning round all the time."""
+        """Joints without informative rows: at rest throughout, or always reversing."""
         return not_shown(self.data, self.arm.robot.joints)
 
     def __repr__(self) -> str:

@@ -63,7 +63,7 @@ def not_repeating(
     floors: Sequence[NoiseFloor], thresholds: Thresholds, least: FloatArray
 ) -> list[int]:
     """
-    Return the joints that differ between equal periods, slowly and by as much as matters.
+    Return the joints whose equal periods differ slowly and by a material amount.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ def findings(
 
 
 def _rows(parts: Sequence[_NamedEffect]) -> list[tuple[ParameterName, float, float]]:
-    """Return the parameters of effects of one name, each once, with values and deviations."""
+    """Return the parameters of all effects of one name, with values and standard deviations."""
     rows: dict[ParameterName, tuple[float, float]] = {}
     for part in parts:
         for parameter, value, std in zip(part.parameters, part.values, part.std, strict=True):
@@ -142,7 +142,7 @@ def small_print(explanation: Explanation) -> tuple[Finding, ...]:
 
 
 def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect]]:
-    """Return the effects of the catalogue that each name of an explanation stands for."""
+    """Translate each name of an explanation into effects of the catalogue."""
     fitted = explanation.fitted
     covariance = fitted.estimate.covariance
     result = []
@@ -169,7 +169,7 @@ def _in_words(explanation: Explanation, arm: ArmModel) -> list[list[_NamedEffect
 def _translated(
     own: SelectedEffect, values: FloatArray, covariance: FloatArray, arm: ArmModel
 ) -> list[_NamedEffect]:
-    """Translate an effect into others of the catalogue, deviations by linear propagation."""
+    """Translate an effect into others of the catalogue; standard deviations propagate linearly."""
     effect, kept, parts = own.effect, list(own.kept), []
     inside = np.zeros((len(values), len(values)))
     inside[np.ix_(kept, kept)] = covariance[: len(kept), : len(kept)]
@@ -199,7 +199,7 @@ def _translated(
 
 
 def _determined(part: _NamedEffect) -> bool:
-    """Return whether any value is three deviations from zero, and larger than is negligible."""
+    """Return whether any value is significant (3 sigma) and not negligible."""
     typical = [q.typical[0] if q.typical else 0.0 for q in part.effect.quantities]
     count = len(part.values) - len(part.effect.shape)
     size, std = np.abs(part.values[:count]), part.std[:count]

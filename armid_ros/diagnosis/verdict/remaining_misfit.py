@@ -39,7 +39,7 @@ _BESIDE = ' beside friction: a stop, a brake or a contact does that'
 @dataclass(frozen=True)
 class RemainingMisfit:
     """
-    What is left of the data of an explanation, measured.
+    The remaining misfit of an explanation.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class RemainingMisfit:
 
     def beside(self, explanation: Explanation) -> list[Excess]:
         """
-        Return what names leave, each kind for all data.
+        Return the excess that the named causes leave, for each set of data.
 
         Where the model stays as given, it is what they leave beside the body, friction and
         discrepancy of both days: another motion visits other states, in which a model has another
@@ -80,7 +80,7 @@ class RemainingMisfit:
         return list(self._of_whole(parts, left))
 
     def as_it_is(self, explanation: Explanation) -> Excess | None:
-        """Return what is left with the body as given; None if it is not fitted anew."""
+        """Return the excess with the body as given; None if it is not refitted."""
         if not explanation.refitted:
             return None
         part, given, fitted = self._parts(explanation)[:1], self.given.theta, explanation.fitted
@@ -118,7 +118,7 @@ class RemainingMisfit:
         return [replace(part, sigma=part.noise) for part in both]
 
     def shown_in(self, left: Sequence[Excess], explanation: Explanation) -> Evidence:
-        """Return the data in which the worst of what is left shows, of which a sentence speaks."""
+        """Return the data with the largest excess."""
         worst = max(range(len(left)), key=lambda k: float(left[k].ratio.max()))
         data = self._data(explanation)
         return data[worst % len(data)]  # each kind of excess is there once for each of them
@@ -129,7 +129,7 @@ class RemainingMisfit:
     def _of_whole(
         self, parts: Sequence[Evidence], left: Sequence[Sequence[FloatArray]]
     ) -> Iterator[Excess]:
-        """Yield residuals of the data, and of those that nothing was fitted to."""
+        """Yield the residuals of fitted and of held-out data."""
         usual = 1.0 if self.chosen.measured else self.settings.thresholds.predicted
         more = usual, self.settings.thresholds.predicted
         where = 'in the recordings', 'in recordings that were not used'
@@ -138,7 +138,7 @@ class RemainingMisfit:
             yield Excess(part.chi2_per_row(own) / limits, words)
 
     def resting(self, explanation: Explanation) -> list[Excess]:
-        """Return by how much joints at rest are held by more than friction, for all data."""
+        """Return the excess of torque over friction in joints at rest, for each set of data."""
         if self.settings.partner is not None:
             return []
         surely, before, found = self.settings.thresholds.surely, self.before, list[Excess]()
@@ -155,7 +155,7 @@ class RemainingMisfit:
 
 
 def places_held(arm: ArmModel, excesses: Sequence[Excess]) -> tuple[Where, ...]:
-    """Return the joints that are held, the worst first."""
+    """Return the joints that something holds at rest, the worst first."""
     excess = np.max([np.zeros(arm.robot.n_joints), *(one.ratio for one in excesses)], axis=0)
     beyond = np.where(excess > 1.0, excess, 0.0)
     order = np.argsort(-beyond)[: np.count_nonzero(beyond)]
@@ -170,7 +170,7 @@ def standing(
     arm: ArmModel, evidence: Evidence, residual: Sequence[FloatArray], surely: float
 ) -> FloatArray:
     """
-    Return the ratio of the residual to friction at rest and in reversals, squared, (n,).
+    Return the squared ratio of the residual at rest and in reversals to friction, (n,).
 
     So many units of noise and misfit (`surely`) are added to friction, in proportion to the torque
     that the model predicts: a joint accelerates most in a reversal, and the error of a model grows

@@ -82,7 +82,7 @@ class Where:
 @dataclass(frozen=True)
 class Excess:
     """
-    Losses of the joints over their limits.
+    Losses of the joints divided by their limits.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ def where_it_is(
 def where_left(
     explanation: Explanation, arm: ArmModel, shown: Evidence, settings: DiagnosisSettings
 ) -> tuple[Where, ...]:
-    """Locate what an arm leaves of some data beyond the limits of the patched model."""
+    """Locate the residual beyond the limits of the patched model."""
     patched, left = (shown.residuals(one) for one in (explanation.fitted.arm, arm))
     losses, limits = shown.chi2_per_row(left), shown.limits(patched, settings)
     beyond = np.where(losses > limits, losses - 1.0, 0.0)
@@ -206,7 +206,7 @@ def _axis(name: str, unit: str, x: FloatArray, residual: FloatArray) -> Axis:
 
 
 def _in_words(axes: Sequence[Axis]) -> str:
-    """Return the quantity that the mean residual is a function of, and of which kind."""
+    """Describe the residual as a function of one quantity, such as velocity."""
     best = axes[0]
     if best.share < _TELLING:
         return 'no function of one quantity of the joint: fast in time, or of several joints'

@@ -101,7 +101,7 @@ def decide(
 
 
 def _rivals_in_words(findings: Sequence[Finding]) -> str:
-    """Say which names may be others, a sentence with a space before it; '' where none may."""
+    """Return a sentence on rivals, with a space before it; empty without rivals."""
     several = len(findings) > 1
     pairs = [
         f'{f"the {one.name}".replace("_", " ") if several else "it"} from {others_in_words(one)}'
@@ -112,7 +112,7 @@ def _rivals_in_words(findings: Sequence[Finding]) -> str:
 
 
 def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
-    """Say that rigid body and friction were refitted, and how far off they were as given."""
+    """Return a sentence on the refit: how far off body and friction were as given."""
     if as_it_is is None or as_it_is.ratio.max() <= 1.0:
         return ''
     joint = robot.joints[int(np.argmax(as_it_is.ratio))]
@@ -124,19 +124,19 @@ def _refit(as_it_is: Excess | None, robot: Robot, floor_in_words: str) -> str:
 
 
 def larger(ratio: float) -> str:
-    """Say how much larger an error is than another one."""
+    """Format how much larger an error is than another."""
     if ratio < 1.05:
         return 'a little larger than'
     return f'{ratio:.0f} times as large as' if ratio >= 100.0 else f'{ratio:.1f} times as large as'
 
 
 def sentence(finding: Finding, of: str = 'the gap') -> str:
-    """Say in a sentence what a cause is and how much it explains, of the gap or what is left."""
+    """Return a sentence: what the cause is and how much of the gap it explains."""
     return f'{_subject(finding)} explains {percent(finding.share)} of {of}.'
 
 
 def share_interval_in_words(finding: Finding) -> str:
-    """Return the 95 % interval of a share in brackets; empty where its ends read alike."""
+    """Return the 95 % interval of a share in brackets; empty where both ends print alike."""
     low, high = (percent(end) for end in finding.share_interval)
     return f' ({low} to {high})' if low != high else ''
 
@@ -147,13 +147,13 @@ def share_in_words(finding: Finding) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share as a percentage, the digit that matters kept: '96 %', '0.4 %'."""
+    """Format a share as a percentage with its leading digit: '96 %', '0.4 %'."""
     size = abs(100.0 * share)
     return f'{100.0 * share:z.0f} %' if size >= 2.0 or size < 0.05 else f'{100.0 * share:.1f} %'
 
 
 def _sentences(findings: Sequence[Finding]) -> str:
-    """Say in sentences what was named; names that are one cause share one."""
+    """Return a sentence for each cause; names that are one cause share it."""
     found: list[str] = []
     for group in by_cause(findings):
         first, *others = (_subject(one) for one in group)
@@ -171,7 +171,7 @@ def names_and_places(group: Sequence[Finding]) -> str:
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """Return findings, those together that are one cause and have their share in common."""
+    """Group the findings that are one cause and share their share of the gap."""
     groups: list[list[Finding]] = []
     done: set[str] = set()
     for one in findings:
@@ -206,7 +206,7 @@ def _subject(finding: Finding) -> str:
 
 def _values(finding: Finding) -> Iterator[str]:
     """
-    Yield the values of a cause, with the name where it differs from that of the one before.
+    Yield the formatted values of a cause; repeated parameter names are left out.
 
     Values whose interval includes zero are left to the table, unless all do.
 
@@ -231,12 +231,12 @@ def vague(finding: Finding, parameter: ParameterName, value: float, std: float) 
 
 
 def added(had: float) -> str:
-    """Say what a value is added to; nothing where that is zero."""
+    """Format the value that a change is added to; empty where it is zero."""
     return f', added to {had:.4g}' if had else ''
 
 
 def _with_degrees(value: float, std: float, unit: str) -> str:
-    """Return a value with its interval; an angle in degrees as well, to the same digits."""
+    """Format a value with its interval; angles also in degrees."""
     text = f'{as_sure(value, std)} {unit}'.strip()
     degrees, *_ = as_sure(np.rad2deg(value), np.rad2deg(std)).split(' ')
     return f'{text}, {degrees} degrees' if unit == 'rad' else text
@@ -254,7 +254,7 @@ def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
 
 
 def others_in_words(finding: Finding) -> str:
-    """Return the rivals of a name in words, with their joints if any rival has other joints."""
+    """List the rivals of a name, with joints if any rival has other joints."""
     elsewhere = any(set(rival.joints) != set(finding.joints) for rival in finding.rivals)
     words = []
     for rival in finding.rivals:
@@ -265,7 +265,7 @@ def others_in_words(finding: Finding) -> str:
 
 
 def as_sure(value: float, std: float) -> str:
-    """Return a value and the half-width of its 95 % interval, to two digits of the latter."""
+    """Format a value with the half-width of its 95 % interval, to two digits of the latter."""
     wide = HALF_WIDTH * std
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'

@@ -1,0 +1,30 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The diagrams of jobs show the calls of the code."""
+
+import pytest
+
+from docsite.architecture import architecture_page, JOBS, steps
+from docsite.sample import drawn
+
+
+@pytest.mark.parametrize('job', JOBS)
+def test_a_job_leads_from_its_command_to_its_result(root, job):
+    found = steps(root / 'armid_ros', *JOBS[job])
+    names = [one.name for one in found]
+    assert len(found) < 60  # one sheet
+    assert any(one.room == 'api' and one.name == JOBS[job][1] for one in found) or job == 'excite'
+    assert all(one.summary for one in found)
+    if job == 'identify':
+        order = ['conditioning', 'regressions', 'fit_values', 'halves_error', 'save_model']
+        assert sorted(order, key=names.index) == order
+
+
+def test_every_job_has_a_diagram(root):
+    page = architecture_page(root / 'armid_ros')
+    assert page.count('<svg ') == page.count('</svg>') == len(JOBS)
+
+
+def test_a_sample_is_drawn_alike_from_docstrings_messages_and_pages():
+    sample = drawn(1, 30)
+    assert len(set(sample)) == 30 and sample == drawn(1, 30)
