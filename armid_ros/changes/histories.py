@@ -131,7 +131,7 @@ def judge(
 
 
 def named(judged: Judged, alpha: float) -> tuple[HistoryChange, ...]:
-    """Return the changes for which an arm is named: those that would name it by themselves."""
+    """Return the changes that are significant by themselves."""
     if judged.adjusted > alpha or not judged.changes:
         return ()
     limit = alpha * judged.p / judged.adjusted / len(judged.changes)
@@ -154,7 +154,7 @@ def largest_change(series: ParameterHistory, spread: Spread) -> HistoryChange:
 
 
 def wear(series: ParameterHistory, spread: Spread) -> tuple[float, float]:
-    """Return the slope of a series and its standard deviation, in a month."""
+    """Return the slope of a series per month, and its standard deviation."""
     slope, std, _ = line(series.days, series.values, 1.0 / variances(series, spread)[0])
     return slope * MONTH, std * spread.trends * MONTH
 

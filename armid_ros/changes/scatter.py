@@ -86,7 +86,7 @@ class ParameterHistory:
 @dataclass(frozen=True)
 class Spread:
     """
-    How much estimates of a parameter differ from bag to bag beyond what they state.
+    Spread of a parameter between bags beyond its stated uncertainty.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class Splits:
 
 
 def splits(series: ParameterHistory, spread: Spread) -> Splits:
-    """Return the steps and the trend of a series, in deviations of neighbours."""
+    """Return the steps and the trend of a series, in standard deviations of neighbours."""
     variance, freedom = variances(series, spread)
     std = np.sqrt(variance)
     # values that are odd among their neighbours are moved to the edge of the noise
@@ -161,7 +161,7 @@ def splits(series: ParameterHistory, spread: Spread) -> Splits:
 
 
 def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]:
-    """Return by how much estimates of each parameter differ beyond what they state."""
+    """Return the spread of each parameter beyond its stated uncertainty."""
     found = {parameter: _spread(group) for parameter, group in by_parameter(series).items()}
     names: dict[str, list[ParameterHistory]] = {}
     for one in series:
@@ -177,7 +177,7 @@ def spreads(series: Sequence[ParameterHistory]) -> dict[tuple[str, str], Spread]
 
 def without_days(series: Sequence[ParameterHistory]) -> list[ParameterHistory]:
     """
-    Return the series without what all siblings share on a day.
+    Subtract the effect of each day that all siblings share.
 
     That goes with the size of the parameter, as of friction that is so much less in the heat.
     Days on which few siblings have bags are left as they are.
@@ -221,7 +221,7 @@ def _polished(group: Sequence[ParameterHistory]) -> list[FloatArray]:
 
 
 def _medians(values: FloatArray, label: npt.NDArray[np.intp]) -> FloatArray:
-    """Return the median of the values of every label 0, 1, ..."""
+    """Return the median of the values of each label 0, 1, ..."""
     order = np.lexsort((values, label))
     counts = np.bincount(label)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -250,7 +250,7 @@ def _spread(group: Sequence[ParameterHistory]) -> Spread:
 
 def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Spread]) -> float:
     """
-    Return the degrees of freedom of what the variances of arms have in common.
+    Return the prior degrees of freedom of the variances of arms (empirical Bayes).
 
     The logarithms of their ratios scatter by trigamma(d_a / 2) + trigamma(d_0 / 2); the former is
     that of one series, the latter is solved for d_0. Arms are taken to differ by what exceeds one
@@ -268,7 +268,7 @@ def _alike(group: Sequence[ParameterHistory], found: Mapping[tuple[str, str], Sp
 
 
 def _ratio(series: ParameterHistory, spread: Spread) -> float:
-    """Return the variance of a series over the usual one."""
+    """Return the ratio of the variance of a series to the usual one."""
     stated = series.std[1:] ** 2 + series.std[:-1] ** 2 + 2.0 * spread.std**2
     squares = np.diff(series.values) ** 2 / np.maximum(stated, 1e-300)
     return max(float(np.median(squares)) / MEDIAN_SQUARE, 1e-100)
@@ -312,7 +312,7 @@ def variances(series: ParameterHistory, spread: Spread) -> tuple[FloatArray, flo
 def _lasting(
     group: Sequence[ParameterHistory], found: dict[tuple[str, str], Spread]
 ) -> tuple[float, float]:
-    """Return by how much steps and trends are larger than by neighbours, in deviations."""
+    """Return the inflation of steps and trends over the spread of neighbours."""
     steps, trends = [], []
     for one in group:
         if len(one.values) < FEWEST:

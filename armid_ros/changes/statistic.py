@@ -51,7 +51,7 @@ def tail(
     square: npt.ArrayLike, rank: npt.ArrayLike, freedom: npt.ArrayLike = np.inf
 ) -> FloatArray:
     """
-    Return the probability of a quadratic form as large without a change.
+    Return the p value of a quadratic form under no change.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def tail(
 
 
 def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
-    """Return the quadratic forms that are exceeded with a small chance without a change."""
+    """Return the thresholds of quadratic forms for a false alarm probability."""
     # Fisher's distribution as that of a share, for scipy.stats takes ten times as long
     share = special.betaincinv(0.5 * freedom, 0.5 * rank, chance)
     return np.asarray(freedom * (1.0 - share) / share)
@@ -78,7 +78,7 @@ def limits(chance: float, rank: FloatArray, freedom: FloatArray) -> FloatArray:
 
 def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """
-    Return the means of a series before and after every place at which it may be cut.
+    Return the means of a series before and after each possible change point.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def two_means(x: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def beyond_chance(chances: Sequence[float] | FloatArray, allowed: float) -> list[bool]:
-    """Return which are changes, with at most this probability of a false one (Holm 1979)."""
+    """Return the significant changes at a family-wise error rate (Holm 1979)."""
     beyond = [False] * len(chances)
     for tried, index in enumerate(np.argsort(chances)):
         if chances[index] > allowed / (len(chances) - tried):

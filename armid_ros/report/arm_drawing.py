@@ -230,7 +230,7 @@ def _strip(
     room: tuple[float, float],
     *others: FloatArray,
 ) -> Strip:
-    """Return a frame for each pose [px] that holds all bodies."""
+    """Return one frame per pose [px], all large enough for all bodies."""
     hulls = [solid.seen(frame[solid.joint])[0] for frame in frames for solid in solids]
     every = np.concatenate([*others, *hulls])
     size = np.ptp(every, axis=0) + 2.0 * _MARGIN
@@ -254,7 +254,7 @@ def _placed(strip: Strip, point: FloatArray, pose: int) -> tuple[float, float]:
 
 
 def _solids(collision: CollisionModel) -> list[_Solid]:
-    """Return the bodies of an arm and of what is around it; bars for an arm without bodies."""
+    """Return the bodies of an arm and its surroundings; bars for an arm without bodies."""
     solids = []
     for body in collision.geometry.geometryObjects:
         shape = body.geometry
@@ -285,7 +285,7 @@ def _frames(model: pin.Model, q: FloatArray) -> list[pin.SE3]:
 
 
 def flat(seen: FloatArray, points: FloatArray) -> FloatArray:
-    """Return what is right and up of points in a view, shape (..., 3) to (..., 2) [m]."""
+    """Project points onto the right and up axes of a view, (..., 3) to (..., 2) [m]."""
     return np.asarray(points @ seen[:2].T)
 
 

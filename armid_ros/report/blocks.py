@@ -241,7 +241,7 @@ class Panels(Templated):
 @dataclass(frozen=True)
 class Legend(Templated):
     """
-    What colours stand for.
+    A legend of colours.
 
     Attributes
     ----------
@@ -322,12 +322,12 @@ class BarChart(Templated):
     full: float = 0.0
 
     def percent(self, row: int, bar: Bar) -> float:
-        """Return how long a bar is, as a percentage of the space."""
+        """Return the length of a bar as a percentage of the width."""
         bars = self.rows[row][1] if self.scale_by_row else [b for _, bs in self.rows for b in bs]
         longest = self.full or max(other.value for other in bars)
         return round(100.0 * bar.value / longest, 2) if longest > 0.0 else 0.0
 
     @property
     def legend(self) -> Legend:
-        """Return what the colours stand for."""
+        """Return the legend of the colours."""
         return Legend(self.roles)

@@ -179,7 +179,7 @@ class Chart(Templated):
 
 def thinned(*series: npt.ArrayLike, most: int = MOST_SAMPLES) -> npt.NDArray[np.intp]:
     """
-    Choose samples that look like all of them.
+    Thin samples so that the curve looks the same.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
 
 
 def verdict(comparison: Comparison) -> tuple[str, str]:
-    """Return what was found in a word or three, and its colour: good, fair or bad."""
+    """Return the verdict in one to three words, and its colour: good, fair or bad."""
     if comparison.unusable:
         return 'unusable', 'bad'
     if comparison.anything:
@@ -108,7 +108,7 @@ def change_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def tell(comparison: Comparison) -> tuple[str, ...]:
-    """Say in words what changed, the surest first; the first sentence is the sum of it."""
+    """Return sentences on what changed, most significant first, after a summary."""
     if comparison.factors:
         units = tell_units(comparison.before.source, comparison.after.source, comparison.factors)
         return (*(_unusable(one) for one in comparison.unusable), units)
@@ -123,7 +123,7 @@ def tell(comparison: Comparison) -> tuple[str, ...]:
 
 
 def tell_units(before: str, after: str, factors: Mapping[str, float]) -> str:
-    """Say that torques of one of two identifications are in another unit."""
+    """Return a sentence if the torques of both identifications differ in unit."""
     named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in factors.items())
     return (
         f'Inertia and friction of {after} are those of {before} times one factor a joint '
@@ -156,7 +156,7 @@ def _sum(comparison: Comparison) -> str:
 
 
 def _details(comparison: Comparison) -> Sequence[str]:
-    """Say what changed as a whole and one by one, or how much would have been seen."""
+    """Return the changes, all together and one by one, or the smallest detectable ones."""
     if not comparison.anything:
         return [_least_visible(comparison.changes)]
     changed = comparison.changed
@@ -192,7 +192,7 @@ def _residual(change: ResidualChange, comparison: Comparison) -> str:
 
 
 def _why_left(comparison: Comparison) -> str:
-    """Say what a residual that differs may come from."""
+    """Return possible reasons of a residual that differs."""
     if any(one.why == 'effect' for one in comparison.not_compared):
         return 'The models have different effects, which may be the reason'
     ask = '' if comparison.unusable else ': run armid diagnose'
@@ -234,7 +234,7 @@ def _together(group: GroupChange) -> str:
 
 
 def _least_visible(changes: Sequence[ParameterChange]) -> str:
-    """Say how large a change would have had to be, of the kinds that wear changes."""
+    """Return the smallest detectable change of the quantities that wear changes."""
     worn = [c for c in changes if not c.parameter.rigid] or list(changes)
     known = [c for c in worn if excludes_zero(c.before, c.before_std)]
     if not known:
@@ -247,7 +247,7 @@ def _least_visible(changes: Sequence[ParameterChange]) -> str:
 
 
 def _tell_not_compared(comparison: Comparison) -> tuple[str, ...]:
-    """Say what is not compared, a sentence for each side and reason."""
+    """Return a sentence for each side and reason that something is not compared."""
     lines = []
     if comparison.left_out:
         files = ' and '.join(

@@ -67,7 +67,7 @@ def tone_of(diagnosis: Diagnosis, worse: Sequence[str] = ()) -> str:
 @dataclass(frozen=True)
 class Extras:
     """
-    What was made of a diagnosis.
+    What follows from a diagnosis: next run, simulation, learned residual.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Extras:
         return next_steps(diagnosis, self.next_run, self.no_run, model, self.worse)
 
     def sentences(self, diagnosis: Diagnosis) -> list[str]:
-        """Return shares of what was named, minor effects, what was made of it, and notes."""
+        """Return sentences on shares, minor effects, consequences and notes."""
         lines = [
             f'{names_and_places(group)}: {share_in_words(group[0])}'
             + (', together' if len(group) > 1 else '')
@@ -116,7 +116,7 @@ class Extras:
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """Joints that a simulation with the patched model is farther off in than before."""
+        """Joints in which a simulation with the patched model is worse than before."""
         return tuple(dict.fromkeys(joint for pair in self.forward for joint in pair.worse))
 
 
@@ -208,7 +208,7 @@ def diagnosis_report(
 def _at_fault(
     diagnosis: Diagnosis, read: Mapping[str, Sequence[Recording]], names: Mapping[str, str]
 ) -> list[str]:
-    """Return the recordings that a verdict of bad data names, or all that were diagnosed."""
+    """Return the recordings that a BAD DATA verdict names; all if it names none."""
     if diagnosis.verdict != 'bad_data':
         return []
     sources = [one.source for several in read.values() for one in several if one.source]
@@ -251,7 +251,7 @@ def _of_maps(residual: Residual | None) -> list[str]:
 @dataclass(frozen=True)
 class Story(Section):
     """
-    The answers to the questions that a person has, in their order.
+    The story of a diagnosis: questions of a reader with their answers.
 
     Attributes
     ----------
@@ -270,7 +270,7 @@ class Story(Section):
 
     @property
     def drawing(self) -> ArmDrawing:
-        """Return the arm in a pose that it was in, with joints of the largest cause coloured."""
+        """Draw the arm in a recorded pose, with the joints of the largest cause coloured."""
         data, robot = self.diagnosis.data, self.diagnosis.arm.robot
         cause: list[Finding] = next(iter(by_cause(self.diagnosis.findings)), [])
         names = ', '.join(one.name.replace('_', ' ') for one in cause)
@@ -364,5 +364,5 @@ class Story(Section):
 
 
 def share_of(diagnosis: Diagnosis) -> str:
-    """Return what the shares of joints are of: where something is named, of what it explains."""
+    """Return what the shares of joints refer to: the gap, or what the named causes explain."""
     return 'the explained part' if diagnosis.findings else 'the gap'

@@ -142,7 +142,7 @@ def _verdict(
     checked: Fitness,
     notes: Sequence[str],
 ) -> VerdictSection:
-    """Say how much is seen, what is known worst, and that nothing is hit."""
+    """Return the verdict: parameters seen, the worst known one, and clearance."""
     information, settings = design.information, design.settings
     std, names = information.std, information.parameters
     unseen = [
@@ -196,7 +196,7 @@ def _verdict(
 
 
 def _conditioning(condition: float) -> str:
-    """Return a condition number in words, with the limit of the usual advice."""
+    """Describe a condition number by the usual limits."""
     word = 'good' if condition < GOOD_CONDITION else 'weak'
     if GOOD_CONDITION <= condition < WEAK_CONDITION:
         word = 'fair'
@@ -297,7 +297,7 @@ def _motion_section(
 def _clearance_section(
     t: FloatArray, curves: Mapping[str, FloatArray], margin: float, notes: Sequence[str]
 ) -> ContentSection:
-    """Return how far bodies are apart, from each other and from the environment."""
+    """Return the distances of bodies, from each other and from the environment."""
     roles: tuple[Role, ...] = ('residual', 'before')
     blocks: list[PageBlock] = [
         Chart(
@@ -344,7 +344,7 @@ def _harmonics_section(trajectory: FourierTrajectory) -> ContentSection:
 
 
 def _foreseen_section(design: Design, links: Sequence[str] = ()) -> ContentSection:
-    """Return what a planned run will determine of every parameter, the best known first."""
+    """Return the predicted uncertainty of every parameter, best known first."""
     information, described = design.information, design.described
     size = information.std / information.scale
     longest = float(np.max(size, where=np.isfinite(size), initial=1e-12))

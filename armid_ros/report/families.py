@@ -56,7 +56,7 @@ def parameter_families(names: tuple[ParameterName, ...]) -> dict[tuple[str, str]
 
 def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
     """
-    Return what a parameter is and of which link or joint, in words.
+    Return the full label of a parameter with its link or joint.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ def full_label(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def _words_and_link(name: ParameterName, links: Sequence[str]) -> tuple[str, str]:
-    """Return what the first parameter of a group is, and the name of its link if it is known."""
+    """Return the label of the first parameter of a group, and its link if known."""
     symbol, number = _SYMBOL.findall(name.name)[0]
     known = 0 < int(number) <= len(links)
     return symbol_in_words(symbol), links[int(number) - 1] if known else ''
 
 
 def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
-    """Return the sum that a group of parameters is, links by their names; '' for one alone."""
+    """Return the linear combination that a group stands for; '' for a single parameter."""
     if ' ' not in name.name:
         return ''
 
@@ -99,7 +99,7 @@ def grouping(name: ParameterName, links: Sequence[str] = ()) -> str:
 
 
 def effects_in_words(effects: Sequence[Effect]) -> str:
-    """Return what effects are called, or that there are none."""
+    """List effects by name, or state that there are none."""
     return ', '.join(effect.name.replace('_', ' ') for effect in effects) or 'none'
 
 
@@ -114,7 +114,7 @@ def parameter_folds(
     order: Callable[[int], float] = float,
 ) -> list[Fold]:
     """
-    Return a table for each link, and for each kind of effects, below a line that opens it.
+    Return a folded table for each link and for each kind of effect.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def parameter_folds(
 
 
 def estimate_text(value: float, std: float) -> tuple[str, str]:
-    """Return a value and the half width of its 95 % interval; no number where that has zero."""
+    """Return a value and the half-width of its 95 % interval; a dash if that includes zero."""
     number, reach = measured(value, HALF_WIDTH * std)
     return (number if not std or abs(value) > HALF_WIDTH * std else 'includes 0'), reach
 

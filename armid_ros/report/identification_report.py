@@ -322,7 +322,7 @@ def _physical_section(
 
 
 def _without_place(exports: Mapping[str, Sequence[str]]) -> list[Paragraph]:
-    """Return what each file for other programs has no place for."""
+    """List what each exported file cannot hold."""
     homeless = []
     for file, lines in exports.items():
         kinds = Counter(line.split(':')[0] for line in lines)

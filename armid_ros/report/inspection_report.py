@@ -86,7 +86,7 @@ def inspection_report(
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
-    """Return the finding in one sentence, and the numbers behind it in others."""
+    """Return the finding in one sentence, then its numbers."""
     count = Counter(one.weight for one in remarks)
     values = 'No impossible or suspicious value in the description.'
     if count['doubt']:
@@ -118,7 +118,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
 
 
 def _wrong_mass(found: LinkCheck, k: int) -> str:
-    """Return by how much the mass of a link is wrong; empty where that is not determined."""
+    """Return the error of the mass of a link; empty where it is not determined."""
     change, reach = found.measured_mass[k] - found.mass[k], HALF_WIDTH * found.mass_std[k]
     if not abs(change) > reach:
         return ''
@@ -180,7 +180,7 @@ def description_check_report(
 
 
 def recording_facts(found: Inspection) -> list[tuple[str, str]]:
-    """Return how a recording is sampled, whether it repeats, and what reading it met."""
+    """Return sampling, repetition and repairs of a recording."""
     sampling, recording, trial = found.sampling, found.recording, found.trial
     motion = 'does not repeat'
     if sampling.period is not None:
@@ -237,7 +237,7 @@ def _joints_section(found: Inspection) -> ContentSection:
 
 
 def _curves_section(found: Inspection) -> ContentSection:
-    """Return all that was recorded, over time."""
+    """Return all recorded curves over time."""
     recording, robot = found.recording, found.robot
     blocks: list[PageBlock] = [
         Paragraph(

@@ -34,7 +34,7 @@ Caution = tuple[str, str]
 @dataclass(frozen=True)
 class Judgement:
     """
-    What to think of an identification.
+    Judgement of an identification.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ def judge(
 
 
 def _notes(result: Identification) -> list[str]:
-    """Return the notes; of a certificate what holds the fit, for the rest is good news."""
+    """Return the notes; of a physical certificate only active bounds."""
     given = result.physical
     if given is None:
         return list(result.notes)
@@ -138,7 +138,7 @@ def _simulated(verification: Verification | None) -> list[str]:
 def _of_errors(
     result: Identification, training: Score, held_out: Score | None
 ) -> Iterator[Caution]:
-    """Yield what the errors on training and on held-out data mean."""
+    """Yield statements on the errors of training and held-out data."""
     if held_out is None:
         yield '', 'Record another motion, and test the model on it: --validate BAG.'
     else:
@@ -180,7 +180,7 @@ def residual_trends(joints: Sequence[str], fits: Sequence[Fit]) -> tuple[str, ..
 
 
 def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Caution]:
-    """Yield what residuals and excitation mean."""
+    """Yield statements on residuals and excitation."""
     joints = result.arm.robot.joints
     for sentence in residual_trends(joints, fits):
         yield sentence, 'Find the missing effect with armid diagnose, and add it with --effects.'
@@ -212,7 +212,7 @@ def _of_residuals(result: Identification, fits: Sequence[Fit]) -> Iterator[Cauti
 
 
 def _of_verification(verification: Verification) -> Iterator[Caution]:
-    """Yield what simulations and the test for encoder noise mean."""
+    """Yield statements on simulations and the test for encoder noise."""
     for text in verification.left_out:
         yield text[0].upper() + text[1:] + '.', ''
     worse = ', '.join(sorted({name for pair in verification.forward for name in pair.worse}))

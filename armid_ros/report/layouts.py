@@ -22,7 +22,7 @@ _RESIDUAL = f'{_IDENTIFIER}/residual'
 
 
 def topic_prefix(namespace: str) -> str:
-    """Return what stands before the topics of a namespace: '/' or '/left_arm/'."""
+    """Return the prefix of the topics of a namespace: '/' or '/left_arm/'."""
     return '/' + (namespace.strip('/') + '/' if namespace.strip('/') else '')
 
 

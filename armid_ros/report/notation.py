@@ -36,7 +36,7 @@ def pretty(unit: str) -> str:
 
 
 def printed(text: str) -> str:
-    """Return a sentence of a document, which is ASCII, as it is printed."""
+    """Replace ASCII notation of a sentence by the printed characters."""
     return pretty(text.replace('+-', '±'))
 
 
@@ -50,13 +50,13 @@ def digits(value: float, count: int = 2) -> str:
 
 
 def plain(value: float, count: int = 3) -> str:
-    """Return a number as short as its digits allow: '5', not '5.00'; 3000, not 3e+03."""
+    """Format a number without trailing zeros or exponent: '5', not '5.00'; 3000, not 3e+03."""
     whole = 10.0**count - 0.5 <= abs(value) < 1e7
     return f'{value:.0f}' if whole else f'{value:.{count}g}'
 
 
 def measured(value: float, reach: float) -> tuple[str, str]:
-    """Return a value and the half width of its interval, to the digit that this leaves."""
+    """Format a value and the half-width of its interval to the digits that this leaves."""
     if not (math.isfinite(reach) and reach > 0.0):
         return f'{value:.4g}', '0'
     decimals = max(0, 1 - math.floor(math.log10(reach)))
@@ -75,7 +75,7 @@ def with_interval(value: float, std: float, unit: str) -> str:
 
 
 def value_of(finding: Finding, parameter: ParameterName, value: float, std: float) -> str:
-    """Return a value of a cause with its 95 % interval, or that the data do not determine it."""
+    """Format a value of a cause with its 95 % interval, or "not determined"."""
     if words.vague(finding, parameter, value, std):
         return 'not determined'
     return with_interval(value, std, parameter.unit)
@@ -99,7 +99,7 @@ def percent(share: float) -> str:
 
 
 def probability(p: float) -> str:
-    """Return a p value to the digit that matters."""
+    """Format a p value with one significant digit."""
     if p < 1e-4:
         return '< 0.0001'
     return f'{p:.1g}' if p < 0.1 else f'{p:.2f}'
@@ -111,14 +111,14 @@ def counted(number: int, what: str) -> str:
 
 
 def robot_label(source: str) -> str:
-    """Return what a robot is called in a heading: its name, or that of its file."""
+    """Return the name of a robot for a heading: its own, or that of its file."""
     path = source.split(' ')[0] if ':=' in source else source
     return PurePath(path).name or path
 
 
 def short_names(sources: Sequence[str]) -> dict[str, str]:
     """
-    Return what each source is called: the end of its path that no other one has.
+    Return the shortest unique end of each path.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def short_names(sources: Sequence[str]) -> dict[str, str]:
 
 def common_prefix(names: Sequence[str]) -> str:
     """
-    Return what all joints and links of an arm begin with, if it is long: 'panda_' of panda_joint1.
+    Return the common prefix of all joints and links if it is long, such as 'panda_'.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def common_prefix(names: Sequence[str]) -> str:
 
 
 def without_prefix(text: str, names: Sequence[str]) -> str:
-    """Return a text, as of a label, with names in it without their common prefix."""
+    """Remove the common prefix from the names in a label."""
     prefix = common_prefix(names)
     if not prefix:
         return text
@@ -171,14 +171,14 @@ def without_prefix(text: str, names: Sequence[str]) -> str:
 
 
 def many_counted(text: str, names: Sequence[str]) -> str:
-    """Return a text in which four or more names in a row are a number: '7 joints'."""
+    """Replace four or more names in a row by their number: '7 joints'."""
     one = f'(?:{"|".join(map(re.escape, names))})(?!\\w)'
     run = rf'(?<![\w/.-]){one}(?:, {one}){{3,}}'
     return re.sub(run, lambda found: f'{found[0].count(",") + 1} joints', text)
 
 
 def explained(text: str) -> Markup:
-    """Return a text as HTML, in which the first of each of the `TERMS` has its explanation."""
+    """Return HTML in which the first use of each of the `TERMS` has a tooltip."""
     html = str(escape(text))
     for term, said in TERMS.items():
         words = rf'(?<!>)\b({term.replace(" ", "[ -]")})\b'
@@ -187,7 +187,7 @@ def explained(text: str) -> Markup:
 
 
 def with_names(text: str, names: Mapping[str, str]) -> str:
-    """Return a text with names in the place of sources, the longest first."""
+    """Replace sources by names, longest first."""
     for source in sorted(names, key=len, reverse=True):
         text = text.replace(source, names[source])
     return text

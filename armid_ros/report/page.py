@@ -37,7 +37,7 @@ _names: ContextVar[Sequence[str]] = ContextVar('_names', default=())
 
 class Templated:
     """
-    Something with a template, which sees it as `block`.
+    A block with a template, in which it is `block`.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Templated:
 
 class Section(Templated):
     """
-    One part of a page, which its template sees as `section`.
+    A section of a page; its template refers to it as `section`.
 
     Attributes
     ----------
@@ -131,13 +131,13 @@ def _few(text: str) -> Markup:
 
 
 def _without_secrets(text: str) -> str:
-    """Return a text without passwords: values of arguments named so, and those in addresses."""
+    """Mask passwords: values of arguments named so, and those in addresses."""
     text = re.sub(r'(\w*(?:passw|token|secret)\w*:?=)[^\s<"&]+', r'\1***', text)
     return re.sub(r'://[^/\s@<>"]+:[^/\s@<>"]+@', '://***@', text)
 
 
 def _visible(text: str) -> str:
-    """Return a text with control characters spelled out, which names of files may have."""
+    """Spell out control characters, which names of files may have."""
     return re.sub(r'[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]', lambda c: repr(c[0])[1:-1], text)
 
 

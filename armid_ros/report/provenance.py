@@ -20,7 +20,7 @@ _PACKAGES = ('armid_ros', 'numpy', 'scipy', 'pin', 'clarabel', 'mcap')
 @dataclass(frozen=True)
 class FileHash:
     """
-    A file and what is in it.
+    A file and its digest.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class FileHash:
 @dataclass(frozen=True)
 class Provenance:
     """
-    What is needed to get the same result again.
+    What is needed to reproduce the result.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Provenance:
 
 
 def hash_files(paths: Iterable[str | Path]) -> tuple[FileHash, ...]:
-    """Hash files, and all files in folders such as bags; what is no file is left out."""
+    """Hash files, and all files in folders such as bags; skip what is no file."""
     found = []
     for path in map(Path, paths):
         inside = sorted(path.rglob('*')) if path.is_dir() else [path]

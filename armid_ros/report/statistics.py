@@ -97,7 +97,7 @@ class Whiteness:
 
     @staticmethod
     def of(fits: Sequence[Fit], joint: int, lags: int = 40) -> Whiteness:
-        """Correlate the residual of a joint with itself, within unbroken stretches."""
+        """Return the autocorrelation of a residual, within unbroken stretches."""
         longest = max(fits, key=lambda fit: len(fit.motion)).motion
         period = float(np.median(np.diff(longest.t)))
         products = np.zeros(max(2, min(lags + 1, len(longest) // 4)))
@@ -116,7 +116,7 @@ class Whiteness:
 @dataclass(frozen=True)
 class Direction:
     """
-    A combination of parameters and how well it is known.
+    A combination of parameters with its uncertainty.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class Direction:
 
 
 def torque_scale(result: Identification) -> FloatArray:
-    """Return the torque one unit of each parameter makes, in residual deviations, shape (r,)."""
+    """Return the torque of a unit of each parameter over the residual, shape (r,)."""
     columns = _some_columns(result, result.training)
     noise = np.where(result.joint_std > 0.0, result.joint_std, 1.0)
     return np.asarray(np.sqrt(np.mean((columns / noise[:, np.newaxis]) ** 2, axis=(0, 1))))
@@ -141,7 +141,7 @@ def torque_scale(result: Identification) -> FloatArray:
 
 def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
     """
-    Return how far the uncertainty of the parameters moves the predicted torque, shape (n,).
+    Return the standard deviation of the predicted torque by the parameters, shape (n,).
 
     Half widths of 95 % intervals, root mean square over a motion [N m].
 
@@ -152,7 +152,7 @@ def torque_reach(result: Identification, fits: Sequence[Fit]) -> FloatArray:
 
 
 def directions(estimate: Estimate, scale: FloatArray) -> tuple[Direction, ...]:
-    """Return independent combinations of the parameters, the worst known first."""
+    """Return uncorrelated combinations of the parameters, worst known first."""
     covariance = estimate.covariance * np.outer(scale, scale)
     variances, vectors = np.linalg.eigh(covariance)
     found = []
@@ -286,7 +286,7 @@ def residual_by_variable(
 
 
 def explained_shares(fits: Sequence[Fit], joint: int) -> dict[str, float]:
-    """Return how much of a joint's residual goes with its speed, its position and its load."""
+    """Return the shares of a joint's residual explained by speed, position and load."""
     residual, axes = residual_by_variable(fits, joint)
     if len(residual) < _FEWEST:
         return {}

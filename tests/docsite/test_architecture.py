@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The diagrams of jobs show the calls of the code."""
 
+from pathlib import Path
+
 import pytest
 
 from docsite.architecture import architecture_page, JOBS, steps
 from docsite.sample import drawn
 
+PACKAGE = Path(__file__).parents[2] / 'armid_ros'
+
 
 @pytest.mark.parametrize('job', JOBS)
-def test_a_job_leads_from_its_command_to_its_result(root, job):
-    found = steps(root / 'armid_ros', *JOBS[job])
+def test_a_job_leads_from_its_command_to_its_result(job):
+    found = steps(PACKAGE, *JOBS[job])
     names = [one.name for one in found]
     assert len(found) < 60  # one sheet
     assert any(one.room == 'api' and one.name == JOBS[job][1] for one in found) or job == 'excite'
@@ -20,8 +24,8 @@ def test_a_job_leads_from_its_command_to_its_result(root, job):
         assert sorted(order, key=names.index) == order
 
 
-def test_every_job_has_a_diagram(root):
-    page = architecture_page(root / 'armid_ros')
+def test_every_job_has_a_diagram():
+    page = architecture_page(PACKAGE)
     assert page.count('<svg ') == page.count('</svg>') == len(JOBS)
 
 

@@ -256,7 +256,7 @@ def patch_section(findings: Sequence[Finding], text: str) -> ContentSection:
 
 
 def candidates_section(diagnosis: Diagnosis) -> ContentSection:
-    """Return what each cause alone would explain, in the order in which they were judged."""
+    """Return what each cause alone would explain, in ranking order."""
     explanation = diagnosis.explanation
     survey = None if explanation is None else explanation.survey
     names = {finding.name for finding in diagnosis.findings}
@@ -299,7 +299,7 @@ def candidates_section(diagnosis: Diagnosis) -> ContentSection:
 
 
 def _candidate_value(diagnosis: Diagnosis, trial: Trial) -> str:
-    """Return the first value, where it is one that the cause can have."""
+    """Return the first value if it is within its bounds."""
     arm, effect, kept = diagnosis.arm, trial.effect, list(trial.named.kept)
     if diagnosis.explanation is not None:
         arm = diagnosis.explanation.given

@@ -31,7 +31,7 @@ ZOOM = 'Drag across a plot, or pinch it, to zoom; double-click or double-tap to 
 
 
 def by_recording(fits: Sequence[Fit]) -> dict[str, list[Fit]]:
-    """Return fits by the recording that they are of."""
+    """Group fits by recording."""
     found: dict[str, list[Fit]] = {}
     for fit in fits:
         found.setdefault(fit.source, []).append(fit)
@@ -232,7 +232,7 @@ def forward_section(
 def _worst_joint(
     robot: Robot, pair: ForwardValidation, models: Sequence[tuple[Role, str, ForwardScore]]
 ) -> list[PageBlock]:
-    """Return the position error over time of the joint that one of the models is off most."""
+    """Return the position error over time of the joint with the largest error."""
     farthest = max((score for *_, score in models), key=lambda one: one.position_error.max())
     worst, motion = int(farthest.position_error.argmax()), pair.after.motion
     curves = [1e3 * (score.simulated[:, worst] - motion.q[:, worst]) for *_, score in models]

@@ -16,7 +16,7 @@ from armid_ros.report.provenance import Provenance
 @dataclass(frozen=True)
 class VerdictSection(Section):
     """
-    The sentence that a reader takes away.
+    The verdict box of a page.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class VerdictSection(Section):
 
 
 def next_steps_section(steps: Sequence[str]) -> ContentSection:
-    """Return what to do next, in order of worth."""
+    """Return the next steps, most useful first."""
     return ContentSection('What to do next', [BulletList([(step, '') for step in steps], True)])
 
 

@@ -100,7 +100,7 @@ def overlay_section(
 
 
 def _of_recording(gap: Gap, shown: Overlay, joint: int) -> tuple[FloatArray, ...]:
-    """Return time, measured torque, and both models in all stretches of the same recording."""
+    """Return time, measured torque and both models for all stretches of a recording."""
     here = shown.source, shown.trajectory.fold
     own = [one for one in gap.overlays if (one.source, one.trajectory.fold) == here]
     curves = zip(*((one.measured, one.before, one.after) for one in own), strict=True)
@@ -115,7 +115,7 @@ def _marks(spans: Sequence[Span]) -> list[Mark]:
 
 def whole_overlays(diagnosis: Diagnosis, recordings: Sequence[Recording]) -> Gap | None:
     """
-    Return the gap with curves of whole recordings, where a cause acts for a part of the time.
+    Return the gap with curves of whole recordings if a cause acts for part of the time.
 
     Parameters
     ----------

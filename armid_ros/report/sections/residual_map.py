@@ -24,7 +24,7 @@ _POSITIVE, _NEGATIVE, _UNSURE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 
 
 
 def residual_map_section(residual: Residual) -> ContentSection:
-    """Return maps of what no effect explains, at the middle load of each joint."""
+    """Return maps of the unexplained residual at the middle load of each joint."""
     robot = residual.base.robot
     rows, pictures = [], []
     for one in residual.joints:
