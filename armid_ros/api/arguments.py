@@ -71,7 +71,7 @@ def spelled(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 
 def robot_of(robot: RobotLike) -> Robot:
-    """Return the robot that is meant."""
+    """Return a robot, loaded where a name or path is given."""
     if isinstance(robot, ArmModel):
         return robot.robot
     if isinstance(robot, Robot):
@@ -93,7 +93,7 @@ def source_of(robot: Robot) -> str:
 
 
 def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
-    """Return the model that is meant; a robot alone gets the usual friction."""
+    """Return an arm model; a robot, name or path without a model gets the usual friction."""
     if isinstance(arm, ArmModel):
         return arm
     if not isinstance(arm, Robot) and is_model(arm):
@@ -102,7 +102,7 @@ def arm_of(arm: RobotLike, effects: str = USUAL) -> ArmModel:
 
 
 def drivable(arm: RobotLike) -> ArmModel:
-    """Return the model that is to move; TrajectoryError where joints of it belong to no arm."""
+    """Return an arm model to move; TrajectoryError if some of its joints belong to no arm."""
     model = arm_of(arm)
     others = joints_beside_arms(model.robot) if isinstance(arm, str | Path) else ()
     if others:
@@ -117,7 +117,7 @@ def drivable(arm: RobotLike) -> ArmModel:
 def recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
 ) -> list[Recording]:
-    """Return recordings, read where they are paths; one, many or none."""
+    """Return a list of recordings; paths are read."""
     several = recordings if isinstance(recordings, Iterable) else [recordings]
     several = [recordings] if isinstance(recordings, RecordingLike) else list(several)
     for one in several:
@@ -140,7 +140,7 @@ def recordings_of(
 def some_recordings_of(
     recordings: RecordingLike | Sequence[RecordingLike], robot: Robot
 ) -> list[Recording]:
-    """Return recordings as `recordings_of`; RecordingError where there is none."""
+    """Return a list of recordings, as `recordings_of`; RecordingError if it is empty."""
     found = recordings_of(recordings, robot)
     if not found:
         raise RecordingError('no recordings: give one bag, table or Recording at least')
@@ -148,7 +148,7 @@ def some_recordings_of(
 
 
 def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
-    """Return recordings of which each has a source of its own, numbered where two are alike."""
+    """Make the source names of recordings unique by numbering equal ones."""
     taken: dict[str, int] = {}
 
     def named(recording: Recording) -> Recording:
@@ -162,7 +162,7 @@ def with_sources_apart(*groups: list[Recording]) -> tuple[list[Recording], ...]:
 
 
 def motion_of(recording: Recording, cutoff: float | None = None) -> Motion:
-    """Return the longest stretch of a recording as identification takes it: `Recording.motion`."""
+    """Filter the longest unbroken stretch of a recording: see `Recording.motion`."""
     measured = recording.tau is not None
     taken = recording if measured else replace(recording, tau=np.zeros_like(recording.q))
     used = conditioning([taken], SignalSettings(cutoff))

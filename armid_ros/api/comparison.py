@@ -43,7 +43,7 @@ class ComparisonResult(Shown):
 
     @property
     def anything(self) -> bool:
-        """Whether something changed beyond chance: parameters, or what a model leaves."""
+        """Whether any parameter or residual changed significantly."""
         return self.core.anything
 
     @property
@@ -66,7 +66,7 @@ class ComparisonResult(Shown):
         return compare_report(self.core, origin.provenance)
 
     def summary(self) -> Summary:
-        """Return what changed, the surest first."""
+        """Return the changes, most significant first."""
         from armid_ros.report.compare_report import change_rows, HEADS, tell, verdict
 
         rows = change_rows(self.core)
@@ -78,7 +78,7 @@ def compare(
     before: IdentificationResult | str | Path, after: IdentificationResult | str | Path
 ) -> ComparisonResult:
     """
-    Say what changed between two identifications of one robot.
+    Compare two identifications of one robot.
 
     Parameters
     ----------

@@ -185,7 +185,7 @@ def _searched(
     rival: ArmModel | None,
     progress: Callable[[DesignProgress], None] | None,
 ) -> ExcitationResult:
-    """Search for the trajectory, once a way to it can be planned."""
+    """Find a start pose with a collision-free approach, then search for the trajectory."""
     planner = planner_of(model, asked, scene)
     if start is None:
         planner.free_start()  # where there is none, that is said before the search
@@ -208,7 +208,7 @@ def _searched(
 def _limited(
     model: ArmModel, given: str | Path | Mapping[str, float]
 ) -> tuple[ArmModel, FloatArray | None]:
-    """Return the model with velocity limits of a file or by name, and acceleration limits."""
+    """Apply the joint limits of a file or mapping; return the model and acceleration limits."""
     named = given if isinstance(given, Mapping) else {}
     file = None if isinstance(given, Mapping) else given
     velocity = [f'{joint}:={limit}' for joint, limit in named.items()]
@@ -219,7 +219,7 @@ def _limited(
 def _information(
     arm: ArmModel, settings: DesignSettings, recordings: Sequence[Recording], rng: Rng
 ) -> FloatArray:
-    """Return the information that recordings hold already, shape (r, r)."""
+    """Return the information matrix of existing recordings, shape (r, r)."""
     used = conditioning(list(recordings), SignalSettings())
     problem = DesignProblem.of(arm, settings, np.random.default_rng(rng))
     matrix = np.zeros(2 * [len(problem.base.parameters)])

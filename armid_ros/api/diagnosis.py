@@ -69,7 +69,7 @@ _Made = TypeVar('_Made')
 @dataclass(frozen=True, repr=False, eq=False)
 class DiagnosisResult(ShownModel):
     """
-    What a model lacks.
+    Diagnosis of a model: named effects, patched model, evidence.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def residual(self) -> Residual | None:
-        """Return what is left without a name, learned, where that was asked for."""
+        """Return the learned map of the unexplained residual; None if not asked for."""
         return self.extras.residual
 
     @property
@@ -124,7 +124,7 @@ class DiagnosisResult(ShownModel):
 
     @property
     def arm(self) -> ArmModel:
-        """Return the model with what was found added, and with what was learned."""
+        """Return the patched model, with the learned residual if there is one."""
         return self.core.arm if self.residual is None else self.residual.arm
 
     def plot(self) -> npt.NDArray[np.object_]:
@@ -152,7 +152,7 @@ class DiagnosisResult(ShownModel):
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return what was named as a pandas table, a row a parameter."""
+        """Return the named effects as a pandas table, one row per parameter."""
         return data_frame(
             {'effect': effect['name'], 'joints': ', '.join(effect['joints']), **row}
             for effect in self.document()['effects']
@@ -209,7 +209,7 @@ class DiagnosisResult(ShownModel):
         ]
 
     def with_residual(self, seed: int) -> DiagnosisResult:
-        """Learn what has no name as a map of the state, or note why nothing is learned."""
+        """Learn the unexplained residual as a map of the state; note why if it is not learned."""
         if self.verdict not in WORTH_A_MAP:
             said = self.verdict.replace('_', ' ')
             return self._with_notes(f'nothing is learned where the verdict is {said}')
@@ -220,7 +220,7 @@ class DiagnosisResult(ShownModel):
         return replace(self, extras=replace(self.extras, residual=found))
 
     def with_extras(self, residual: bool, seed: int, progress: Progress) -> DiagnosisResult:
-        """Learn the residual where that is wanted, simulate, and plan the next run."""
+        """Learn the residual if asked for, simulate, and plan the next run."""
         result = self
         if residual:
             progress(1.0, 'learning the residual')
@@ -393,7 +393,7 @@ def diagnose(
 
 
 def _misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return what a model left when it was identified, where that is known."""
+    """Return the misfit of a model at its identification, if it is known."""
     if isinstance(arm, IdentificationResult):
         return arm.misfit
     return read_misfit(arm, model) if _is_written(arm) else None
@@ -402,7 +402,7 @@ def _misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit
 def _since(
     arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
 ) -> list[Recording]:
-    """Return what a model was identified from; nothing if some of it is looked at."""
+    """Return the recordings of the identification as baseline; none if one is diagnosed."""
     if isinstance(arm, IdentificationResult):
         found = [*arm.recordings, *arm.held_out]
     elif _is_written(arm):
@@ -422,7 +422,7 @@ def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:
 
 
 def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
-    """Return what was made, or None and why there is none."""
+    """Return the result of a step, or None and the reason."""
     try:
         return make(), ()
     except Exception as error:  # whatever it is, the diagnosis itself stands

@@ -47,7 +47,7 @@ BAG = 'trajectory'
 @dataclass(frozen=True, repr=False, eq=False)
 class ExcitationResult(Shown):
     """
-    A trajectory worth running.
+    A designed excitation trajectory.
 
     Attributes
     ----------
@@ -87,12 +87,12 @@ class ExcitationResult(Shown):
 
     @property
     def trajectory(self) -> Excitation:
-        """Return what is to be run, from rest to rest."""
+        """Return the trajectory, from rest to rest."""
         return self.core.excitation
 
     @property
     def duration(self) -> float:
-        """How long that takes [s]."""
+        """Duration of the trajectory [s]."""
         return self.trajectory.duration
 
     def motion(self, rate: float = WAYPOINT_RATE) -> Motion:
@@ -115,7 +115,7 @@ class ExcitationResult(Shown):
 
     @cached_property
     def planner(self) -> TransferPlanner:
-        """Return what plans the ways to the trajectory and back."""
+        """Return the planner of approach and return motions."""
         return planner_of(self.arm, self.core.settings, self.scene)
 
     @cached_property
@@ -125,13 +125,13 @@ class ExcitationResult(Shown):
 
     @cached_property
     def run(self) -> Run:
-        """Return the trajectory with the way there and back; TrajectoryError if there is none."""
+        """Return the trajectory with approach and return; TrajectoryError if none is found."""
         excitation = self.core.excitation
         return plan_run(excitation, self.planner, self.start, WAYPOINT_RATE, seed=self.seed)
 
     @cached_property
     def fitness(self) -> Fitness:
-        """Return what was checked of the run."""
+        """Return the results of the checks of the run."""
         return fitness(self.run, self.core.limits, self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
@@ -213,7 +213,7 @@ class ExcitationResult(Shown):
         return document
 
     def summary(self) -> Summary:
-        """Return how much of its limits every joint uses."""
+        """Return the share of its limits that each joint uses."""
         shares = self.core.limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
@@ -230,7 +230,7 @@ class ExcitationResult(Shown):
         )
 
     def _of_run(self) -> list[str]:
-        """Say whether the run is fit, where it starts, and whether the search was stopped."""
+        """Return sentences: is the run fit, where it starts, was the search stopped."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:
@@ -250,7 +250,7 @@ class ExcitationResult(Shown):
 
 
 def planner_of(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -> TransferPlanner:
-    """Return what plans the ways of an arm to a run with such settings, and back."""
+    """Return a planner of approach and return motions."""
     return TransferPlanner(
         arm,
         transfer_limits(arm.robot, settings.speed, settings.acceleration),

@@ -69,7 +69,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, repr=False, eq=False)
 class IdentificationResult(ShownModel):
     """
-    An identified model, and what it was made from.
+    An identified model with its recordings, fits and grade.
 
     Attributes
     ----------
@@ -124,17 +124,17 @@ class IdentificationResult(ShownModel):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Return what a person should know."""
+        """Return notes for the user."""
         return self.core.notes
 
     @property
     def training(self) -> Score:
-        """How well it fits what it was fitted to."""
+        """Errors on the training data."""
         return Score.of(self.core.training)
 
     @property
     def held_out_score(self) -> Score | None:
-        """How well it predicts what it was not fitted to; None without such recordings."""
+        """Errors on held-out recordings; None if there are none."""
         fits = [fit for part in self.validation.values() for fit in part]
         return Score.of(fits) if fits else None
 
@@ -145,7 +145,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def misfit(self) -> Misfit:
-        """Return what the model leaves, with what the recordings tell of its parameters."""
+        """Return the residual of the model with the information on its parameters."""
         known = parameters_of(self.arm.robot.name, self.document())
         information = known.information(self.arm.parameters)
         unusable = self.grade == 'unusable'
@@ -157,7 +157,7 @@ class IdentificationResult(ShownModel):
 
     @property
     def grade(self) -> str:
-        """How far it can be believed, in a word."""
+        """Grade in one word: good, fair, poor or unusable."""
         return self.graded.word
 
     @cached_property
@@ -202,7 +202,7 @@ class IdentificationResult(ShownModel):
         return {'identified.urdf': arm_urdf(self.arm), 'identified.mjcf.xml': arm_mjcf(self.arm)}
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return what identification.json holds, but for exports and digests of recordings."""
+        """Return the content of identification.json, without exports and digests of recordings."""
         robot = origin.of(self.description.robot).robot
         document = identification_document(
             self.core, robot, self.validation, self.verification, self.graded
@@ -296,7 +296,7 @@ class IdentificationResult(ShownModel):
         return aligned(('parameter', 'value, 95 %', 'described'), rows)
 
     def _bodies(self) -> list[str]:
-        """Say whether simulators take the model."""
+        """State whether links are physically consistent, which simulators need."""
         cost = self.core.bodies_cost
         if cost is None:
             return []

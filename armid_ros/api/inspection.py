@@ -44,7 +44,7 @@ CHECK = 'armid/check/1'
 @dataclass(frozen=True, repr=False, eq=False)
 class InspectionResult(Shown):
     """
-    What a recording holds.
+    Inspection of a recording.
 
     Attributes
     ----------
@@ -66,12 +66,12 @@ class InspectionResult(Shown):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Return what a person should know, the worst first."""
+        """Return remarks for the user, most serious first."""
         return tuple(remark.text for remark in self.core.remarks)
 
     @property
     def recording(self) -> Recording:
-        """Return what was read."""
+        """Return the recording."""
         return self.core.recording
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -89,7 +89,7 @@ class InspectionResult(Shown):
         return inspection_report(self.core, robot=origin.robot, provenance=origin.provenance)
 
     def summary(self) -> Summary:
-        """Return the verdict, the joints, what was remarked, and how it was sampled."""
+        """Return verdict, table of joints, remarks and sampling."""
         from armid_ros.report.inspection_report import joint_heads, joint_rows, recording_facts
 
         heads, found = joint_heads(self.core), self.core
@@ -119,7 +119,7 @@ def inspect(
     rng: Rng = 0,
 ) -> InspectionResult:
     """
-    Look at a recording: rate, gaps, ranges, units that look wrong, whether identify takes it.
+    Inspect a recording: rate, gaps, ranges, suspicious units, fitness for identification.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def inspect(
 @dataclass(frozen=True, repr=False, eq=False)
 class CheckResult(Shown):
     """
-    What is wrong with a description.
+    Check of a robot description.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class CheckResult(Shown):
 
     @property
     def finding(self) -> str:
-        """Return what was found in one sentence."""
+        """Return the finding in one sentence."""
         from armid_ros.report.inspection_report import headline
 
         return headline(self.remarks, self.links)[0]

@@ -99,7 +99,7 @@ def reference_of(
     settings: ReadSettings = DEFAULT,
 ) -> Reference:
     """
-    Return what a simulated arm follows.
+    Return the reference that a simulated arm follows.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ WIDTH = 80
 @dataclass(frozen=True)
 class Summary:
     """
-    A result in short.
+    Summary of a result.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class Summary:
     steps: Sequence[str] = ()
 
     def text(self) -> str:
-        """Return at most ten lines of 80 columns, and below them the next steps."""
+        """Return at most ten lines of 80 columns, followed by the next steps."""
         title = textwrap.wrap(self._headline, WIDTH, max_lines=3)
         below = [piece for line in self.lines for piece in textwrap.wrap(line, WIDTH)]
         if len(below) > 2:
@@ -72,7 +72,7 @@ class Summary:
         return '\n'.join([*title, *aligned(self.heads, rows, WIDTH), *below, *steps])
 
     def full_text(self) -> list[str]:
-        """Return all of it, as the commands print it."""
+        """Return the whole text, as the commands print it."""
         table = aligned(self.heads, self.rows)
         return [self._headline, *table, *filter(None, self.lines), *self._next]
 
@@ -88,7 +88,7 @@ class Summary:
 @dataclass(frozen=True)
 class ResultOrigin:
     """
-    What files of a result say of where it comes from.
+    Provenance of a result, as its files state it.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class ResultOrigin:
     provenance: Provenance | None = None
 
     def of(self, robot: Robot) -> ResultOrigin:
-        """Return the same with the defaults filled in."""
+        """Fill in defaults."""
         known = source_of(robot)
         return replace(self, robot=self.robot or known, source=self.source or known)
 
@@ -130,18 +130,18 @@ class Shown(ABC):
     @property
     @abstractmethod
     def files(self) -> Sequence[str]:
-        """Return the names of what it writes: the document first, then the page."""
+        """Return the names of the files it writes: the document first, then the page."""
 
     @abstractmethod
     def summary(self) -> Summary:
-        """Return the result in short."""
+        """Return a summary."""
 
     @abstractmethod
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
-        """Return the result for programs."""
+        """Return the content of its JSON file, with the provenance given."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result for programs, as its JSON file has it."""
+        """Return the content of its JSON file."""
         return self.document()
 
     @abstractmethod
@@ -173,7 +173,7 @@ class Shown(ABC):
         return self.summary().text()
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the report, in a frame of its own."""
+        """Show the report in a notebook, in a frame of its own."""
         return f'<iframe srcdoc="{escape(self.page())}" width="100%" height="640"></iframe>'
 
 
@@ -196,7 +196,7 @@ class ShownModel(Shown):
 def aligned(
     heads: Sequence[str], rows: Sequence[Sequence[str]], width: int | None = None
 ) -> list[str]:
-    """Return lines with columns below each other, names to the left and the rest to the right."""
+    """Align columns: names left, all others right."""
     if not heads:
         return []
     table = [tuple(heads), *(tuple(row) for row in rows)]

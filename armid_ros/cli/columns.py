@@ -20,7 +20,7 @@ _META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Keep a value where `settings` finds it."""
+    """Store a value for `settings`."""
     ctx.meta.setdefault(_META, {})[parameter.name] = value
     return value
 
@@ -30,7 +30,7 @@ def _option(*names: str, **facts: Any) -> Callable[[Any], Any]:
 
 
 def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Keep pairs of names, each of which has to be one."""
+    """Store pairs of names; refuse malformed ones."""
     rules = []
     for text in value:
         old, *new = listed(text, ':')
@@ -46,7 +46,7 @@ def _rules(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
 
 
 def _numbers(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Any:
-    """Keep one number, or one a joint."""
+    """Store one number, or one for each joint."""
     if value is not None:
         from armid_ros.recording.tables import numbers
 
@@ -131,14 +131,14 @@ _OPTIONS = (
 
 
 def options(command: Any) -> Any:
-    """Give a command the options; `settings` has what they say."""
+    """Add the options to a command; `settings` returns their values."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
 
 
 def settings() -> ColumnSettings:
-    """Return what the options of the running command say."""
+    """Return the values of the options of the running command."""
     from armid_ros.recording.tables import ColumnSettings
 
     return ColumnSettings(**click.get_current_context().meta.get(_META, {}))

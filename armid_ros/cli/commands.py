@@ -66,7 +66,7 @@ class Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """
-        Find the command, and give it the options of the project.
+        Find the command and apply the options of armid.toml.
 
         Of one that does not exist the error names the nearest.
 
@@ -151,7 +151,7 @@ def _summary(name: str) -> str:
 
 
 def _refuse_infinite(command: click.Command) -> None:
-    """Let a command, and those below it, refuse numbers that are not finite."""
+    """Make a command and its subcommands refuse numbers that are not finite."""
     for below in command.commands.values() if isinstance(command, click.Group) else ():
         _refuse_infinite(below)
     for parameter in command.params:
@@ -165,7 +165,7 @@ def _finite(
     parameter: click.Parameter,
     value: Any,
 ) -> Any:
-    """Check the numbers of an option before its own callback has them."""
+    """Check the numbers of an option before its own callback."""
     for number in value if isinstance(value, tuple) else (value,):
         if number is not None and not math.isfinite(number):
             raise click.BadParameter(f'{number} is not a finite number', context, parameter)

@@ -30,7 +30,7 @@ _ROS = (
 
 
 def main(name: str | None = None) -> int | None:
-    """Run a node of the core or of a plug-in, by default that which the executable is named."""
+    """Run a node of the core or of a plug-in; by default the one of the executable."""
     name = name or Path(sys.argv[0]).name
     try:
         if find_spec(f'armid_ros.nodes.{name}') is None and name in plug_ins('nodes'):
@@ -48,7 +48,7 @@ def main(name: str | None = None) -> int | None:
 
 
 def lacking(error: ModuleNotFoundError) -> str | None:
-    """Say what to install for a module that is not there; None if it is none of ROS 2."""
+    """Return what to install for a missing module; None if it is not part of ROS 2."""
     module = (error.name or '').partition('.')[0]
     if module == 'armid_msgs':
         return (

@@ -49,7 +49,7 @@ _SHOWN = 'armid.columns.shown'
 
 def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> None:
     """
-    Make a folder, and keep it for the results of this command as long as the command runs.
+    Create a folder and lock it for the results of this command.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def hold(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) ->
 
 def stage(out: Path, schema: str, robot: str = '', also: Collection[str] = ()) -> Staged:
     """
-    Keep a folder as `hold` does, and return where to write until all of the result is there.
+    Lock a folder as `hold` does; return the staging folder of the result.
 
     Nothing of it gets to the folder unless the command keeps it. Files of an earlier result that
     the new one has not go with it, except a description that --robot names; with --force, which
@@ -92,7 +92,7 @@ def deliver(
     summary: Summary | None = None,
 ) -> None:
     """
-    Write a result to its folder, if it has one, and print it.
+    Write a result to its folder, if any, and print it.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def read_settings() -> ReadSettings:
 
 
 def tell_damage(*recordings: Recording) -> None:
-    """Say on stderr what is wrong with the files of recordings; the same is said once."""
+    """Report damage of recording files on stderr, equal reports once."""
     for text in dict.fromkeys(
         f'{r.source}: {r.report.damage}' for r in recordings if r.report.damage
     ):
@@ -144,7 +144,7 @@ def open_robot(
     bags: Sequence[Path] = (),
     tell: bool = True,
 ) -> Robot:
-    """Load the robot that --robot, --gravity and --joints ask for; say what is doubtful."""
+    """Load the robot of --robot, --gravity and --joints; warn of doubtful values."""
     named = listed(joints) if isinstance(joints, str) else joints
     robot = _loaded(source, gravity, named or None, bags)
     lines = driven_in_words(robot) if joints is None else ()
@@ -195,7 +195,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
 
 
 def with_effects(arm: ArmModel, names: str) -> ArmModel:
-    """Add the effects that --effects names, but for those that the arm has."""
+    """Add the effects of --effects that the arm does not have yet."""
     for name in filter(None, parted(names)):
         effect = make_effect(name, arm.robot)
         if (effect.name, effect.joints) not in [(own.name, own.joints) for own in arm.effects]:
@@ -218,7 +218,7 @@ def box(text: str, robot: Robot) -> tuple[str, Corners]:
 
 
 def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
-    """Read one number for all joints, or one for each; None where there is no text."""
+    """Parse one number for all joints, or one for each; None without text."""
     if text is None:
         return None
     try:
@@ -234,7 +234,7 @@ def per_joint(text: str | None, robot: Robot, option: str) -> FloatArray | None:
 
 
 def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recording]:
-    """Read the joints of bags and tables; guesses are shown on stderr, equal ones once."""
+    """Read the joints of bags and tables; print guesses on stderr, equal ones once."""
     said, reading = columns.settings(), read_settings()
     shown: set[str] = click.get_current_context().meta.setdefault(_SHOWN, set())
 
@@ -266,7 +266,7 @@ def read(paths: Sequence[Path], robot: Robot, topic: str | None) -> list[Recordi
 
 
 def kept_source(source: str, robot: Robot, out: Path) -> str:
-    """Return how files in a folder refer to the robot; one from a bag is put beside them."""
+    """Return how files in a folder refer to the robot; copy one from a bag beside them."""
     if source == '-':
         write_file(out / 'robot.urdf', robot.urdf)
         return 'robot.urdf'

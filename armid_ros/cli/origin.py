@@ -18,7 +18,7 @@ def provenance(
     paths: Iterable[Path], settings: Mapping[str, Any] | None = None, seed: int | None = None
 ) -> Provenance:
     """
-    Return what is needed to get the result of the command that runs again.
+    Return the provenance of the running command.
 
     Parameters
     ----------

@@ -143,7 +143,7 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
 
 
 def with_packages(context: click.Context, _: click.Parameter, source: str | None) -> str | None:
-    """Write packages behind the path of a description, where any program takes them."""
+    """Append the packages to the path of the description."""
     written = []
     for text in context.meta.get(PACKAGES, []):
         name, _, folder = text.partition('=')

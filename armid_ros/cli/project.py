@@ -23,7 +23,7 @@ def project_options(
     others: Callable[[], Iterable[click.Command]],
 ) -> dict[str, Any]:
     """
-    Return defaults of a command by the names of its parameters, and print on stderr what they are.
+    Return the defaults of a command from armid.toml, and print them on stderr.
 
     A key outside of a table is for every command that has an option of this name; a key in the
     table of a command is for that one.

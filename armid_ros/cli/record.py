@@ -128,7 +128,7 @@ def simulate(
 
 @contextmanager
 def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
-    """Name the --effect that adds to a body where links turn out to be none."""
+    """Name the --effect that makes a link physically impossible."""
     from armid_ros.effects import parse_effect
     from armid_ros.simulation.bodies import NoBodyError
 
@@ -149,7 +149,7 @@ def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
 
 
 def _of_some_size(text: str, robot: Robot) -> tuple[Effect, FloatArray]:
-    """Read --effect; refuse one of no size, which would change nothing."""
+    """Parse --effect; refuse one without a value."""
     from armid_ros.effects import parse_effect
 
     effect, values = parse_effect(text, robot)

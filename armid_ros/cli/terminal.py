@@ -18,13 +18,13 @@ Tick = Callable[..., None]
 
 
 def say(text: str, colour: str | None = None) -> None:
-    """Print a line, on a terminal in a colour."""
+    """Print a line, coloured on a terminal."""
     shown = visible(text)
     click.echo(shown if colour is None else click.style(shown, fg=colour))
 
 
 def wrapped(text: str, first: str = '', others: str = '') -> str:
-    """Return a text in lines of 80 columns, indented, that break at blanks alone."""
+    """Wrap a text at blanks to 80 columns, indented."""
     return textwrap.fill(
         text,
         80,
@@ -78,13 +78,13 @@ class ProgressLines:
         self._start = self._last = clock()
 
     def tick(self, share: float, what: str | None = None) -> None:
-        """Take the share that is done, and what is being done now."""
+        """Update the share that is done and the current step."""
         self._share = share
         if what is not None:
             self._what = what
 
     def look(self) -> None:
-        """Write a line if it is time for one."""
+        """Write a line if one is due."""
         now = self._clock()
         if now - self._last >= self.EVERY:
             self._last = now
@@ -96,7 +96,7 @@ class ProgressLines:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Look every second, beside the work, which may be silent for long."""
+        """Check every second in a thread."""
         done = threading.Event()
 
         def watch() -> None:
@@ -154,7 +154,7 @@ def print_rows(
 
 
 def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
-    """Print a table of parameters; a value whose interval includes zero is no number."""
+    """Print a table of parameters; a dash for values whose interval includes zero."""
     from armid_ros.identification.fitting.identifiability import excludes_zero
 
     shown = [

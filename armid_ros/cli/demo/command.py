@@ -128,7 +128,7 @@ def demo(gravity: str, rate: float, hide: str, out: Path, seed: int, as_json: bo
 def _tell(
     document: dict[str, Any], found: IdentificationResult, online: Agreement, offline: Agreement
 ) -> None:
-    """Print the grade, and how far both estimates are from the truth."""
+    """Print the grade, and the errors of both estimates."""
     say(f'{found.grade.upper()}: {found.graded.reasons[0]}')
     say(f'online:  {online.sentence()}')
     say(f'offline: {offline.sentence()}')

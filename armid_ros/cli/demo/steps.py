@@ -57,7 +57,7 @@ def true_arm(robot: Robot) -> ArmModel:
 
 def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> HiddenChange:
     """
-    Return what is hidden in the arm.
+    Return the hidden effect.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def hidden_change(robot: Robot, rng: np.random.Generator, hide: str = '') -> Hid
 @dataclass(frozen=True)
 class HiddenChange:
     """
-    What the arm has and its model has not.
+    An effect that the arm has and its model lacks.
 
     Attributes
     ----------
@@ -119,12 +119,12 @@ class HiddenChange:
         return any((one.name, one.joints) == named for one in first)
 
     def outcome(self, diagnosis: Diagnosis) -> str:
-        """Say what was hidden, and whether it was found."""
+        """Return a sentence: what was hidden, and whether it was found."""
         rank = 'found it' if self.found_by(diagnosis) else 'did not rank it first'
         return f'Hidden was: {self.sentence(diagnosis.arm)}. The diagnosis {rank}.'
 
     def document(self, diagnosis: Diagnosis) -> dict[str, Any]:
-        """Return what was hidden and found, for programs to read."""
+        """Return the hidden and the found effect for JSON."""
         gap, joints = diagnosis.gap, diagnosis.arm.robot.joints
         return {
             'hidden': {
@@ -207,7 +207,7 @@ def diagnose_hidden(
 
 
 def show_hidden(hidden: HiddenChange, found: Diagnosis) -> None:
-    """Print the diagnosis, what it did for the held-out run, and what was hidden."""
+    """Print the diagnosis, its gain on the held-out run, and the hidden effect."""
     say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
     say(printed(f'{found.verdict.replace("_", " ").upper()}: {found.summary}'))
     gap, arm = found.gap, found.arm

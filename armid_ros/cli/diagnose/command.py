@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Percent(click.ParamType):  # type: ignore[type-arg]
-    """A share that a person writes in per cent, with or without the sign."""
+    """A percentage, with or without the sign."""
 
     name = 'percent'
 
@@ -193,7 +193,7 @@ def diagnose(
 
 
 def _identified_from(model: Path, asked: list[Path]) -> tuple[Path, ...]:
-    """Return what a model was identified from as a baseline; nothing if some of it is asked of."""
+    """Return the recordings of the identification as baseline; none if one is diagnosed."""
     from armid_ros.identification.identified_from import identified_from, require_as_identified
 
     found = identified_from(model)

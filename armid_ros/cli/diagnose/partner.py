@@ -51,7 +51,7 @@ def open_partner(
     source: str | None, ties: Sequence[str], robot: Robot, gravity: str
 ) -> Partner | None:
     """
-    Load what --partner and --tie ask for; None where there is no partner.
+    Load the partner of --partner and --tie; None without partner.
 
     Raises
     ------

@@ -271,7 +271,7 @@ def excite(
 
 
 def _driven(source: str, gravity: str, joints: str | None, bags: tuple[Path, ...]) -> Robot:
-    """Load the robot; joints that belong to no arm are driven where they are named only."""
+    """Load the robot; joints that belong to no arm are driven only if they are named."""
     from armid_ros.cli import options
     from armid_ros.files.cells import listed
     from armid_ros.robots import load_arms
@@ -310,7 +310,7 @@ def _arms(
 
 @contextmanager
 def _kept_design(staged: Staged) -> Iterator[None]:
-    """Keep a design that no way leads to, its coefficients alone, unless one was there."""
+    """Save the coefficients of a design without approach, unless the file exists."""
     try:
         yield
     except TrajectoryError as error:

@@ -30,7 +30,7 @@ _OWN = {'share'}
 
 
 def refuse_other_options(context: click.Context) -> None:
-    """Raise a UsageError where an option was given that does not go with the kind."""
+    """Raise a UsageError for an option that does not go with the kind."""
     kind, default = context.params['kind'], click.core.ParameterSource.DEFAULT
     for option in context.command.params:
         name = str(option.name)
@@ -40,7 +40,7 @@ def refuse_other_options(context: click.Context) -> None:
 
 
 def require_free(folder: Path) -> None:
-    """Raise a RecordingError where a recording is already, before a design takes its time."""
+    """Raise a RecordingError if the recording exists, before the design begins."""
     if any(folder.glob('*.mcap')) or (folder / 'metadata.yaml').exists():
         raise RecordingError(f'{folder} is a recording; name another --out')
     if os.path.lexists(folder / BAG) and not is_plan(folder / BAG):
