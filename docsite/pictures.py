@@ -26,6 +26,7 @@ from matplotlib.figure import Figure
 import numpy as np
 from scipy import signal, stats
 
+from benchmarks.growth import OUT as GROWTH
 from benchmarks.lived_scoring import reliability as bins
 from docsite.desk import FRICTION, GAIN, lay_out
 
@@ -132,6 +133,29 @@ def exo_cycle() -> Figure:
             frameon=False, fontsize=7, loc='best' if axes is not panels[2, 0] else 'upper left'
         )
     return figure
+
+
+def growth() -> Figure:
+    """Draw processor time and memory of the jobs over what grows, as benchmarks.growth has them."""
+    document = json.loads(GROWTH.read_text())
+    axes_names = list(dict.fromkeys(row['over'] for row in document['jobs']))
+    jobs = list(dict.fromkeys(row['job'] for row in document['jobs']))
+    colours = dict(zip(jobs, (GREY, BLUE, ORANGE, '#4a9c6d', '#8a5ca8'), strict=True))
+    figure = Figure(figsize=(WIDTH, 4.6), layout='constrained')
+    panels = figure.subplots(2, len(axes_names), sharey='row', squeeze=False)
+    for row in document['jobs']:
+        upper, lower = panels[:, axes_names.index(row['over'])]
+        name = f'{row["job"]}, slope {row["slope"]:.1f}'
+        upper.loglog(row['values'], row['seconds'], 'o-', color=colours[row['job']], label=name)
+        lower.loglog(
+            row['values'], np.maximum(row['megabytes'], 1.0), 'o-', color=colours[row['job']]
+        )
+        lower.set_xlabel(row['over'])
+    panels[0, 0].set_ylabel('processor time [s]')
+    panels[1, 0].set_ylabel('memory [MB]')
+    for axes in panels[0]:
+        axes.legend(frameon=False, fontsize=6)
+    return _plain(figure)
 
 
 def reliability() -> Figure:
@@ -355,6 +379,7 @@ PICTURES = {
     'deviations.png': deviations,
     'excitation.png': excitation,
     'exo_cycle.png': exo_cycle,
+    'growth.png': growth,
     'installed.png': installed,
     'learned.png': learned,
     'own_effect.png': own_effect,
