@@ -136,7 +136,7 @@ def exo_cycle() -> Figure:
 
 
 def growth() -> Figure:
-    """Draw processor time and memory of the jobs over what grows, as benchmarks.growth has them."""
+    """Draw processor time and memory of the jobs as their input grows: benchmarks.growth."""
     document = json.loads(GROWTH.read_text())
     axes_names = list(dict.fromkeys(row['over'] for row in document['jobs']))
     jobs = list(dict.fromkeys(row['job'] for row in document['jobs']))
