@@ -79,6 +79,7 @@ def test_loose_straps_on_both_legs_are_slack(tmp_path) -> None:
     assert slacks == pytest.approx([0.003] * 4, rel=0.2)
 
 
+@pytest.mark.long
 def test_a_pair_that_is_not_tied_gets_no_name(tmp_path) -> None:
     document = diagnosed(tmp_path, Straps(), 1)
     assert document['verdict'] == 'consistent'

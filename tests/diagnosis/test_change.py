@@ -175,6 +175,7 @@ def test_a_link_that_is_named_between_two_days_is_doubted(name, doubted):
     assert ('elbow was exchanged' in doubt_of_names([found])) == doubted
 
 
+@pytest.mark.long
 def test_a_model_that_was_unusable_is_doubted(bench):
     rng = np.random.default_rng(0)
     before = bench.recordings(hose, seed=1)

@@ -21,7 +21,7 @@ def with_offsets(bench, seed, offsets):
 @pytest.mark.parametrize(
     'before, after, named',
     [
-        ((0.0, 0.8, 0.1), (0.45, 0.55, 0.5), False),
+        pytest.param((0.0, 0.8, 0.1), (0.45, 0.55, 0.5), False, marks=pytest.mark.long),
         ((0.0, 0.05, 0.1), (0.45, 0.55, 0.5), True),
     ],
     ids=['one recording from before had it', 'none had it'],
@@ -46,6 +46,7 @@ def worn(bench, seeds, coulomb):
     return [bench.recordings(hidden, seed=seed)[seed % 3] for seed in seeds]
 
 
+@pytest.mark.long
 def test_many_recordings_tell_a_change_that_is_smaller_than_the_misfit(bench):
     rng = np.random.default_rng(0)
     old, new = worn(bench, range(1, 7), 0.0), worn(bench, range(11, 17), 0.4)

@@ -46,8 +46,10 @@ def elbow(shape):
     ('name', 'hide'),
     [
         ('torque_offset', elbow(lambda m, tau: np.ones(len(m)))),
-        ('rotor_inertia', elbow(lambda m, tau: m.ddq[:, 1])),
-        ('torque_ripple', elbow(lambda m, tau: np.sin(9.0 * m.q[:, 1]))),
+        pytest.param('rotor_inertia', elbow(lambda m, tau: m.ddq[:, 1]), marks=pytest.mark.long),
+        pytest.param(
+            'torque_ripple', elbow(lambda m, tau: np.sin(9.0 * m.q[:, 1])), marks=pytest.mark.long
+        ),
     ],
 )
 def test_the_size_that_shows_is_right_within_a_factor_of_four(bench, sizes, name, hide):
@@ -66,6 +68,7 @@ def test_of_what_data_do_not_tell_apart_no_size_is_stated(bench, sizes):
         assert sizes['torque_offset', (joint,)]['min_detectable'] < 0.01
 
 
+@pytest.mark.long
 def test_smooth_motion_shows_a_joint_only_if_it_is_softer(bench):
     slow = [replace(bench.recordings(seed=seed)[0], source=f'slow {seed}') for seed in range(3)]
     found = asked(bench, slow)

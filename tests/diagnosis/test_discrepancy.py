@@ -52,8 +52,8 @@ def by_load(bench, motion):
     ('curve', 'before', 'today'),
     [
         (slow_at_low_speed, 0, 2),
-        (saturating, 0, 1),
-        (of_position, 1, 2),
+        pytest.param(saturating, 0, 1, marks=pytest.mark.long),
+        pytest.param(of_position, 1, 2, marks=pytest.mark.long),
         (by_load, 2, 0),
     ],
 )

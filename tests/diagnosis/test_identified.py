@@ -40,6 +40,7 @@ def test_base_parameters_are_as_sure_as_they_were_identified(bench):
     np.testing.assert_allclose(std, found.estimate.std, rtol=0.01)  # the description tells little
 
 
+@pytest.mark.long
 def test_a_value_is_as_unsure_as_the_model_that_it_makes_up_for(bench):
     """Errors of values over models that are off by draws of their covariance."""
     rng = np.random.default_rng(7)
@@ -83,7 +84,7 @@ def test_what_is_not_told_leaves_what_it_does_not_act_on_as_sure(bench):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('seed', [0, 1])
+@pytest.mark.parametrize('seed', [0, pytest.param(1, marks=pytest.mark.long)])
 def test_what_a_model_was_identified_wrong_is_no_change(upright, seed):
     """A slow short motion hardly tells inertias; a fast one of another day does."""
     known = upright.recordings(seed=seed)[:1]

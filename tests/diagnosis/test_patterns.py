@@ -37,7 +37,9 @@ def links(robot, *factors):
     return robot.with_inertias(parameters.ravel())
 
 
-@pytest.mark.parametrize('factors', [(1.06, 0.96), (0.93, 1.08)])
+@pytest.mark.parametrize(
+    'factors', [pytest.param((1.06, 0.96), marks=pytest.mark.long), (0.93, 1.08)]
+)
 def test_links_that_are_off_each_by_its_own_factor_have_no_name(bench, other, factors):
     found = other(links(bench.robot, *factors))
     assert not found.findings
@@ -51,7 +53,7 @@ def test_a_factor_in_one_joint_is_a_gain_of_its_drive(bench):
     assert finding.values[0] == pytest.approx(0.05, abs=0.002)
 
 
-@pytest.mark.parametrize('share', [0.97, 1.62 / 9.81])
+@pytest.mark.parametrize('share', [pytest.param(0.97, marks=pytest.mark.long), 1.62 / 9.81])
 def test_what_gravity_alone_enters_is_gravity(bench, other, share):
     found = other(bench.robot.with_gravity(share * bench.robot.gravity))
     (finding,) = found.findings
@@ -60,7 +62,7 @@ def test_what_gravity_alone_enters_is_gravity(bench, other, share):
     assert not names(found) & {'payload', 'link_inertia', 'torque_gain'}
 
 
-@pytest.mark.parametrize('joint', ['shoulder', 'elbow'])
+@pytest.mark.parametrize('joint', [pytest.param('shoulder', marks=pytest.mark.long), 'elbow'])
 def test_one_direction_of_ten_parameters_is_a_link(bench, other, joint):
     factors = [1.1 if name == joint else 1.0 for name in bench.robot.joints]
     found = other(links(bench.robot, *factors))
@@ -75,6 +77,7 @@ def tilted(bench):
     return 9.81 * np.array([np.sin(ANGLE), 0.0, -np.cos(ANGLE)])
 
 
+@pytest.mark.long
 @pytest.mark.xfail(strict=True, reason='the size of gravity is a value that counts against a tilt')
 def test_a_planar_arm_cannot_tell_a_tilt_from_the_zero_of_its_first_encoder(bench, other):
     found = other(bench.robot.with_gravity(tilted(bench)))

@@ -23,7 +23,10 @@ def held_by(robot, link=-1):
     return lambda motion, tau: inverse_dynamics(true, motion) - inverse_dynamics(robot, motion)
 
 
-@pytest.mark.parametrize(('arm', 'friction'), [('bench', 'named'), ('upright', 'known')])
+@pytest.mark.parametrize(
+    ('arm', 'friction'),
+    [('bench', 'named'), pytest.param('upright', 'known', marks=pytest.mark.long)],
+)
 def test_a_payload_is_named_with_its_mass(request, arm, friction):
     arm = request.getfixturevalue(arm)
     hidden = arm.recordings(held_by(arm.robot))
@@ -37,6 +40,7 @@ def test_a_payload_is_named_with_its_mass(request, arm, friction):
     assert others <= {'viscous_friction', 'coulomb_friction'}
 
 
+@pytest.mark.long
 def test_a_load_of_an_inner_link_may_be_that_link(upright):
     """Both are the same ten values: nothing but what a user knows tells them apart."""
     hidden = upright.recordings(held_by(upright.robot, link=1))
@@ -60,7 +64,7 @@ def test_a_payload_that_was_put_down_is_less_than_nothing(bench):
     assert 'put down' in found.summary
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_heavy_load_is_no_fault_of_the_data(bench):
     light = bench.robot.rigid_parameters.copy()
     light[-10:] *= 0.02

@@ -126,6 +126,7 @@ def test_friction_of_a_ur10(real_data):
     assert {'viscous_friction', 'coulomb_friction'} <= set(names(found))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ('name', 'joint'), [('rotor_inertia', 'elbow_joint'), ('joint_spring', 'wrist_2_joint')]
 )
@@ -141,6 +142,7 @@ def test_friction_taken_out_of_the_model_of_a_ur10_is_named_in_all_joints(real_d
     assert len(found.findings[0].joints) == 6
 
 
+@pytest.mark.long
 def test_a_ripple_of_a_ur10_is_named_and_no_link(real_data, tmp_path):
     """Nothing repeats in this recording: its noise is assumed, and excuses no wrong body."""
     machines = Machines(real_data, tmp_path)

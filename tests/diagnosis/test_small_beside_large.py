@@ -14,7 +14,7 @@ def hidden(size):
     return lambda m, tau: np.array([6.0, 0.0]) * m.dq * np.abs(m.dq) + np.array([0.0, size]) * m.q
 
 
-@pytest.mark.parametrize('size', [0.05, 0.2])
+@pytest.mark.parametrize('size', [0.05, pytest.param(0.2, marks=pytest.mark.long)])
 def test_a_small_cause_is_named_beside_one_that_takes_everything(bench, size):
     settings = DiagnosisSettings(material=0.0)
     misfit = Misfit('held-out', {'shoulder': 0.01, 'elbow': 0.01}, 0.2)
@@ -32,6 +32,7 @@ def test_a_small_cause_is_named_beside_one_that_takes_everything(bench, size):
     assert spring.values[0] == pytest.approx(size, rel=0.2)
 
 
+@pytest.mark.long
 def test_a_payload_is_not_lost_in_a_body_fitted_anew_where_something_else_is_small(bench):
     """Links of a model that was right when it was identified do not change."""
     heavier = CATALOGUE['payload'].on(bench.robot, ('elbow',))

@@ -27,7 +27,7 @@ def two_days(upright):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('with_baseline', [True, False])
+@pytest.mark.parametrize('with_baseline', [pytest.param(True, marks=pytest.mark.long), False])
 def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(
     two_days, with_baseline
 ):
@@ -43,7 +43,7 @@ def test_a_payload_that_is_picked_up_and_put_down_is_named_with_its_seconds(
         assert one['stop'] == pytest.approx(STOP, abs=WITHIN)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize('seconds', [0.4, 1.5])
 def test_seconds_that_are_too_few_to_be_diagnosed_alone_are_a_verdict(two_days, upright, seconds):
     model, before, _ = two_days

@@ -40,7 +40,9 @@ def coming_to_rest(bench, held, seed=0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(('held', 'baseline'), [(0.28, False), (-0.28, True)])
+@pytest.mark.parametrize(
+    ('held', 'baseline'), [(0.28, False), pytest.param(-0.28, True, marks=pytest.mark.long)]
+)
 def test_what_friction_holds_is_no_gap(bench, held, baseline):
     before = coming_to_rest(bench, 0.0, seed=1) if baseline else []
     found = diagnose(
@@ -54,7 +56,12 @@ def test_what_friction_holds_is_no_gap(bench, held, baseline):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ('part', 'baseline'), [('recordings', False), ('recordings', True), ('validate', True)]
+    ('part', 'baseline'),
+    [
+        pytest.param('recordings', False, marks=pytest.mark.long),
+        ('recordings', True),
+        pytest.param('validate', True, marks=pytest.mark.long),
+    ],
 )
 def test_more_than_friction_holds_is_said(bench, baseline, part):
     """An arm that leans on a table stands still, and no row of it tells a model anything."""
@@ -72,6 +79,7 @@ def test_more_than_friction_holds_is_said(bench, baseline, part):
     assert found.where[0].joint == 'elbow'
 
 
+@pytest.mark.long
 def test_a_brake_that_held_the_arm_on_the_day_before_is_no_change(bench):
     before, now = (coming_to_rest(bench, 9.0, seed) for seed in (1, 2))
     found = diagnose(bench.arm, now, baseline=before, rng=np.random.default_rng(0))

@@ -11,6 +11,7 @@ from armid_ros.live import DiagnosisRequest
 from armid_ros.live.request import answer, Healthy, WAITING
 from armid_ros.motion import Motion
 import numpy as np
+import pytest
 
 
 def test_what_changed_is_named_from_what_came_since(known_arm, changed):
@@ -30,6 +31,7 @@ def test_a_healthy_arm_is_consistent(known_arm, healthy):
     assert said.arm is known_arm
 
 
+@pytest.mark.long
 def test_a_gap_is_told_from_the_misfit_that_was_learned(known_arm, healthy, changed):
     learned = Healthy(known_arm, healthy)
     said, found = answer(DiagnosisRequest(known_arm, changed, healthy=learned))

@@ -39,7 +39,11 @@ def workspace(root, tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=['copied', 'linked'])
+@pytest.fixture(
+    scope='module',
+    params=[(), pytest.param(('--symlink-install',), marks=pytest.mark.long)],
+    ids=['copied', 'linked'],
+)
 def install(request, workspace, tmp_path_factory):
     """Build armid_ros alone; its messages are in the environment, of the same CMakeLists.txt."""
     folder = tmp_path_factory.mktemp('package')

@@ -51,7 +51,7 @@ def checked(root, folder, source):
     return [line for line in done.stdout.splitlines() if 'user.py' in line and 'error:' in line]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_code_of_a_user_passes_and_mistakes_are_found(root, tmp_path):
     assert checked(root, tmp_path, RIGHT) == []
     lines = checked(root, tmp_path, WRONG)

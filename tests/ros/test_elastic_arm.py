@@ -13,6 +13,7 @@ from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from builtin_interfaces.msg import Duration
 import numpy as np
+import pytest
 from sensor_msgs.msg import Imu, JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -58,6 +59,7 @@ def test_both_sides_are_published_with_one_stamp(bench):
     np.testing.assert_allclose([up.x, up.y, up.z], [0.0, 0.0, 9.81], atol=1e-9)
 
 
+@pytest.mark.long
 def test_a_bag_recorded_live_tells_the_springs(bench, tmp_path):
     arm = still_arm(
         bench, robot='two_link_elastic', rate=1000.0, loop_gain=0.15, start='0,0',

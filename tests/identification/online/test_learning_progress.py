@@ -34,7 +34,7 @@ def learn(arm, motion, look_every=1.0):
     return said
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_joint_that_stands_still_is_named(arm, motion):
     elbow = list(arm.robot.joints).index('elbow_pitch')
     parts = [np.array(part) for part in (motion.q, motion.dq, motion.ddq)]

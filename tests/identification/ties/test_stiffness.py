@@ -144,7 +144,7 @@ def two_sides(pair: TiedPair, seed: int) -> tuple[Recording, Recording]:
     return recorded(own), recorded(other)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ('times', 'draws'),
     [(np.linspace(0.0, 1.8, 101)[:-1], 150), (np.arange(0.0, 3.0, 1e-3), 60)],

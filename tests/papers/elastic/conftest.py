@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demo of the command, which its tests and those of the page share."""
+"""The demo of the command, and the browser that looks at its page."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from pathlib import Path
 from armid_ros.papers.elastic.command import elastic
 from click.testing import CliRunner
 import pytest
+
+from tests.report.conftest import browser, charts_drawn
+
+__all__ = ['browser', 'charts_drawn', 'demo']
 
 
 @pytest.fixture(scope='session')

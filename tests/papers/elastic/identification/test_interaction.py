@@ -43,6 +43,7 @@ def test_ideal_response_is_that_of_python_control(truth, joint) -> None:
     np.testing.assert_allclose(ideal_response(truth, joint, FREQUENCY)[:, 0, 0], theirs, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_decoupled_joints_are_one_link_systems(truth, runs) -> None:
     for joint, found in enumerate(decouple(runs, truth)):
         ideal = ideal_response(truth, joint, FREQUENCY)

@@ -69,6 +69,7 @@ def found(bag):
     return fit_springs(ROBOT, [read_sides(bag, ROBOT)], np.random.default_rng(0))
 
 
+@pytest.mark.long
 def test_stiffness_of_every_joint_that_carries_a_load(found):
     for one, wanted in list(zip(found, STIFFNESS, strict=True))[:3]:
         assert one.informative, one.joint

@@ -68,6 +68,7 @@ def test_bode_plot_is_that_of_python_control(clean) -> None:
     assert np.abs(np.degrees(np.angle(ratio))).max() < 0.1
 
 
+@pytest.mark.long
 def test_noise_of_the_outputs_does_not_bias(clean) -> None:
     rng = np.random.default_rng(1)
     noisy = [experiment(rng, noise=0.02 * np.std(e.y)) for e in clean for _ in range(2)]
