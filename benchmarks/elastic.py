@@ -19,10 +19,10 @@ from armid_ros.papers.elastic.identification.interaction import (
     decibel_error,
     decouple,
     joint_signals,
+    measured_response,
 )
 from armid_ros.papers.elastic.identification.names import unpack
 from armid_ros.papers.elastic.identification.physical import ideal_response
-from armid_ros.papers.elastic.identification.spectra import measured_response
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.identification.tuning import tune
 from armid_ros.papers.elastic.plant.run import ElasticSensors, Experiment, run_all
@@ -200,7 +200,7 @@ def decoupling(runs: list[ElasticRun], parameters: TwoLinkParameters) -> list[tu
     frequency, table = np.geomspace(5.0, 60.0, 200), []
     for joint, found in enumerate(decouple(runs, parameters)):
         ideal = ideal_response(parameters, joint, frequency)
-        decoupled = decibel_error(found.system.response(frequency)[:, 0, 0], ideal[:, 0, 0])
+        decoupled = decibel_error(found.response(frequency)[:, 0, 0], ideal[:, 0, 0])
         signals = joint_signals(runs, parameters, joint, decoupled=False)
         f, coupled = measured_response(signals, DT)
         band = (f >= 5.0) & (f <= 60.0)

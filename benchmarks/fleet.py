@@ -232,13 +232,12 @@ def run_cost(bags, workers):
 def loop_seconds(bags):
     """Return processor seconds of identify for a bag, in one process."""
     from armid_ros.fleet.job import FleetSettings
-    from armid_ros.fleet.kinds import choose_filters
+    from armid_ros.fleet.plan import choose_filters
     from armid_ros.identification import IdentificationSettings, identify, SignalSettings
 
     arm = ArmModel.of(str(ROBOT), effects=EFFECTS)
-    asked = FleetSettings(EFFECTS)
     theory = arm.base_parameters(np.random.default_rng(0))
-    chosen = choose_filters(arm, theory, bags, asked.signals, None, asked.reading)
+    chosen = choose_filters(arm, theory, bags, FleetSettings(EFFECTS))
     filters = SignalSettings(chosen.cutoff_hz, chosen.decimation)
     settings = IdentificationSettings('wls', filters)  # as the fleet: chosen once for all bags
     done, start = 0, time.process_time()

@@ -58,8 +58,12 @@ class BagFile:
     def name(self) -> str:
         """Name of its files among the results: that of the bag, and a digest of where it is."""
         last = self.url.rstrip('/').rsplit('/', 1)[-1]
-        digest = hashlib.sha256(self.url.encode()).hexdigest()[:10]
-        return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest}'
+        return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest(self.url, size=10)}'
+
+
+def digest(*parts: str, size: int = 16) -> str:
+    """Return a name for texts, of so many hexadecimal digits."""
+    return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:size]
 
 
 def part_of(data_set: str, bag: BagFile, day: str) -> str:
@@ -97,7 +101,12 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         There is no bag, or a bag has no arm, or one whose name is empty or too long.
 
     """
-    regular = None if arm_pattern is None else _compiled(arm_pattern)
+    try:
+        regular = None if arm_pattern is None else re.compile(arm_pattern)
+    except re.error as error:
+        raise FleetError(f'--arm {arm_pattern}: {error}') from error
+    if regular is not None and regular.groups < 1:
+        raise FleetError(f"--arm {arm_pattern}: has no group, as in 'robots/([^/]+)/'")
     found: dict[str, BagFile] = {}
     for pattern in patterns:
         filesystem, path = opened(pattern)
@@ -147,18 +156,14 @@ def _bags(
                 whole.append(path)
                 versions = [_version(one) for one in sorted(inside, key=lambda one: one['name'])]
                 size = sum(int(one.get('size') or 0) for one in inside)
-                yield path, size, _digest(*versions)
+                yield path, size, digest(*versions)
         elif path.endswith(SUFFIXES):
-            yield path, int(info.get('size') or 0), _digest(_version(info))
+            yield path, int(info.get('size') or 0), digest(_version(info))
 
 
 def _version(info: Mapping[str, Any]) -> str:
     found = [str(info[name]) for name in _VERSIONS if info.get(name)][:1]
     return '/'.join([str(info.get('name')), str(info.get('size')), *found])
-
-
-def _digest(*parts: str) -> str:
-    return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:16]
 
 
 def _arm(pattern: str, path: str) -> str:
@@ -168,16 +173,6 @@ def _arm(pattern: str, path: str) -> str:
     last = len(parts) - 1
     at = min(wild[0] if wild else last, max(last - 1, 0))
     return parts[at]
-
-
-def _compiled(pattern: str) -> re.Pattern[str]:
-    try:
-        compiled = re.compile(pattern)
-    except re.error as error:
-        raise FleetError(f'--arm {pattern}: {error}') from error
-    if compiled.groups < 1:
-        raise FleetError(f"--arm {pattern}: has no group, as in 'robots/([^/]+)/'")
-    return compiled
 
 
 def _day(path: str) -> str:

@@ -76,7 +76,7 @@ def fleet() -> None:
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
     """Hold a folder of results while a command runs, and show how far it is."""
     from armid_ros.cli.options import hold
-    from armid_ros.fleet.kinds import SCHEMA
+    from armid_ros.fleet.plan import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
 
     store = Store(out)
@@ -155,8 +155,7 @@ def identify(
     from armid_ros.fleet.bags import find_bags
     from armid_ros.fleet.cluster import connected
     from armid_ros.fleet.job import FleetSettings
-    from armid_ros.fleet.kinds import read_table
-    from armid_ros.fleet.plan import plan_fleet
+    from armid_ros.fleet.plan import plan_fleet, read_table
     from armid_ros.fleet.run import identify_fleet
     from armid_ros.identification import SignalSettings
 

@@ -23,8 +23,7 @@ from armid_ros.api.identification import identify
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
 from armid_ros.fleet.bags import folder_of
-from armid_ros.fleet.kinds import document
-from armid_ros.fleet.plan import kind_arm
+from armid_ros.fleet.plan import document, kind_arm
 from armid_ros.fleet.run import RETRIES
 from armid_ros.fleet.store import fetched, Store
 from armid_ros.fleet.watch import arm_of, Watch

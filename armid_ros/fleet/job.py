@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-import hashlib
 import json
 from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
+from armid_ros.fleet.bags import digest
 from armid_ros.identification import Conditioning, SignalSettings
 from armid_ros.identification.description import kinematics_digest
 from armid_ros.identification.fitting.nonlinear import curved
@@ -139,8 +139,7 @@ class Job:
     @cached_property
     def digest(self) -> str:
         """Return a name for the settings."""
-        text = json.dumps(self.facts, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
+        return digest(json.dumps(self.facts, sort_keys=True))
 
     @property
     def samples(self) -> int:

@@ -50,6 +50,10 @@ class Refused:
     reason: str
     failed: bool = False
 
+    def merged(self) -> MergedBags:
+        """Return it as a group of one bag."""
+        return MergedBags(refused=(self,))
+
 
 @dataclass(frozen=True, eq=False)
 class FleetEstimate:

@@ -25,7 +25,6 @@ from armid_ros.fleet.watch import (
     RESIDUAL,
     Watch,
     WatchedArm,
-    wear_rows,
 )
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.motion import FloatArray
@@ -129,7 +128,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         curves.append(Fold(line, [SmallMultiples(rest)]))
     sections.append(ContentSection('Parameters over time', [Paragraph(said, 'hint'), *curves]))
     rows = []
-    for row in wear_rows(found, arm):
+    for row in arm.wear:
         std = (row['upper'] - row['lower']) / (2.0 * HALF_WIDTH)
         unit = f'{row["unit"]} a month'
         rows.append(
@@ -202,7 +201,6 @@ def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
         order = np.arange(len(series.values), dtype=float)
         title = f'{label}: {last} {pretty(series.unit)}'
         what += _drawing(order, series.values, series.std, first.index, title=title)[0]
-    errors = sorted(e for row in arm.bags if (e := row['relative_error_percent']) is not None)
     found = _diagnosed(arm, diagnosis)
     tone = 'wearing' if found else arm.health.split(' ')[0]
     mark = Markup('<span class="mark {}">{}</span>').format(tone, found or arm.health)
@@ -212,7 +210,7 @@ def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
         what,
         str(len(arm.bags)),
         str(len(arm.refused) or ''),
-        f'{digits(errors[len(errors) // 2])} %' if errors else '',
+        '' if arm.error is None else f'{digits(arm.error)} %',
     ]
 
 
@@ -285,13 +283,7 @@ def _drawing(
     links: Sequence[str] = (),
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
-    """
-    Draw a series: small as a line, or larger as points with intervals and links.
-
-    Values have the shape (K,); the cut is the first one after a step, 0 for none. Returns the ends
-    of the ordinate as well.
-
-    """
+    """Draw a series, as a line or as points with links; return it and the ends of its ordinate."""
     (width, height), wide = (_LARGE, HALF_WIDTH) if links else (_SMALL, 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))
     least = max(6.0 * float(np.median(std)), 1e-3 * float(np.max(np.abs(values))), 1e-12)

@@ -1,27 +1,102 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The plan of a fleet: which model and filters every arm has, and the file that keeps them."""
+"""
+The plan of a fleet: which robot each arm is, and the filters of all bags of one kind of robot.
+
+fleet.json keeps them, so that later runs have the same.
+
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-import hashlib
+import csv
+from dataclasses import dataclass
+import io
 import itertools
 import json
 from typing import Any
 import uuid
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import FleetError
-from armid_ros.files import json_text
+from armid_ros.errors import ArmidError, FleetError
+from armid_ros.files import json_text, load_json, reading
 from armid_ros.files.cells import listed
-from armid_ros.fleet.bags import BagFile
+from armid_ros.fleet.bags import BagFile, digest
 from armid_ros.fleet.job import filter_facts, FleetSettings, Job, require_linear
-from armid_ros.fleet.kinds import choose_filters, document, Entry, SCHEMA
-from armid_ros.fleet.store import Store
+from armid_ros.fleet.store import fetched, opened, Store, StoreError
 from armid_ros.identification import Conditioning, SignalSettings
+from armid_ros.identification.fitting.held_out import cutoff_of_torques
+from armid_ros.identification.rows.damage import without_damage
+from armid_ros.identification.rows.signals import conditioning
+from armid_ros.model import BaseParameters
+from armid_ros.recording import Recording
+from armid_ros.recording.reader import read_pieces
 from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
+
+SCHEMA = 'armid/fleet/1'
+#: Bags that the filters are chosen by, of as many arms where there are.
+_CHOSEN_BY = 4
+#: Bags that are tried for that, where some cannot be read.
+_TRIED = 24
+#: Samples of each that are looked at.
+_LOOKED_AT = 100_000
+
+
+@dataclass(frozen=True)
+class Entry:
+    """
+    An arm in the table of robots.
+
+    Attributes
+    ----------
+    robot : str
+        Shipped name, or path of a URDF or xacro.
+    gravity, joints, effects : str
+        As of `armid identify`; empty where the table has none.
+
+    """
+
+    robot: str
+    gravity: str = ''
+    joints: str = ''
+    effects: str = ''
+
+
+def read_table(url: str) -> dict[str, Entry]:
+    """
+    Read a CSV with the columns arm and robot, and if wanted gravity, joints and effects.
+
+    Raises
+    ------
+    FleetError
+        It cannot be read, or a line has no arm or robot.
+
+    """
+    filesystem, path = opened(url)
+    try:
+        text = filesystem.cat_file(path).decode('utf-8-sig')
+    except (OSError, UnicodeDecodeError) as error:
+        raise FleetError(f'--robots {url}: cannot be read: {error}') from error
+    with reading(url, FleetError):
+        rows = csv.DictReader(io.StringIO(text), skipinitialspace=True)
+        names = rows.fieldnames or []
+        if not {'arm', 'robot'} <= set(names):
+            raise FleetError(
+                f'its first line has to name the columns arm and robot; it has {", ".join(names)}'
+            )
+        table: dict[str, Entry] = {}
+        for number, row in enumerate(rows, start=2):
+            arm, robot = (str(row[name] or '').strip() for name in ('arm', 'robot'))
+            if not arm or not robot:
+                raise FleetError(f'line {number}: has no arm or no robot')
+            if arm in table:
+                raise FleetError(f'line {number}: arm {arm} is there twice')
+            rest = (str(row.get(n) or '').strip() for n in ('gravity', 'joints', 'effects'))
+            table[arm] = Entry(robot, *rest)
+    return table
 
 
 def plan_fleet(
@@ -74,13 +149,12 @@ def plan_fleet(
         effects = [f'{effect.name}@{"+".join(effect.joints)}' for effect in model.effects]
         gravity, joints = [float(g) for g in robot.gravity], list(robot.joints)
         facts = json.dumps([robot.urdf, gravity, joints, effects])
-        key = hashlib.sha256(facts.encode()).hexdigest()[:12]
+        key = digest(facts, size=12)
         theory = model.base_parameters(np.random.default_rng(settings.seed))
-        wanted, topic = settings.signals, settings.topic
-        if key in before.get('kinds', {}) and wanted == SignalSettings():
+        if key in before.get('kinds', {}) and settings.signals == SignalSettings():
             filters = Conditioning(**before['kinds'][key]['filters'])
         else:
-            filters = choose_filters(model, theory, some, wanted, topic, settings.reading)
+            filters = choose_filters(model, theory, some, settings)
         job = Job(model, theory, filters, store.url, run, settings)
         store.write(f'robots/{key}.urdf', robot.urdf)
         kinds[key] = {
@@ -89,7 +163,7 @@ def plan_fleet(
             'joints': joints,
             'effects': effects,
             'method': 'wls' if settings.weighted else 'ols',
-            'topic': topic,
+            'topic': settings.topic,
             'filters': filter_facts(filters),
         }
         for bag in some:
@@ -108,6 +182,75 @@ def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
         urdf.decode(), gravity=facts['gravity'], joints=facts['joints'], source=facts['robot']
     )
     return ArmModel.of(robot, effects=facts['effects'])
+
+
+def document(store: Store) -> dict[str, Any]:
+    """
+    Return fleet.json; empty if there is none.
+
+    Raises
+    ------
+    FleetError
+        It is none of this program.
+
+    """
+    data = store.read('fleet.json')
+    if data is None:
+        return {}
+    with reading(f'{store.url}/fleet.json', FleetError):
+        found: Mapping[str, Any] = load_json(data.decode())
+        if found['schema'] != SCHEMA:
+            raise FleetError(f'holds {found["schema"]}, not {SCHEMA}; name another folder')
+    return dict(found)
+
+
+def choose_filters(
+    arm: ArmModel, theory: BaseParameters, bags: Sequence[BagFile], settings: FleetSettings
+) -> Conditioning:
+    """
+    Choose the filters for a kind of arm by a few of its bags.
+
+    They are then those of all bags of all days: estimates through other filters differ by more
+    than noise.
+
+    Raises
+    ------
+    FleetError
+        No bag can be read; with the reason of the last one.
+
+    """
+    recordings: list[Recording] = []
+    problem, wanted = 'there is none', settings.signals
+    turns: Counter[str] = Counter()
+    order = []
+    for bag in bags:  # one of each arm before a second one of any
+        turns[bag.arm] += 1
+        order.append((turns[bag.arm], bag))
+    for _, bag in sorted(order)[:_TRIED]:
+        try:
+            with fetched(bag.url) as path:
+                first = read_pieces(
+                    path,
+                    joints=arm.robot.joints,
+                    topic=settings.topic,
+                    samples=_LOOKED_AT,
+                    keep=lambda piece: piece.start_ns,
+                    settings=settings.reading,
+                )
+                piece, _ = next(first)
+                conditioning([piece], wanted)
+                recordings.append(piece)
+        except (ArmidError, StoreError) as error:
+            problem = str(error)
+        if len(recordings) == _CHOSEN_BY:
+            break
+    if not recordings:
+        raise FleetError(f'no bag of {arm.robot.name} can be read: {problem}')
+    used = conditioning(recordings, wanted)
+    if wanted.cutoff_hz is None:
+        repaired, _ = without_damage(recordings, SignalSettings(used.cutoff_hz, used.decimation))
+        used = cutoff_of_torques(arm, theory.independent, repaired, used)
+    return Conditioning(used.rate_hz, used.cutoff_hz, used.decimation)
 
 
 def _model(entry: Entry, settings: FleetSettings) -> ArmModel:

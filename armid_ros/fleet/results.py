@@ -17,11 +17,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import datetime
-import hashlib
 
 from armid_ros.arm import parameter_table
 from armid_ros.errors import FleetError
-from armid_ros.fleet.bags import BagFile, folder_of, part_of
+from armid_ros.fleet.bags import BagFile, digest, folder_of, part_of
 from armid_ros.fleet.job import Job
 from armid_ros.fleet.merge import FleetEstimate, MergedBags, Refused
 from armid_ros.fleet.store import Store
@@ -174,7 +173,7 @@ def write_arm(
     """Write the estimate of all bags of an arm together."""
     common = {
         'settings': job.digest,
-        'versions': versions_digest(merged.versions),
+        'versions': _versions(merged.versions),
         'bags': len(merged.versions),
         'seconds': merged.seconds,
         'relative_error_percent': estimate.relative_error_percent,
@@ -208,13 +207,7 @@ def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> li
             refused.append(known)
     out = {one.bag.url for one in refused}
     used = [(bag.url, bag.version) for bag in bags if bag.url not in out]
-    return refused if row['versions'] == versions_digest(used) else None
-
-
-def versions_digest(versions: Sequence[tuple[str, str]]) -> str:
-    """Return a name for a set of bags as they are now."""
-    lines = sorted('\t'.join(pair) for pair in versions)
-    return hashlib.sha256('\n'.join(lines).encode()).hexdigest()[:16]
+    return refused if row['versions'] == _versions(used) else None
 
 
 def table_of(store: Store, data_set: str) -> pa.Table:
@@ -231,6 +224,11 @@ def table_of(store: Store, data_set: str) -> pa.Table:
     if table is None:
         raise FleetError(f'{store.url}: holds no {data_set}; run `armid fleet identify` first')
     return table
+
+
+def _versions(versions: Sequence[tuple[str, str]]) -> str:
+    """Return a name for a set of bags as they are now."""
+    return digest(*sorted('\t'.join(pair) for pair in versions))
 
 
 def _rows(estimate: FleetEstimate) -> list[dict[str, object]]:

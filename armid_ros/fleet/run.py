@@ -22,7 +22,7 @@ from armid_ros.fleet.results import (
     write_summary,
 )
 from armid_ros.fleet.store import Store
-from armid_ros.fleet.summary import prepare, PreparedBag
+from armid_ros.fleet.summary import BagSummary, prepare
 from armid_ros.identification import Conditioning
 from armid_ros.motion import FloatArray
 from distributed import as_completed, Client, Future, KilledWorker
@@ -107,17 +107,18 @@ Group = tuple[BagFile, ...]
 Fitted = tuple[MergedBags, FleetFit | None]
 
 
-def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[PreparedBag, ...]:
+def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused, ...]:
     """Task: find bags among the results, or read them and write them there."""
     store, taken = Store(job.out), []
     for bag in bags:
-        known = find_summary(store, bag, job)
-        prepared = prepare(bag, job, bags_of_arm) if known is None else PreparedBag(known)
-        taken.append(prepared)
-        if known is None and isinstance(prepared.summary, Refused):
-            write_refused(store, prepared.summary, job)
-        elif known is None and not isinstance(prepared.summary, Refused):
-            write_summary(store, prepared.summary, job)
+        one = find_summary(store, bag, job)
+        if one is None:
+            one = prepare(bag, job, bags_of_arm)
+            if isinstance(one, Refused):
+                write_refused(store, one, job)
+            else:
+                write_summary(store, one, job)
+        taken.append(one)
     return tuple(taken)
 
 
@@ -126,9 +127,9 @@ def same(job: Job) -> Job:
     return job
 
 
-def merge(prepared: Sequence[PreparedBag]) -> MergedBags:
+def merge(taken: Sequence[BagSummary | Refused]) -> MergedBags:
     """Task: merge the bags of a group, and leave their rows where they are."""
-    return MergedBags.of([one.merged() for one in prepared])
+    return MergedBags.of([one.merged() for one in taken])
 
 
 def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
@@ -137,11 +138,11 @@ def fit(groups: Sequence[MergedBags], job: Job) -> Fitted:
     return merged, None if merged.normal is None else FleetFit.of(merged.normal, job)
 
 
-def noise(prepared: Sequence[PreparedBag], fitted: Fitted, job: Job) -> FloatArray | None:
+def noise(taken: Sequence[BagSummary | Refused], fitted: Fitted, job: Job) -> FloatArray | None:
     """Task: compute the noise products of a group at the values of its arm."""
     known, found = fitted[1], None
-    for one in prepared:
-        if known is not None and not isinstance(one.summary, Refused):
+    for one in taken:
+        if known is not None and isinstance(one, BagSummary):
             products = known.noise(one.rows_again(job))
             found = products if found is None else found + products
     return found
@@ -216,17 +217,12 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """
-    An arm that is to be done: its bags, and those of which it is known that they fail.
-
-    And how often tasks of it were on workers that others ended.
-
-    """
+    """An arm that is to be done: its bags, and those of which it is known that they fail."""
 
     arm: str
     groups: tuple[Group, ...]
     refused: tuple[Refused, ...] = ()
-    hit: int = 0
+    hit: int = 0  # times that tasks of it were on workers that others ended
 
 
 @dataclass
@@ -329,14 +325,10 @@ class _Run:
         return _UnderWay(arm, prepared, fitted, products, last)
 
     def _begin_again(self, tasks: _UnderWay) -> None:
-        """
-        Let what is left of an arm wait whose tasks have failed, and give up the bags at fault.
-
-        A group that has failed is shared out, bag by bag, to find the one to blame. What waits for
-        a task fails with it, so the noise is looked at only where all bags were read. A bag whose
-        worker another bag may have ended is read once more by itself.
-
-        """
+        """Let what is left of an arm wait whose tasks have failed; give up the bags at fault."""
+        # A group that has failed is shared out, bag by bag, to find the one to blame. What waits
+        # for a task fails with it, so the noise is looked at only where all bags were read. A bag
+        # whose worker another bag may have ended is read once more by itself.
         arm = tasks.arm
         job, futures = self._job_of[arm.arm], tasks.prepared
         if tasks.fitted.status == 'finished' and all(one.status != 'error' for one in futures):

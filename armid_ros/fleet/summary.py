@@ -47,6 +47,8 @@ class BagSummary:
         Further columns of the table ``bags``; empty where it was found among the results.
     computed : bool
         False where it was found among the results.
+    rows : tuple of Regression or None
+        Its rows, while they fit into the memory; None where the bag is read again for them.
 
     """
 
@@ -58,46 +60,26 @@ class BagSummary:
     own: FleetEstimate | None = None
     motion: Mapping[str, object] = field(default_factory=dict)
     computed: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedBag:
-    """
-    A bag that was read.
-
-    Attributes
-    ----------
-    summary : BagSummary or Refused
-        What travels.
-    rows : tuple of Regression or None
-        What does not; None where the bag is read again if they are needed.
-
-    """
-
-    summary: BagSummary | Refused
     rows: tuple[Regression, ...] | None = None
 
     def merged(self) -> MergedBags:
         """Return it as a group of one bag."""
-        one = self.summary
-        if isinstance(one, Refused):
-            return MergedBags(refused=(one,))
-        version = one.bag.url, one.bag.version
-        return MergedBags(one.normal, one.seconds, (version,), 0 if one.computed else 1)
+        version = self.bag.url, self.bag.version
+        return MergedBags(self.normal, self.seconds, (version,), 0 if self.computed else 1)
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
         """Yield the rows of the bag, as they were kept or read again."""
         if self.rows is not None:
             yield from self.rows
             return
-        with fetched(self.summary.bag.url) as path:
+        with fetched(self.bag.url) as path:
             for _, parts in pieces(path, job):
                 yield from parts
 
 
-def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> PreparedBag:
+def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Read a bag and compress it.
+    Read a bag and compress it, or say why it is not used.
 
     Parameters
     ----------
@@ -120,7 +102,7 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> PreparedBag:
             return _prepared(bag, path, job, KEPT_BYTES // max(1, bags_of_arm))
     except ArmidError as error:
         # a message names the bag by where it lies, not by where its copy was
-        return PreparedBag(Refused(bag, str(error).replace(path, bag.url)))
+        return Refused(bag, str(error).replace(path, bag.url))
 
 
 def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
@@ -136,7 +118,7 @@ def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression
     )
 
 
-def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
+def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
     robot = job.arm.robot
     normal: NormalEquations | None = None
     kept: list[Regression] | None = []
@@ -183,5 +165,5 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> PreparedBag:
     apart = datetime.date.fromisoformat(day) - stamped.date()
     if abs(apart.days) > 1:  # the clock counts from its start; one day off is a time zone
         start_ns += apart.days * DAY_NS
-    summary = BagSummary(bag, day, start_ns, seconds, normal, own, motion)
-    return PreparedBag(summary, None if kept is None else tuple(kept))
+    held = None if kept is None else tuple(kept)
+    return BagSummary(bag, day, start_ns, seconds, normal, own, motion, rows=held)

@@ -29,10 +29,10 @@ from armid_ros.changes.scatter import ParameterHistory, Spread, spreads, without
 from armid_ros.errors import FleetError
 from armid_ros.estimate import ParameterName
 from armid_ros.fleet.bags import DAY_NS
-from armid_ros.fleet.kinds import document
-from armid_ros.fleet.plan import kind_arm
+from armid_ros.fleet.plan import document, kind_arm
 from armid_ros.fleet.results import table_of
 from armid_ros.fleet.store import Store
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.report.families import full_label
 import numpy as np
 import pyarrow as pa
@@ -40,8 +40,6 @@ import pyarrow.compute as pc
 
 #: Share of healthy arms among those named, in the long run.
 ALPHA = 0.05
-#: Half width of a 95 % interval, in standard deviations.
-_WIDE = 1.96
 #: What the series of residuals is called; it is the logarithm of their deviation.
 RESIDUAL = 'residual'
 
@@ -99,8 +97,6 @@ class WatchedArm:
         That of its robot.
     series : tuple of ParameterHistory
         Its parameters, and the logarithm of its residuals.
-    compared : tuple of ParameterHistory
-        The same without what its siblings share on a day, which is no change of its own.
     bags : tuple of dict
         A row of the table ``bags`` each, in order of time, without normal equations.
     judged : Judged
@@ -109,17 +105,19 @@ class WatchedArm:
         What it is named for.
     refused : tuple of dict
         Rows of the table ``refused``.
+    wear : tuple of dict
+        Rows of the table ``watch/wear``.
 
     """
 
     arm: str
     kind: str
     series: tuple[ParameterHistory, ...]
-    compared: tuple[ParameterHistory, ...]
     bags: tuple[dict[str, Any], ...]
     judged: Judged
     named: tuple[HistoryChange, ...]
     refused: tuple[dict[str, Any], ...]
+    wear: tuple[dict[str, Any], ...]
 
     @property
     def health(self) -> str:
@@ -127,6 +125,12 @@ class WatchedArm:
         if self.named:
             return 'changed' if self.named[0].kind == 'step' else 'wearing'
         return 'healthy' if self.judged.changes else 'too few bags'
+
+    @property
+    def error(self) -> float | None:
+        """Median of the relative errors of its bags [%]; None where none was fitted."""
+        errors = [e for row in self.bags if (e := row['relative_error_percent']) is not None]
+        return float(np.median(errors)) if errors else None
 
     def bag_at(self, change: HistoryChange) -> dict[str, Any]:
         """Return the row of the bag at a change: the first one after a step, or the last one."""
@@ -143,18 +147,12 @@ class Watch:
     ----------
     arms : tuple of WatchedArm
         Those named first.
-    spread : dict
-        Spread of bags by kind of arm and parameter.
-    wearing : frozenset of str
-        Names of the parameters that wear is looked for in: those of the effects.
     alpha : float
         False discovery rate.
 
     """
 
     arms: tuple[WatchedArm, ...]
-    spread: Mapping[str, Mapping[tuple[str, str], Spread]]
-    wearing: frozenset[str]
     alpha: float
 
 
@@ -172,15 +170,10 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     kind_of: Mapping[str, str] = facts.get('arms', {})
     if not kind_of:
         raise FleetError(f'{store.url}: holds no fleet; run `armid fleet identify` first')
-    bags: dict[str, list[dict[str, Any]]] = {}
-    for row in table_of(store, 'bags').drop_columns(['normal_equations']).to_pylist():
-        bags.setdefault(str(row['arm']), []).append(row)
+    bags = _by_arm(table_of(store, 'bags').drop_columns(['normal_equations']))
     for rows in bags.values():
         rows.sort(key=lambda row: (row['start_ns'], row['bag']))
-    refused: dict[str, list[dict[str, Any]]] = {}
-    table = store.data_set('refused')
-    for row in [] if table is None else table.to_pylist():
-        refused.setdefault(str(row['arm']), []).append(row)
+    refused = _by_arm(store.data_set('refused'))
     by_kind: dict[str, list[ParameterHistory]] = {}
     for one in _series(table_of(store, 'parameters'), bags):
         by_kind.setdefault(kind_of.get(one.arm, ''), []).append(one)
@@ -188,17 +181,18 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     for key, kind in facts['kinds'].items():
         arm = kind_arm(store, kind, key)
         wearing.update(one.name for one in arm.parameters[len(arm.robot.rigid_parameters) :])
-    spread: dict[str, Mapping[tuple[str, str], Spread]] = {}
     kinds, arms = [], []
     own: dict[str, list[ParameterHistory]] = {}
-    compared: dict[str, list[ParameterHistory]] = {}
-    for key, group in by_kind.items():
+    worn: dict[str, list[dict[str, Any]]] = {}
+    for group in by_kind.values():
+        # without what siblings share on a day, which is no change of an arm's own
         without = without_days(group)
-        spread[key] = spreads(without)
-        kinds.append((without, spread[key]))
+        spread = spreads(without)
+        kinds.append((without, spread))
         for one, other in zip(group, without, strict=True):
             own.setdefault(one.arm, []).append(one)
-            compared.setdefault(one.arm, []).append(other)
+            if one.name in wearing:
+                worn.setdefault(one.arm, []).extend(_wear_row(other, spread))
     for judged in judge(kinds):
         name = judged.arm
         arms.append(
@@ -206,14 +200,14 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
                 name,
                 kind_of.get(name, ''),
                 tuple(own[name]),
-                tuple(compared[name]),
                 tuple(bags.get(name, ())),
                 judged,
                 named(judged, alpha),
                 tuple(refused.get(name, ())),
+                tuple(worn.get(name, ())),
             )
         )
-    return Watch(tuple(arms), spread, frozenset(wearing), alpha)
+    return Watch(tuple(arms), alpha)
 
 
 def arm_of(found: Watch, name: str) -> WatchedArm:
@@ -236,20 +230,18 @@ def arm_of(found: Watch, name: str) -> WatchedArm:
 def write_watch(store: Store, found: Watch) -> None:
     """Write tables and alarms."""
     changes = [row for arm in found.arms for row in change_rows(arm)]
-    arms = []
-    for arm in found.arms:
-        errors = [e for row in arm.bags if (e := row['relative_error_percent'])]
-        arms.append(
-            {
-                'arm': arm.arm,
-                'health': arm.health,
-                'bags': len(arm.bags),
-                'refused': len(arm.refused),
-                'adjusted_p': arm.judged.adjusted,
-                'relative_error_percent': float(np.median(errors)) if errors else None,
-            }
-        )
-    wear = [row for arm in found.arms for row in wear_rows(found, arm)]
+    arms = [
+        {
+            'arm': arm.arm,
+            'health': arm.health,
+            'bags': len(arm.bags),
+            'refused': len(arm.refused),
+            'adjusted_p': arm.judged.adjusted,
+            'relative_error_percent': arm.error,
+        }
+        for arm in found.arms
+    ]
+    wear = [row for arm in found.arms for row in arm.wear]
     for name, rows, schema in (
         ('changes', changes, CHANGES),
         ('wear', wear, WEAR),
@@ -286,22 +278,23 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
     return rows
 
 
-def wear_rows(found: Watch, arm: WatchedArm) -> Iterator[dict[str, Any]]:
-    """Yield the slope of every parameter of an arm that is none of a rigid body."""
-    for series in arm.compared:
-        if series.name not in found.wearing or len(series.values) < 2:
-            continue
-        slope, std = wear(series, found.spread[arm.kind][series.parameter])
-        if np.isfinite(std):
-            yield {
-                'arm': arm.arm,
-                'name': series.name,
-                'joint': series.joint,
-                'unit': series.unit,
-                'per_month': slope,
-                'lower': slope - _WIDE * std,
-                'upper': slope + _WIDE * std,
-            }
+def _wear_row(
+    series: ParameterHistory, spread: Mapping[tuple[str, str], Spread]
+) -> Iterator[dict[str, Any]]:
+    """Yield the slope of a parameter as a row, where there is one."""
+    if len(series.values) < 2:
+        return
+    slope, std = wear(series, spread[series.parameter])
+    if np.isfinite(std):
+        yield {
+            'arm': series.arm,
+            'name': series.name,
+            'joint': series.joint,
+            'unit': series.unit,
+            'per_month': slope,
+            'lower': slope - HALF_WIDTH * std,
+            'upper': slope + HALF_WIDTH * std,
+        }
 
 
 def sentence(change: HistoryChange) -> str:
@@ -309,11 +302,11 @@ def sentence(change: HistoryChange) -> str:
     series = change.series
     what = parameter_label(*series.parameter)
     if series.name == RESIDUAL:
-        reach = _WIDE * change.std
+        reach = HALF_WIDTH * change.std
         factor, lower, upper = np.exp(change.size + np.array([0.0, -reach, reach]))
         by = f'by a factor of {factor:.3g} ({lower:.3g} to {upper:.3g})'
     else:
-        by = f'by {change.size:+.3g} ± {_WIDE * change.std:.2g} {series.unit}'.rstrip()
+        by = f'by {change.size:+.3g} ± {HALF_WIDTH * change.std:.2g} {series.unit}'.rstrip()
     if change.kind == 'trend':
         return f'{what} drifts {by} a month since {day_text(float(series.days[0]))}'
     last, first = (day_text(float(series.days[k])) for k in (change.index - 1, change.index))
@@ -334,6 +327,14 @@ def parameter_label(name: str, joint: str) -> str:
     if name.isidentifier() and '_' in name:
         return f'{name.replace("_", " ")} of {joint}'
     return full_label(ParameterName(name, joint, ''))
+
+
+def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of a table by their arm."""
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for row in [] if table is None else table.to_pylist():
+        rows.setdefault(str(row['arm']), []).append(row)
+    return rows
 
 
 def _series(

@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import make_effect, USUAL_EFFECTS
+from armid_ros.effects import USUAL_EFFECTS
 from armid_ros.errors import ArmidError
-from armid_ros.identification import Identification, identify, Score
+from armid_ros.identification import identify, Score
 from armid_ros.identification.assess.grade import beyond_noise, grade
 from armid_ros.identification.assess.grade_limits import LIMITS
 from armid_ros.identification.assess.sensor_faults import held_elsewhere
@@ -86,9 +85,7 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         Of the identification.
 
     """
-    arm = ArmModel(robot)
-    for name in USUAL_EFFECTS:
-        arm = arm.with_effect(make_effect(name, robot))
+    arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
     try:
         result = identify(arm, [recording], rng=rng)
         graded = grade(result, arm, [recording], {})
@@ -98,6 +95,8 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
     torques = [motion.tau for motion in motions if motion.tau is not None]
     factors, correlation = torque_factors(robot, motions, torques)
     score = Score.of(result.training)
+    errors = score.joint_relative_error_percent
+    beyond = beyond_noise(errors, result.training, result.used)  # noise makes no model poor
     return TrialFit(
         relative_error_percent=score.relative_error_percent,
         rank=result.base.rank,
@@ -107,16 +106,12 @@ def try_identification(robot: Robot, recording: Recording, rng: np.random.Genera
         scale=np.where(np.abs(correlation) > FOLLOWS, factors, np.nan),
         notes=result.notes,
         elsewhere=tuple(one.text for one in held_elsewhere(robot, [recording], motions)),
-        poor=tuple(_poor(result, score.joint_relative_error_percent)),
+        poor=tuple(
+            f'{error:.0f} % of the efforts of {joint}'
+            for joint, error, left in zip(robot.joints, errors, beyond, strict=True)
+            if left > LIMITS.poor
+        ),
         grade=graded.word,
         reasons=graded.reasons,
         faults=graded.faults,
     )
-
-
-def _poor(result: Identification, errors: FloatArray) -> Iterator[str]:
-    """Name the joints whose model would be poor; noise of a torque makes none so."""
-    beyond = beyond_noise(errors, result.training, result.used)
-    for joint, error, left in zip(result.arm.robot.joints, errors, beyond, strict=True):
-        if left > LIMITS.poor:
-            yield f'{error:.0f} % of the efforts of {joint}'

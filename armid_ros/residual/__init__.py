@@ -11,11 +11,12 @@ residual the map and the law predict, and a table for other programs.
 from armid_ros.residual.learn import (
     JointResidual,
     learn_residual,
+    lookup_table,
     require_libraries,
     Residual,
+    TABLE_FILE,
     WORTH_A_MAP,
 )
-from armid_ros.residual.table import lookup_table, TABLE_FILE
 
 __all__ = [
     'TABLE_FILE',

@@ -73,22 +73,10 @@ class Law:
         return {'text': self.text, 'terms': terms, 'held_out_share': self.share}
 
 
-def library(
+def _library(
     inputs: FloatArray, low: float, high: float, prismatic: bool
 ) -> list[tuple[str, str, FloatArray]]:
-    """
-    Return the terms that are tried: text, unit of the factor, and values along the data, (N,).
-
-    Parameters
-    ----------
-    inputs : ndarray, shape (N, 3)
-        Position, velocity, load.
-    low, high : float
-        Range of the position in which hinges may be [rad or m].
-    prismatic : bool
-        Whether the joint slides: it has no sines.
-
-    """
+    """Return the terms that are tried: text, unit of the factor, and values along the data."""
     q, dq, w = inputs.T
     sign = np.sign(dq)
     force, x = ('N', 'm') if prismatic else ('N m', 'rad')
@@ -135,7 +123,7 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
 
     """
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
-    columns = library(rows.inputs, *ends, prismatic)
+    columns = _library(rows.inputs, *ends, prismatic)
     x = np.column_stack([values for _, _, values in columns])
     # squared residuals of each block under laws of so many terms that are fitted to the others
     losses = np.zeros((_TERMS, BLOCKS))

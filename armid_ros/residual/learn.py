@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 from armid_ros.arm import ArmModel
@@ -13,6 +14,7 @@ from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import Trajectory
 from armid_ros.effects.learned import as_effect, TorqueMap
 from armid_ros.errors import IdentificationError
+from armid_ros.files.cells import csv_cell
 from armid_ros.motion import FloatArray
 from armid_ros.residual.gaussian_process import learn_map
 from armid_ros.residual.law import Law, share_of, suggest_law
@@ -27,6 +29,10 @@ WORTH_A_MAP = ('partial', 'unknown')
 _FEW = 100
 #: A map knows something where its deviation is less than this share of the prior's.
 _KNOWN = 0.5
+#: File beside model.yaml with the maps on a grid of position, velocity and load.
+TABLE_FILE = 'residual.csv'
+_STEPS = (41, 31, 9)
+_HEAD = 'joint,position,velocity,load,torque,std'
 
 
 @dataclass(frozen=True)
@@ -145,19 +151,6 @@ def require_libraries() -> None:
         ) from None
 
 
-def _one_thread() -> threadpool_limits:
-    """
-    Return a context in which linear algebra has one thread.
-
-    Learning solves thousands of systems of a hundred rows. Two threads wait for each other
-    fifteen times as long as they compute.
-
-    """
-    import sklearn.linear_model  # noqa: F401
-
-    return threadpool_limits(1)
-
-
 def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual | None:
     """
     Learn a map of the residual that a diagnosis does not explain.
@@ -193,7 +186,11 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         validation = [overlay.trajectory for overlay in gap.overlays]
     every = joint_rows(base, diagnosis.data)
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
-    with _one_thread():
+    # thousands of systems of a hundred rows: two threads would wait for each other fifteen times
+    # as long as they compute
+    import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
+
+    with threadpool_limits(1):
         learned = [
             _learned(joint, rows, other, base, rng)
             for joint, rows, other in zip(base.robot.joints, every, unseen, strict=True)
@@ -244,3 +241,30 @@ def _learned(
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
     """Return which rows a map knows something of: they lie near those it was learned from."""
     return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
+
+
+def lookup_table(residual: Residual) -> str:
+    """
+    Return the maps on a grid over the data as CSV, in SI units.
+
+    Returns
+    -------
+    str
+        Joint, position, velocity, load, torque and its standard deviation; the load is empty
+        where it does not matter. Position varies slowest.
+
+    """
+    lines = [_HEAD]
+    for one in residual.joints:
+        axes = [one.axis(number, count) for number, count in enumerate(_STEPS)]
+        loaded = one.learned.takes_load
+        if not loaded:
+            axes[2] = np.zeros(1)
+        inputs = np.array(list(product(*axes)))
+        torque, std = one.learned.torque(inputs), one.learned.std(inputs)
+        name = csv_cell(one.joint)
+        lines += [
+            f'{name},{q:.6g},{dq:.6g},{f"{w:.6g}" if loaded else ""},{tau:.6g},{s:.4g}'
+            for (q, dq, w), tau, s in zip(inputs, torque, std, strict=True)
+        ]
+    return '\n'.join(lines) + '\n'

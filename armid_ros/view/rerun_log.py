@@ -22,12 +22,15 @@ from typing import Any
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import ArmidError
+from armid_ros.identification import SignalSettings
+from armid_ros.identification.rows.regression import predictions
+from armid_ros.identification.rows.signals import conditioning
+from armid_ros.model.kinematics import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
 from armid_ros.robots.geometry import LinkShape, shapes_of
 from armid_ros.robots.sticks import sticks
-from armid_ros.view.scene import joint_frames, poses, torques
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -43,6 +46,8 @@ _LINK, _MARKED = (175, 182, 190), (230, 60, 40)
 _SINCE_1970 = 1e8
 #: Radius of a bar of an arm without bodies [m].
 _BAR = 0.02
+#: Poses per second that are drawn.
+_POSE_RATE = 30.0
 
 
 def rerun() -> ModuleType:
@@ -146,21 +151,22 @@ def log_recording(
     rr, robot = rerun(), arm.robot
     notes = _log_bodies(stream, robot, marked)
     t, q = poses(recording)
-    rotations, translations = joint_frames(robot, q)
+    frames = LinkFrames.of(robot, q).frames
     curves = [('position/{}', recording.t, recording.q)]
     if recording.dq is not None:
         curves.append(('velocity/{}', recording.t, recording.dq))
-    found = torques(arm, recording)
-    if found is not None:
-        times, measured, predicted = found
-        curves += [
-            ('torque/{}/measured', times, measured),
-            ('torque/{}/predicted', times, predicted),
-            ('residual/{}', times, measured - predicted),
-        ]
+    if recording.tau is not None:  # measured and predicted torque, filtered alike
+        fits = predictions(arm, [recording], conditioning([recording], SignalSettings()))
+        times = np.concatenate([fit.motion.t for fit in fits])
+        for entity, name in (
+            ('torque/{}/measured', 'tau'),
+            ('torque/{}/predicted', 'predicted'),
+            ('residual/{}', 'residual'),
+        ):
+            curves.append((entity, times, np.concatenate([getattr(fit, name) for fit in fits])))
     for j, joint in enumerate(robot.joints):
-        turns = Rotation.from_matrix(rotations[:, j]).as_quat()
-        moved = rr.Transform3D.columns(translation=translations[:, j], quaternion=turns)
+        turns = Rotation.from_matrix(frames[j].rotation.transpose(2, 0, 1)).as_quat()
+        moved = rr.Transform3D.columns(translation=frames[j].origin.T, quaternion=turns)
         stream.send_columns(f'arm/{_part(joint)}', [_times(t)], moved)
         for entity, at, values in curves:
             known = np.isfinite(values[:, j])
@@ -177,6 +183,18 @@ def log_recording(
     stream.send_blueprint(_layout(robot.joints, marked))
     stream.flush()
     return notes
+
+
+def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
+    """Return times, shape (K,) [s], and poses, (K, n), some thirty a second, without NaN."""
+    t = recording.t
+    count = max(2, int((t[-1] - t[0]) * _POSE_RATE) + 1)
+    at = np.linspace(t[0], t[-1], min(count, len(t)))
+    columns = []
+    for column in recording.q.T:
+        known = np.isfinite(column)
+        columns.append(np.interp(at, t[known], column[known]) if known.any() else 0.0 * at)
+    return at, np.column_stack(columns)
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:

@@ -9,8 +9,7 @@ from pathlib import Path
 from armid_ros.arm import ArmModel
 from armid_ros.errors import FleetError
 from armid_ros.fleet.bags import DAY_NS, find_bags
-from armid_ros.fleet.kinds import document, Entry
-from armid_ros.fleet.plan import plan_fleet
+from armid_ros.fleet.plan import document, Entry, plan_fleet
 from armid_ros.fleet.store import Store
 from armid_ros.fleet.summary import prepare
 from armid_ros.identification import IdentificationSettings, identify, Score, SignalSettings
@@ -98,7 +97,7 @@ def test_a_bag_whose_clock_began_at_zero_is_of_the_day_in_its_path(bags, tmp_pat
     bag = find_bags([f'{bags}/*/*'])[0]
     job = plan_fleet([bag], URDF, str(tmp_path), SETTINGS)[bag.arm]
     stamped, dated = (
-        prepare(replace(bag, day=day), job).summary.start_ns for day in (bag.day, '2040-05-06')
+        prepare(replace(bag, day=day), job).start_ns for day in (bag.day, '2040-05-06')
     )
     assert datetime.fromtimestamp(1e-9 * dated, UTC).strftime('%F') == '2040-05-06'
     assert (dated - stamped) % DAY_NS == 0

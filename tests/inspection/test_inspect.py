@@ -192,9 +192,7 @@ def test_what_identify_calls_unusable_is_not_taken(clean, robot):
     """The grade of identify is asked, whatever it is for: here a torque that is no arm's."""
     pushed = clean.tau.std(axis=0) * np.sin(7.0 * clean.t)[:, np.newaxis]
     other = replace(clean, tau=clean.tau + pushed)
-    arm = ArmModel(robot)
-    for name in USUAL_EFFECTS:
-        arm = arm.with_effect(make_effect(name, robot))
+    arm = ArmModel.of(robot, effects=USUAL_EFFECTS)
     result = identify(arm, [other], rng=np.random.default_rng(0))
     graded = grade(result, arm, [other], {})
     found = inspect(other, robot, rng=np.random.default_rng(0))

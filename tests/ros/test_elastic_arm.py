@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.recorder import RecorderNode
-from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments
 from armid_ros.robots import load_robot
@@ -88,8 +88,8 @@ def test_a_bag_recorded_live_tells_the_springs(bench, tmp_path):
         run(trajectory(t, experiment.q + way - way[0], experiment.torque), len(t) + 110)
     recorder.close()
     shipped = two_link_set('after')
-    sensors = Accelerometers.on(ROBOT, shipped.assumptions['accelerometer_radius'])
-    runs = read_runs(tmp_path / 'bag', ROBOT, sensors)
+    radius = shipped.assumptions['accelerometer_radius']
+    runs = read_runs(tmp_path / 'bag', ROBOT, radius)
     assert len(runs) == 4
     found = identify_two_inertia(runs, shipped.parameters).parameters
     np.testing.assert_allclose(found.stiffness, shipped.parameters.stiffness, rtol=0.02)

@@ -15,8 +15,7 @@ import sys
 import armid_ros as ar
 from armid_ros.cli import main
 from armid_ros.view import rerun_log
-from armid_ros.view.rerun_log import log_recording, open_stream
-from armid_ros.view.scene import poses
+from armid_ros.view.rerun_log import log_recording, open_stream, poses
 from click.testing import CliRunner
 import numpy as np
 import pinocchio as pin

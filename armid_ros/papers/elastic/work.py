@@ -14,7 +14,7 @@ from armid_ros.cli.terminal import print_parameters, progress, say, Tick
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA, tuning_story
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
@@ -37,6 +37,7 @@ from armid_ros.robots.two_link import (
     two_link_set,
     TwoLinkParameters,
 )
+from armid_ros.simulation.accelerometers import LinkAccelerometers
 from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from armid_ros.simulation.motor_control import VelocityLoop
 import click
@@ -85,11 +86,11 @@ class ElasticOptions:
     kp: str | None
     ki: str | None
 
-    def machine(self, robot: Robot) -> tuple[Accelerometers, TwoLinkParameters, VelocityLoop]:
-        """Return sensors, drives and loop; what is not given is that of the shipped arm."""
+    def machine(self) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
+        """Return places of sensors, drives and loop; by default those of the shipped arm."""
         shipped = two_link_set('after')
         radius = shipped.assumptions['accelerometer_radius']
-        sensors = Accelerometers.on(robot, _two_numbers(self, 'accelerometers', radius))
+        radius = _two_numbers(self, 'accelerometers', radius)
         gear = _two_numbers(self, 'gear', shipped.parameters.gear)
         loop = two_link_loop(shipped)
         loop = replace(
@@ -97,7 +98,7 @@ class ElasticOptions:
             proportional=_two_numbers(self, 'kp', loop.proportional),
             integral=_two_numbers(self, 'ki', loop.integral),
         )
-        return sensors, replace(shipped.parameters, gear=gear), loop
+        return radius, replace(shipped.parameters, gear=gear), loop
 
 
 def identify_elastic(data: ElasticOptions, out: Path, seed: int, as_json: bool) -> None:
@@ -116,16 +117,16 @@ def identify_elastic(data: ElasticOptions, out: Path, seed: int, as_json: bool) 
     if data.model is not None:
         raise RobotError('--model has no place in the three steps, which find the inertias')
     shipped = two_link_set('after')
-    sensors, drives, loop = data.machine(robot)
+    radius, drives, loop = data.machine()
     staged = options.stage(out, SCHEMA, data.robot)
     with progress('reading') as tick:
         if data.demo:
-            data = _simulate(robot, sensors, staged, data, seed, tick)
+            data = _simulate(robot, radius, staged, data, seed, tick)
         elif not data.bags:
             raise RecordingError('no bag is named; give one, or --demo to simulate one')
         how = options.read_settings(), options.tell_damage
         runs, responses = (
-            [run for path in paths for run in read_runs(path, robot, sensors, *how)]
+            [run for path in paths for run in read_runs(path, robot, radius, *how)]
             for paths in (data.bags, data.steps)
         )
         result = identify_two_inertia(
@@ -170,7 +171,7 @@ def _two_numbers(data: ElasticOptions, what: str, default: Any) -> FloatArray:
 
 def _simulate(
     robot: Robot,
-    sensors: Accelerometers,
+    radius: FloatArray,
     staged: Staged,
     data: ElasticOptions,
     seed: int,
@@ -182,6 +183,7 @@ def _simulate(
     resonances, steps = (staged.folder / name for name in DEMO_BAGS)
     rng, shipped = np.random.default_rng(seed), two_link_set('after')
     plant = two_link_plant(shipped.parameters)
+    sensors = LinkAccelerometers(robot, np.outer(radius, [1.0, 0.0, 0.0]))
     plans = (
         (
             resonances,
@@ -194,7 +196,7 @@ def _simulate(
     for path, loop, plan, noise in plans:
         tick(0.0, f'simulating {path.name}')
         runs = [noise.measure(run, rng) for run in run_all(plant, loop, plan, tick)]
-        write_runs(path, runs, robot, sensors.on_links(robot))
+        write_runs(path, runs, robot, sensors)
     return replace(data, bags=(resonances,), steps=(steps,))
 
 

@@ -31,9 +31,13 @@ from armid_ros.papers.exo.plant.leg_pair import (
 from armid_ros.papers.exo.plant.shares import ground_by_shares
 from armid_ros.papers.exo.plant.walkers import walking_pair
 from armid_ros.papers.exo.report.page import exo_report
-from armid_ros.papers.exo.report.sections import ShownMotion
 from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
-from armid_ros.recording import read_recording, Recording, write_joint_states
+from armid_ros.recording import (
+    read_recording,
+    recorded_together,
+    Recording,
+    write_joint_states,
+)
 from armid_ros.recording.writer import require_new, whole_bag
 import click
 import numpy as np
@@ -123,7 +127,7 @@ def identify_pair(
     document = _document(found, walked, both[0].source)
     page = exo_report(
         pair.with_stiffness(found[0].stiffness[0].clip(0.0)),
-        _shown(pair, gait) if bag is None else _recorded(*both),
+        *(_shown(pair, gait) if bag is None else _recorded(pair, *both)),
         found,
         walked,
         provenance(
@@ -200,29 +204,29 @@ def _identify(
     return found
 
 
-def _shown(pair: TiedPair, gait: Gait) -> ShownMotion:
+def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
     """Return single support of walking, over the gait cycle of the swing leg."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value
     t = np.linspace(0.0, (end - begin) * cycle, 2 * round(500 * (end - begin) * cycle) + 1)
     phase = begin + 0.5 + t / cycle
-    return ShownMotion(walking(pair, gait, t), phase, 'gait cycle of the swing leg')
+    return walking(pair, gait, t), phase, 'gait cycle of the swing leg'
 
 
-def _recorded(machine: Recording, wearer: Recording) -> ShownMotion:
+def _recorded(
+    pair: TiedPair, machine: Recording, wearer: Recording
+) -> tuple[PairMotion, FloatArray, str]:
     """Return the recorded motion as it is, of which positions alone are shown."""
-    shift = 1e-9 * (machine.start_ns - wearer.start_ns)
-    t = machine.t[(machine.t + shift >= wearer.t[0]) & (machine.t + shift <= wearer.t[-1])]
-    motions = [
-        _smooth(recording, times) for recording, times in ((machine, t), (wearer, t + shift))
-    ]
-    return ShownMotion(PairMotion(motions[0], motions[1]), t, 'time [s]')
-
-
-def _smooth(recording: Recording, t: FloatArray) -> Motion:
-    q = np.column_stack([np.interp(t, recording.t, column) for column in recording.q.T])
-    return Motion(recording.joints, t, q, np.zeros_like(q), np.zeros_like(q))
+    both = recorded_together(machine, wearer, pair.other)
+    assert both.partner is not None
+    motions = PairMotion(
+        *(
+            Motion(joints, both.t, q, np.zeros_like(q), np.zeros_like(q))
+            for joints, q in ((machine.joints, both.q), (wearer.joints, both.partner.q))
+        )
+    )
+    return motions, both.t, 'time [s]'
 
 
 def _document(

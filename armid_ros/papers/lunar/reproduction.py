@@ -200,10 +200,7 @@ def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
     n = robot.n_joints
 
     def torque(q: FloatArray) -> FloatArray:
-        rest = np.zeros_like(q)
-        return inverse_dynamics(
-            robot, Motion(robot.joints, np.arange(1.0 * len(q)), q, rest, rest)
-        )
+        return inverse_dynamics(robot, Motion.of_states(robot.joints, q, 0.0, 0.0))
 
     poses = rng.uniform(-np.pi, np.pi, (_POSES, n))
     sizes = np.abs(torque(poses))
@@ -211,7 +208,7 @@ def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
     for joint in range(n):
         for pose in poses[np.argsort(sizes[:, joint])[-_STARTS:]]:
             found = scipy.optimize.minimize(
-                lambda q, joint=joint: -abs(float(torque(q[np.newaxis])[0, joint])), pose
+                lambda q, joint=joint: -abs(float(torque(q)[0, joint])), pose
             )
             best[joint] = max(best[joint], -found.fun)
     return best

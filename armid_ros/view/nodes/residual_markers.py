@@ -9,14 +9,14 @@ import textwrap
 from typing import Any
 
 from armid_msgs.msg import Diagnosis
+from armid_ros.model.kinematics import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.joint_states import JointSample
-from armid_ros.nodes.parameters.table import NodeParameter
+from armid_ros.nodes.parameters.table import names, NodeParameter
 from armid_ros.nodes.qos import DEPTH, LATCHED, STREAM
 from armid_ros.nodes.running.process import run
 from armid_ros.robots import load_robot, Robot, robot_from_urdf
-from armid_ros.view.scene import joint_axes, joint_frames
 from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import Point
 import numpy as np
@@ -68,7 +68,7 @@ class ResidualMarkersNode(ListeningNode):
         self._told = ''
         self._markers = self.create_publisher(MarkerArray, '~/markers', STREAM)
         if self.value('robot'):
-            self._draw_on(load_robot(self.value('robot'), joints=self._joints()))
+            self._draw_on(load_robot(self.value('robot'), joints=names(self, 'joints') or None))
         self.listen()
         self.create_subscription(
             JointState, 'online_identifier/residual', self._on_residual, DEPTH
@@ -92,7 +92,11 @@ class ResidualMarkersNode(ListeningNode):
         if self.robot is None or not np.isfinite(self._q).all():
             return
         stamp = self.get_clock().now().to_msg()
-        markers = [*self._of_joints(self.robot), *self._of_diagnosis(self.robot)]
+        markers = [*self._of_joints(self.robot)]
+        if self._told:
+            lines = '\n'.join(textwrap.wrap(self._told, _LINE))
+            above = np.array([0.0, 0.0, 1.3 * self._reach])
+            markers.append(self._text('diagnosis', lines, above, 1.4))
         for number, marker in enumerate(markers):
             marker.header.frame_id, marker.header.stamp = self._frame, stamp
             marker.id = number
@@ -100,32 +104,27 @@ class ResidualMarkersNode(ListeningNode):
         self._markers.publish(MarkerArray(markers=markers))
 
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:
-        rotations, places = joint_frames(robot, self._q[np.newaxis])
-        ends = places[0] + np.einsum('jab,jb->ja', rotations[0], joint_axes(robot)) * (
-            _ARROW * self._reach * np.clip(self._now / self._scale(), -1.0, 1.0)[:, np.newaxis]
-        )
+        frames = LinkFrames.of(robot, self._q[np.newaxis]).frames
+        full = max(2.0 * float(np.sqrt(self._residual.max())), 1e-9)  # of the longest arrow
+        lengths = _ARROW * self._reach * np.clip(self._now / full, -1.0, 1.0)
         markers = []
         for j, (joint, share) in enumerate(zip(robot.joints, self._shares(), strict=True)):
+            place, geometry = frames[j].origin[:, 0], robot.geometry[j]
+            axis = frames[j].turned(geometry.slide + geometry.turn)[:, 0]
             red = float(np.clip(share / self.value('full'), 0.0, 1.0))
             colour = ColorRGBA(r=red, g=1.0 - red, b=0.1, a=0.9)
             arrow = _marker('residual', Marker.ARROW, colour)
-            arrow.points = [_point(places[0, j]), _point(ends[j])]
+            arrow.points = [_point(place), _point(place + lengths[j] * axis)]
             arrow.scale.x, arrow.scale.y = self._reach * _SHAFT, 2.0 * self._reach * _SHAFT
             ball = _marker('share', Marker.SPHERE, colour)
-            ball.pose.position = _point(places[0, j])
+            ball.pose.position = _point(place)
             size = self._reach * _SHAFT * (3.0 + 3.0 * red)
             ball.scale.x = ball.scale.y = ball.scale.z = size
             unit = robot.torque_units[j]
             rms = float(np.sqrt(self._residual[j]))
             words = f'{joint} {rms:.3g} {unit}, {100.0 * share:.0f} %'
-            markers += [arrow, ball, self._text('joint', words, places[0, j], 1.0)]
+            markers += [arrow, ball, self._text('joint', words, place, 1.0)]
         return markers
-
-    def _of_diagnosis(self, robot: Robot) -> Sequence[Marker]:
-        if not self._told:
-            return ()
-        lines = '\n'.join(textwrap.wrap(self._told, _LINE))
-        return (self._text('diagnosis', lines, np.array([0.0, 0.0, 1.3 * self._reach]), 1.4),)
 
     def _text(self, space: str, words: str, place: FloatArray, size: float) -> Marker:
         text = _marker(space, Marker.TEXT_VIEW_FACING, ColorRGBA(r=0.5, g=0.5, b=0.5, a=1.0))
@@ -138,16 +137,9 @@ class ResidualMarkersNode(ListeningNode):
         """Return the residual against the torque of each joint, both as root mean square."""
         return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
 
-    def _scale(self) -> float:
-        """Return the residual that the longest arrow stands for [N m or N]."""
-        return max(2.0 * float(np.sqrt(self._residual.max())), 1e-9)
-
-    def _joints(self) -> tuple[str, ...] | None:
-        return tuple(filter(None, self.value('joints'))) or None
-
     def take_description(self, urdf: str) -> None:
         """Draw on the robot of robot_description."""
-        self._draw_on(robot_from_urdf(urdf, joints=self._joints()))
+        self._draw_on(robot_from_urdf(urdf, joints=names(self, 'joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
         n = robot.n_joints
@@ -156,8 +148,9 @@ class ResidualMarkersNode(ListeningNode):
         self._q, self._now = np.full(n, np.nan), np.zeros(n)
         self._residual, self._torque = np.zeros(n), np.zeros(n)
         self._seen = {'residual': 0.0, 'torque': 0.0}
-        _, places = joint_frames(robot, np.zeros((1, n)))
-        steps = np.diff(np.vstack([np.zeros(3), places[0]]), axis=0)
+        frames = LinkFrames.of(robot, np.zeros((1, n))).frames
+        places = [frames[j].origin[:, 0] for j in range(n)]
+        steps = np.diff(np.vstack([np.zeros(3), *places]), axis=0)
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
 
     def take_sample(self, sample: JointSample) -> None:

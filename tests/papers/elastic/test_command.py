@@ -10,7 +10,7 @@ from armid_ros.cli.record import simulate
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.excitation import Excitation, FourierTrajectory, save_excitation
 from armid_ros.papers.elastic.command import elastic
-from armid_ros.papers.elastic.identification.files import Accelerometers, read_runs
+from armid_ros.papers.elastic.identification.files import read_runs
 from armid_ros.robots import load_robot
 from armid_ros.robots.two_link import two_link_set
 from click.testing import CliRunner
@@ -68,7 +68,7 @@ def test_a_simulated_arm_on_springs_is_recorded_on_both_sides(tmp_path) -> None:
     result = CliRunner().invoke(simulate, [*arguments, str(tmp_path / 'bag')])
     assert result.exit_code == 0 and 'both sides' in result.stdout
     robot, radius = load_robot('two_link_elastic'), [0.4, 0.4]
-    (run,) = read_runs(tmp_path / 'bag', robot, Accelerometers.on(robot, radius))
+    (run,) = read_runs(tmp_path / 'bag', robot, radius)
     parameters = two_link_set('after').parameters
     spring = parameters.stiffness * (run.motor.q - run.link.q)
     spring += parameters.spring_damping * (run.motor.dq - run.link.dq)
@@ -112,7 +112,7 @@ def test_what_shows_springs_is_followed_by_the_elastic_arm(tmp_path, kind, exper
     plan, run = tmp_path / 'plan', tmp_path / 'run'
     armid('excite', '--robot', robot.name, '--kind', kind, '--duration', 7, *rng, '--out', plan)
     armid('simulate', '--robot', robot.name, '--trajectory', plan / 'trajectory', '--out', run)
-    runs = read_runs(run, robot, Accelerometers.on(robot, [0.4, 0.4]))
+    runs = read_runs(run, robot, [0.4, 0.4])
     assert len(runs) == experiments
     if kind == 'multisine':
         assert np.all(runs[0].motor.tau.std(axis=0) > 0.05 * robot.torque_limit)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from armid_ros.model.kinematics import points_motion
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, driving_torque, weight
 from armid_ros.papers.exo.plant.shares import feet_by_shares, ground_by_shares
-from armid_ros.papers.exo.plant.walkers import contacts, floating, leg_length
+from armid_ros.papers.exo.plant.walkers import contacts, floating
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -38,7 +38,7 @@ def test_the_moment_on_a_trunk_is_what_the_ground_and_the_springs_do_not_give(
     geometry = cycle.pair.geometry(*cycle.motions)
     tied = geometry.other_position if other else geometry.other_position + geometry.way
     pull = -cycle.torques.forces if other else cycle.torques.forces
-    feet = points_motion(robot, *contacts(robot, leg_length(robot)), motion.q)[0]
+    feet = points_motion(robot, *contacts(robot), motion.q)[0]
     ground = cycle.other_ground if other else cycle.ground
     data, moment = robot.model.createData(), cycle.trunk_moment(other=other)
     assert np.abs(moment).max() > 0.1 * weight(robot)

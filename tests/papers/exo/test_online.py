@@ -8,18 +8,18 @@ from armid_ros.errors import IdentificationError
 from armid_ros.papers.exo.identification.online import InteractionSettings, OnlineInteraction
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
 import numpy as np
 import pytest
 
-SENSORS = PairSensors(angle_noise=np.radians(0.05), torque_noise=0.5)
+NOISE = {'angle_noise': np.radians(0.05), 'torque_noise': 0.5}
 SETTINGS = InteractionSettings(memory=4.0, period=2.0)
 
 
 def identified(slack: float = 0.0, seconds: float = 4.2) -> OnlineInteraction:
     pair = leg_pair(1e4).with_slack(slack)
     rng = np.random.default_rng(0)
-    walking = SimulatedPair(pair, read_gait(), sensors=SENSORS, rate=500.0, rng=rng)
+    walking = SimulatedPair(pair, read_gait(), rate=500.0, rng=rng, **NOISE)
     online = OnlineInteraction(pair.machines, SETTINGS)
     for _ in range(round(500.0 * seconds)):
         sample = walking.advance()

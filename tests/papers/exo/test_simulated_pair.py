@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair, pair_torques, stepping
-from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
 import numpy as np
 import pytest
 
@@ -50,8 +50,8 @@ def test_all_joints_in_open_loop_fall_where_torques_are_sampled_coarsely():
 
 
 def test_noise_has_the_size_asked_for_and_comes_from_the_seed():
-    sensors = PairSensors(angle_noise=1e-3, torque_noise=0.5)
-    noisy, again, clean = simulated(sensors=sensors), simulated(sensors=sensors), simulated()
+    noise = {'angle_noise': 1e-3, 'torque_noise': 0.5}
+    noisy, again, clean = simulated(**noise), simulated(**noise), simulated()
     triples = [(noisy.advance(), again.advance(), clean.advance()) for _ in range(200)]
     errors = np.array([a.q - c.q for a, _, c in triples])
     assert errors.std() == pytest.approx(1e-3, rel=0.1)

@@ -20,7 +20,8 @@ import pytest
 from benchmarks.leg_pair_in_mujoco import drive_in_mujoco
 
 RATE = 100.0
-DRIVEN = {'exo_swing_hip': (0.05, 0.61), 'exo_swing_knee': (0.1, 1.71)}
+#: How far joints are off with springs that are 20 % too soft [deg].
+DRIVEN = {'exo_swing_hip': 0.61, 'exo_swing_knee': 1.71}
 
 
 @pytest.fixture(scope='module')
@@ -38,20 +39,12 @@ def most(error: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize('joint', DRIVEN)
-def test_mujoco_walks_by_the_torques(pair, motions, joint) -> None:
-    column = [pair.robot.index(joint)]
-    torque = splined(motions.own.t, pair_torques(pair, *motions).tau[:, column], RATE)
-    path = drive_in_mujoco(pair, motions, [joint], torque)
-    assert most(path - motions.own.q[:, column]) < DRIVEN[joint][0] / 10.0
-
-
-@pytest.mark.parametrize('joint', DRIVEN)
 def test_springs_believed_too_soft_lead_both_engines_astray_alike(pair, motions, joint) -> None:
     soft = pair.with_stiffness(0.8 * pair.stiffness)
     column = [pair.robot.index(joint)]
     torque = splined(motions.own.t, pair_torques(soft, *motions).tau[:, column], RATE)
     followed = drive_by_torque(pair, *motions, [joint], torque).q[:, column]
-    assert most(followed - motions.own.q[::2, column]) == pytest.approx(DRIVEN[joint][1], abs=0.02)
+    assert most(followed - motions.own.q[::2, column]) == pytest.approx(DRIVEN[joint], abs=0.02)
     path = drive_in_mujoco(pair, motions, [joint], torque)[::2]
     assert most(path - followed) < 0.01
 

@@ -14,7 +14,6 @@ ends it, and so does a pause in the stamps.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
 
@@ -24,7 +23,6 @@ from armid_ros.recording import read_recording, Recording, topics
 from armid_ros.recording.elastic import imu_topic, LINK, MOTOR, read_accelerations, REFERENCE
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.robots import Robot
-from armid_ros.simulation.accelerometers import LinkAccelerometers
 import numpy as np
 import numpy.typing as npt
 
@@ -36,63 +34,28 @@ _SHARED = 0.9
 _STANDING, _SHORTEST = 0.1, 0.2
 
 
-@dataclass(frozen=True, eq=False)
-class Accelerometers:
-    """
-    Where the accelerometers of a planar two-link arm are.
-
-    Attributes
-    ----------
-    radius : ndarray, shape (2,)
-        Distance from the axis of each link's own joint [m].
-    length : float
-        From the first axis to the second [m].
-
-    """
-
-    radius: FloatArray
-    length: float
-
-    @classmethod
-    def on(cls, robot: Robot, radius: npt.ArrayLike) -> Accelerometers:
-        """Place accelerometers on a robot, at distances from the joints, shape (2,) [m]."""
-        offset = np.asarray(robot.model.jointPlacements[2].translation)
-        return cls(np.asarray(radius, dtype=float), float(np.hypot(offset[0], offset[1])))
-
-    def on_links(self, robot: Robot) -> LinkAccelerometers:
-        """Return them as sensors of a simulated robot."""
-        return LinkAccelerometers(robot, np.outer(self.radius, [1.0, 0.0, 0.0]))
-
-    def accelerations(
-        self, q: FloatArray, dq: FloatArray, first: FloatArray, second: FloatArray
-    ) -> FloatArray:
-        """
-        Return the angular accelerations of the joints, shape (N, 2) [rad/s^2].
-
-        Parameters
-        ----------
-        q, dq : ndarray, shape (N, 2)
-            Motion of the links.
-        first, second : ndarray, shape (N, 3)
-            Readings; those sideways count.
-
-        """
-        a1 = first[:, 1] / self.radius[0]
-        carried = self.length * (a1 * np.cos(q[:, 1]) + dq[:, 0] ** 2 * np.sin(q[:, 1]))
-        return np.column_stack([a1, (second[:, 1] - carried) / self.radius[1] - a1])
-
-
 def read_runs(
     path: str | Path,
     robot: Robot,
-    sensors: Accelerometers,
+    radius: npt.ArrayLike,
     settings: ReadSettings = DEFAULT,
     read: Callable[..., None] | None = None,
 ) -> list[ElasticRun]:
     """
     Read the experiments of a bag.
 
-    `read` is given the recordings of joint states, which know how they were read.
+    Parameters
+    ----------
+    path : str or Path
+        The bag.
+    robot : Robot
+        A planar pair of links.
+    radius : array_like, shape (2,)
+        Distance of each link's accelerometer from the axis of its joint [m].
+    settings : ReadSettings
+        Checksums and memory.
+    read : callable, optional
+        Is given the recordings of joint states, which know how they were read.
 
     Raises
     ------
@@ -121,13 +84,13 @@ def read_runs(
         recording.select(np.flatnonzero(np.isin(own, common)))
         for recording, own in zip(recordings, stamps, strict=False)
     )
-    first, second = (
-        values[np.searchsorted(own, common, sorter=np.argsort(own))]
+    sideways = [
+        values[np.searchsorted(own, common, sorter=np.argsort(own)), 1]
         for (_, values), own in zip(felt, stamps[3:], strict=True)
-    )
+    ]
     assert motor.dq is not None and motor.tau is not None
     assert link.dq is not None and asked.dq is not None
-    ddq = sensors.accelerations(link.q, link.dq, first, second)
+    ddq = _accelerations(robot, np.asarray(radius, dtype=float), link.q, link.dq, sideways)
     period = float(np.median(np.diff(motor.t)))
     left = asked.q - motor.q
     runs = []
@@ -149,6 +112,17 @@ def read_runs(
             'velocity loops are asked for'
         )
     return runs
+
+
+def _accelerations(
+    robot: Robot, radius: FloatArray, q: FloatArray, dq: FloatArray, sideways: Sequence[FloatArray]
+) -> FloatArray:
+    """Return angular accelerations of the joints from what links feel sideways, shape (N, 2)."""
+    offset = np.asarray(robot.model.jointPlacements[2].translation)
+    length = np.hypot(offset[0], offset[1])
+    first = sideways[0] / radius[0]
+    carried = length * (first * np.cos(q[:, 1]) + dq[:, 0] ** 2 * np.sin(q[:, 1]))
+    return np.column_stack([first, (sideways[1] - carried) / radius[1] - first])
 
 
 def read_sides(

@@ -12,7 +12,6 @@ two independent one-link systems with two inertias each.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from armid_ros.motion import ElasticRun, FloatArray, Motion
 from armid_ros.papers.elastic.identification.subspace import (
@@ -24,6 +23,7 @@ from armid_ros.papers.elastic.identification.subspace import (
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import csd
 
 #: States of a motor and a link on a spring, seen by their velocities.
 ORDER = 3
@@ -79,25 +79,6 @@ def direction(velocity: FloatArray) -> FloatArray:
     return np.vstack([mean, np.sign(velocity[-1:])])
 
 
-@dataclass(frozen=True, eq=False)
-class DecoupledJoint:
-    """
-    One joint as a system of its own.
-
-    Attributes
-    ----------
-    joint : str
-        Its name.
-    system : StateSpace
-        From the motor's torque less Coulomb friction, and from the interaction torque, to the
-        velocities of motor and link, all at the joint.
-
-    """
-
-    joint: str
-    system: StateSpace
-
-
 def joint_signals(
     runs: Sequence[ElasticRun], parameters: TwoLinkParameters, joint: int, *, decoupled: bool
 ) -> list[Signals]:
@@ -131,9 +112,15 @@ def joint_signals(
 
 def decouple(
     runs: Sequence[ElasticRun], parameters: TwoLinkParameters
-) -> tuple[DecoupledJoint, DecoupledJoint]:
+) -> tuple[StateSpace, StateSpace]:
     """
     Identify both joints by subspaces, each with its interaction torque as an input.
+
+    Returns
+    -------
+    tuple of StateSpace
+        Of each joint, from the motor's torque less Coulomb friction, and from the interaction
+        torque, to the velocities of motor and link, all at the joint.
 
     Raises
     ------
@@ -143,16 +130,59 @@ def decouple(
     """
     t = runs[0].motor.t
     dt = float(t[-1] - t[0]) / (len(t) - 1)
-    first, second = (
-        DecoupledJoint(
-            name,
-            identify_subspace(
-                joint_signals(runs, parameters, joint, decoupled=True), dt, ORDER, _HOLD
-            ),
-        )
-        for joint, name in enumerate(runs[0].motor.joints)
+    first, second = (joint_signals(runs, parameters, joint, decoupled=True) for joint in range(2))
+    return (
+        identify_subspace(first, dt, ORDER, _HOLD),
+        identify_subspace(second, dt, ORDER, _HOLD),
     )
-    return first, second
+
+
+def measured_response(
+    experiments: Sequence[Signals], dt: float, *, window: float = 1.0
+) -> tuple[FloatArray, npt.NDArray[np.complex128]]:
+    """
+    Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
+
+    Of no model and no order. The first input is held between samples; its response is that to the
+    continuous, held signal.
+
+    Parameters
+    ----------
+    experiments : sequence of Signals
+        With m inputs and p outputs.
+    dt : float
+        Time between samples [s].
+    window : float
+        Length of the averaged stretches [s], half overlapping, under a Hann window; no longer than
+        the experiments.
+
+    Returns
+    -------
+    frequency : ndarray, shape (K,)
+        [Hz], zero left out.
+    response : ndarray of complex, shape (K, p, m)
+
+    """
+    size = round(window / dt)
+    cross: list[npt.NDArray[np.complex128]] = []
+    power: list[npt.NDArray[np.complex128]] = []
+    for e in experiments:
+        stretches = 1 + (len(e.u) - size) // (size // 2)
+        for found, of in ((cross, e.y), (power, e.u)):
+            _, mean = csd(
+                e.u[:, np.newaxis],
+                of[:, :, np.newaxis],
+                nperseg=size,
+                noverlap=size - size // 2,
+                axis=0,
+            )
+            found.append(stretches * mean[1:])
+    frequency = np.fft.rfftfreq(size, dt)[1:]
+    inverse = np.linalg.pinv(np.sum(power, axis=0), rcond=1e-12, hermitian=True)
+    response = np.asarray(np.sum(cross, axis=0) @ inverse)
+    s = 2j * np.pi * frequency * dt
+    response[:, :, 0] /= ((1.0 - np.exp(-s)) / s)[:, np.newaxis]
+    return np.asarray(frequency, dtype=np.float64), response
 
 
 def coupled_response(

@@ -11,7 +11,7 @@ from armid_ros.arm import parameter_table
 from armid_ros.papers.elastic.identification.interaction import decibel_error
 from armid_ros.papers.elastic.identification.joints import SpringEstimate
 from armid_ros.papers.elastic.identification.names import parameter_names, unpack
-from armid_ros.papers.elastic.identification.physical import BAND, ideal_response
+from armid_ros.papers.elastic.identification.physical import BAND, frequencies, ideal_response
 from armid_ros.papers.elastic.identification.response import velocities
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
@@ -27,9 +27,10 @@ MAIN = ('alpha', 'beta', 'gamma', 'mm', 'kg')
 def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, Any]:
     """Return an identification of elastic joints as the document that elastic.json holds."""
     parameters, rigid = result.parameters, result.rigid.estimate
-    names = parameter_names(tuple(joint.joint for joint in result.joints))
+    names = parameter_names(result.joints)
     std = [None] * len(names) if result.tuning is None else list(result.tuning.estimate.std)
     frequency = np.geomspace(5.0, BAND[1], 200)
+    antiresonance, resonance = frequencies(result.untuned)
     document: dict[str, Any] = {
         'schema': SCHEMA,
         'robot': robot,
@@ -39,17 +40,17 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
         },
         'joints': [
             {
-                'joint': joint.joint,
-                'antiresonance_hz': fit.antiresonance,
-                'resonance_hz': fit.resonance,
-                'interaction_gain': fit.interaction_gain,
+                'joint': joint,
+                'antiresonance_hz': float(antiresonance[k]),
+                'resonance_hz': float(resonance[k]),
+                'interaction_gain': float(result.interaction_gain[k]),
                 'subspaces_against_physical_db': decibel_error(
-                    joint.system.response(frequency)[:, 0, 0],
+                    result.systems[k].response(frequency)[:, 0, 0],
                     ideal_response(parameters, k, frequency)[:, 0, 0],
                 ),
                 'coulomb_torque': float(parameters.joint_coulomb[k]),
             }
-            for k, (joint, fit) in enumerate(zip(result.joints, result.fits, strict=True))
+            for k, joint in enumerate(result.joints)
         ],
         'untuned': parameter_table(names, unpack(result.untuned), [None] * len(names)),
         'parameters': parameter_table(names, unpack(parameters), std),
@@ -68,12 +69,12 @@ def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
     rows = []
     for k, joint in enumerate(result.joints):
         weights = np.zeros(len(estimate.values))
-        weights[estimate.index('dl', joint.joint)] = 1.0
-        weights[estimate.index('dm', joint.joint)] = gear[k] ** 2
+        weights[estimate.index('dl', joint)] = 1.0
+        weights[estimate.index('dm', joint)] = gear[k] ** 2
         rows.append(
             {
                 'name': 'dl + dm gear^2',
-                'joint': joint.joint,
+                'joint': joint,
                 'value': float(weights @ estimate.values),
                 'std': float(np.sqrt(weights @ estimate.covariance @ weights)),
                 'unit': 'N m s/rad',

@@ -12,11 +12,12 @@ gain: a common error of its scale is no error of the joint.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
 from armid_ros.errors import IdentificationError
 from armid_ros.motion import FloatArray
-from armid_ros.papers.elastic.identification.interaction import DecoupledJoint
+from armid_ros.papers.elastic.identification.subspace import StateSpace
 from armid_ros.robots.two_link import TwoLinkParameters
 import numpy as np
 import numpy.typing as npt
@@ -26,37 +27,6 @@ ComplexArray = npt.NDArray[np.complex128]
 #: Where the responses are compared [Hz], and by how many frequencies, equally apart in logarithm.
 BAND = (1.0, 60.0)
 _POINTS = 120
-
-
-@dataclass(frozen=True, eq=False)
-class DecoupledFit:
-    """
-    Physical parameters of a decoupled joint, all at the joint.
-
-    Attributes
-    ----------
-    rotor, inertia : float
-        Motor and link [kg m^2].
-    stiffness : float
-        [N m/rad].
-    spring_damping, motor_damping, link_damping : float
-        [N m s/rad].
-    interaction_gain : float
-        Of the interaction torque; 1 when beta and gamma were right.
-    antiresonance, resonance : float
-        Of the motor's velocity, undamped [Hz].
-
-    """
-
-    rotor: float
-    inertia: float
-    stiffness: float
-    spring_damping: float
-    motor_damping: float
-    link_damping: float
-    interaction_gain: float
-    antiresonance: float
-    resonance: float
 
 
 def ideal_response(
@@ -90,59 +60,71 @@ def ideal_response(
         parameters.link_damping,
     )
     values = np.array([*(quantity[joint] for quantity in own), 1.0])
-    return response(np.asarray(2j * np.pi * np.asarray(frequency, dtype=float)), values)
+    return _response(np.asarray(2j * np.pi * np.asarray(frequency, dtype=float)), values)
 
 
-def fit_joint(joint: DecoupledJoint) -> DecoupledFit:
+def fit_joints(
+    systems: Sequence[StateSpace], joints: Sequence[str], known: TwoLinkParameters
+) -> tuple[TwoLinkParameters, FloatArray]:
     """
-    Fit a motor and a link on a spring to an identified response.
+    Fit a motor and a link on a spring to the identified responses of both joints.
+
+    Parameters
+    ----------
+    systems : sequence of StateSpace
+        Both joints, as of ``decouple``.
+    joints : sequence of str
+        Their names.
+    known : TwoLinkParameters
+        Gears, gamma and Coulomb friction, which are kept.
+
+    Returns
+    -------
+    fitted : TwoLinkParameters
+        The arm.
+    gain : ndarray, shape (2,)
+        Of the interaction torques; 1 where beta and gamma were right.
 
     Raises
     ------
     IdentificationError
-        If the response has no antiresonance and resonance in the band.
+        If a response has no antiresonance and resonance in the band.
 
     """
     frequency = np.geomspace(*BAND, _POINTS)
-    found = joint.system.response(frequency)
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-    start = np.log(_first_guess(joint, frequency, found))
+    values = []
+    for joint, system in zip(joints, systems, strict=True):
+        found = system.response(frequency)
 
-    def residual(logarithms: FloatArray) -> FloatArray:
-        ratio = (response(s, np.exp(logarithms)) / found - 1.0).ravel()
-        return np.concatenate([ratio.real, ratio.imag])
+        def residual(logarithms: FloatArray, found: ComplexArray = found) -> FloatArray:
+            ratio = (_response(s, np.exp(logarithms)) / found - 1.0).ravel()
+            return np.concatenate([ratio.real, ratio.imag])
 
-    fit = least_squares(residual, start, x_scale='jac')
-    rotor, inertia, stiffness, between, motor, link, gain = np.exp(fit.x).tolist()
-    return DecoupledFit(
-        rotor,
-        inertia,
-        stiffness,
-        between,
-        motor,
-        link,
-        gain,
-        float(np.sqrt(stiffness / inertia) / (2.0 * np.pi)),
-        float(np.sqrt(stiffness * (1.0 / inertia + 1.0 / rotor)) / (2.0 * np.pi)),
+        start = np.log(_first_guess(joint, frequency, found))
+        values.append(np.exp(least_squares(residual, start, x_scale='jac').x))
+    rotor, inertia, stiffness, between, motor, link, gain = np.array(values).T
+    fitted = replace(
+        known,
+        alpha=float(inertia[0]),
+        beta=float(inertia[1]),
+        motor_inertia=rotor / known.gear**2,
+        stiffness=stiffness,
+        link_damping=link,
+        motor_damping=motor / known.gear**2,
+        spring_damping=between,
     )
+    return fitted, gain
 
 
-def response(s: ComplexArray, values: FloatArray) -> ComplexArray:
-    """
-    Return the response of motor and link on a spring.
+def frequencies(parameters: TwoLinkParameters) -> tuple[FloatArray, FloatArray]:
+    """Return antiresonance and resonance of each motor's velocity, undamped, shape (2,) [Hz]."""
+    by_link, by_motor = (parameters.stiffness / x for x in (parameters.inertia, parameters.rotor))
+    return np.sqrt(by_link) / (2.0 * np.pi), np.sqrt(by_link + by_motor) / (2.0 * np.pi)
 
-    Parameters
-    ----------
-    s : ndarray of complex, shape (K,)
-        i times angular frequency [rad/s].
-    values : ndarray, shape (7,)
-        Rotor, link, stiffness, damping of spring, motor and link, gain of the interaction torque.
 
-    Returns
-    -------
-    ndarray of complex, shape (K, 2, 2)
-
-    """
+def _response(s: ComplexArray, values: FloatArray) -> ComplexArray:
+    """Return the response of motor and link on a spring at s = i w, shape (K, 2, 2)."""
     rotor, inertia, stiffness, between, motor, link, gain = values
     spring = stiffness / s + between
     a, b = rotor * s + motor + spring, inertia * s + link + spring
@@ -151,14 +133,14 @@ def response(s: ComplexArray, values: FloatArray) -> ComplexArray:
     return np.asarray(inverse * np.array([1.0, -gain]))
 
 
-def _first_guess(joint: DecoupledJoint, frequency: FloatArray, found: ComplexArray) -> FloatArray:
+def _first_guess(joint: str, frequency: FloatArray, found: ComplexArray) -> FloatArray:
     size = np.abs(found[:, 0, 0])
     lowest = int(np.argmin(size[frequency > 4.0 * frequency[0]]))
     lowest += int(np.count_nonzero(frequency <= 4.0 * frequency[0]))
     highest = lowest + int(np.argmax(size[lowest:]))
     if highest in (lowest, len(size) - 1):
         raise IdentificationError(
-            f"joint '{joint.joint}': no antiresonance with a resonance above it between "
+            f"joint '{joint}': no antiresonance with a resonance above it between "
             f'{frequency[0]:g} and {frequency[-1]:g} Hz; excite it there, or widen the band'
         )
     anti, resonance = 2.0 * np.pi * frequency[[lowest, highest]]

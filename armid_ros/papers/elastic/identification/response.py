@@ -238,21 +238,9 @@ class _Arm:
 def _friction(
     response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
 ) -> tuple[DualArray, npt.NDArray[np.int_]]:
-    """
-    Find friction torques: bounds for what slips, whatever stops the rest.
-
-    Parameters
-    ----------
-    response : ndarray, shape (B, 2, 2)
-        Change of velocity at the end of the step per torque.
-    free : ndarray, shape (B, 2)
-        Velocity at the end without friction.
-    level : ndarray, shape (B, 2)
-        Coulomb torque.
-    modes : ndarray of int, shape (B, 2)
-        First guess: 1 slips forwards, -1 backwards, 0 sticks.
-
-    """
+    """Find friction torques, (B, 2): bounds for what slips, whatever stops the rest."""
+    # response: change of velocity at the end of the step per torque; free: what that velocity is
+    # without friction; modes, a first guess: 1 slips forwards, -1 backwards, 0 sticks
     modes = modes.copy()
     for _ in range(_ROUNDS):
         stuck = modes == 0

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from armid_ros.errors import IdentificationError
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.identification.fitting.covariance import sandwich, score_products
-from armid_ros.identification.fitting.least_squares import Solution, solve
+from armid_ros.identification.fitting.least_squares import solve
 from armid_ros.identification.fitting.normal_equations import NormalEquations
 from armid_ros.identification.rows.regression import by_stretch, Regression, weighted_rows
 from armid_ros.motion import ElasticRun, FloatArray
@@ -57,11 +57,6 @@ class RigidFit:
     def coulomb(self) -> FloatArray:
         """Coulomb torque at the joints, shape (2,) [N m]."""
         return self.estimate.values[6:8]
-
-    @property
-    def total_damping(self) -> FloatArray:
-        """Viscous friction of motor and link, shape (2,) [N m s/rad]."""
-        return self.estimate.values[4:6]
 
 
 def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
@@ -108,21 +103,16 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
         *(ParameterName('dl + dm gear^2', joint, 'N m s/rad') for joint in joints),
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
-    left = normal.squares(solution.values).sum() / normal.target_squares.sum()
-    estimate = Estimate(names, solution.values, _covariance(problem, solution))
-    return RigidFit(estimate, 100.0 * float(np.sqrt(left)))
-
-
-def _covariance(problem: Sequence[Regression], solution: Solution) -> FloatArray:
-    """Return the covariance where rows are closer than the filter lets errors change, (8, 8)."""
+    # rows are closer than the filter lets errors change
     rows, target = weighted_rows(problem, solution.weights)
-    joints = solution.weights.shape[1]
     scores = rows * (target - rows @ solution.values)[:, np.newaxis]
-    scores = scores.reshape(-1, joints, rows.shape[1]).sum(axis=1)
+    scores = scores.reshape(-1, len(joints), rows.shape[1]).sum(axis=1)
     middle = score_products(by_stretch(problem, scores), _LASTING * _KEPT)
     freedom = len(rows) / max(len(rows) - rows.shape[1], 1)
     bread = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
-    return np.asarray(freedom * sandwich(bread, middle))
+    left = normal.squares(solution.values).sum() / normal.target_squares.sum()
+    estimate = Estimate(names, solution.values, freedom * sandwich(bread, middle))
+    return RigidFit(estimate, 100.0 * float(np.sqrt(left)))
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:

@@ -11,12 +11,12 @@ from armid_ros.errors import IdentificationError
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.papers.elastic.identification.interaction import (
     decouple,
-    DecoupledJoint,
     joint_signals,
+    measured_response,
 )
-from armid_ros.papers.elastic.identification.physical import DecoupledFit, fit_joint
+from armid_ros.papers.elastic.identification.physical import fit_joints
 from armid_ros.papers.elastic.identification.rigid import fit_rigid, RigidFit
-from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.subspace import StateSpace
 from armid_ros.papers.elastic.identification.tuning import tune, Tuning
 from armid_ros.robots.two_link import TwoLinkParameters
 from armid_ros.simulation.motor_control import VelocityLoop
@@ -34,8 +34,6 @@ class MeasuredJoint:
 
     Attributes
     ----------
-    joint : str
-        Its name.
     frequency : ndarray, shape (K,)
         [Hz].
     decoupled, coupled : ndarray of complex, shape (K, 2)
@@ -43,7 +41,6 @@ class MeasuredJoint:
 
     """
 
-    joint: str
     frequency: FloatArray
     decoupled: npt.NDArray[np.complex128]
     coupled: npt.NDArray[np.complex128]
@@ -56,16 +53,18 @@ class TwoInertiaIdentification:
 
     Attributes
     ----------
+    joints : tuple of str
+        Names of the joints.
     rigid : RigidFit
         Step 1.
     measured : tuple of MeasuredJoint
         Responses of no model, for comparison.
-    joints : tuple of DecoupledJoint
+    systems : tuple of StateSpace
         Step 2, of both joints.
-    fits : tuple of DecoupledFit
-        Step 3a, of both joints.
     untuned : TwoLinkParameters
         Parameters after step 3a.
+    interaction_gain : ndarray, shape (2,)
+        Of the interaction torques there; 1 where beta and gamma were right.
     experiments : int
         Number of experiments through the resonances.
     angles : ndarray, shape (S,)
@@ -75,11 +74,12 @@ class TwoInertiaIdentification:
 
     """
 
+    joints: tuple[str, ...]
     rigid: RigidFit
     measured: tuple[MeasuredJoint, MeasuredJoint]
-    joints: tuple[DecoupledJoint, DecoupledJoint]
-    fits: tuple[DecoupledFit, DecoupledFit]
+    systems: tuple[StateSpace, StateSpace]
     untuned: TwoLinkParameters
+    interaction_gain: FloatArray
     experiments: int
     angles: FloatArray
     tuning: Tuning | None
@@ -145,12 +145,11 @@ def identify_two_inertia(
         drives, alpha=alpha, beta=beta, gamma=gamma, coulomb=rigid.coulomb / drives.gear
     )
     tell(0.05, 'step 2: decoupled joints')
-    joints = decouple(runs, known)
+    joints, systems = runs[0].motor.joints, decouple(runs, known)
     tell(0.35, 'measured responses')
     measured = _measured(runs, known)
     tell(0.45, 'step 3: physical parameters')
-    fits = fit_joint(joints[0]), fit_joint(joints[1])
-    untuned = _physical(fits, known)
+    untuned, gain = fit_joints(systems, joints, known)
     tuning = None
     if steps and loop is not None:
         tell(0.5, 'step 3: tuning to step responses')
@@ -159,25 +158,7 @@ def identify_two_inertia(
     tell(1.0, 'done')
     angles = np.quantile(np.concatenate([run.link.q[:, 1] for run in runs]), _SHARES)
     return TwoInertiaIdentification(
-        rigid, measured, joints, fits, untuned, len(runs), angles, tuning
-    )
-
-
-def _physical(
-    fits: tuple[DecoupledFit, DecoupledFit], known: TwoLinkParameters
-) -> TwoLinkParameters:
-    def both(name: str) -> FloatArray:
-        return np.array([getattr(fit, name) for fit in fits])
-
-    return replace(
-        known,
-        alpha=fits[0].inertia,
-        beta=fits[1].inertia,
-        motor_inertia=both('rotor') / known.gear**2,
-        stiffness=both('stiffness'),
-        link_damping=both('link_damping'),
-        motor_damping=both('motor_damping') / known.gear**2,
-        spring_damping=both('spring_damping'),
+        joints, rigid, measured, systems, untuned, gain, len(runs), angles, tuning
     )
 
 
@@ -188,11 +169,10 @@ def _measured(
     dt = float(t[-1] - t[0]) / (len(t) - 1)
     window = min(1.0, min(len(run.motor) for run in runs) * dt)
     found = []
-    for joint, name in enumerate(runs[0].motor.joints):
+    for joint in range(2):
         signals = joint_signals(runs, known, joint, decoupled=True)
         alone = joint_signals(runs, known, joint, decoupled=False)
         frequency, decoupled = measured_response(signals, dt, window=window)
         _, coupled = measured_response(alone, dt, window=window)
-        found.append(MeasuredJoint(name, frequency, decoupled[:, :, 0], coupled[:, :, 0]))
-    first, second = found
-    return first, second
+        found.append(MeasuredJoint(frequency, decoupled[:, :, 0], coupled[:, :, 0]))
+    return found[0], found[1]

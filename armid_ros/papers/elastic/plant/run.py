@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.motion import ElasticRun, FloatArray, Motion
-from armid_ros.robots import Robot
 from armid_ros.simulation.closed_loop import command, run
 from armid_ros.simulation.controller import Targets
 from armid_ros.simulation.motor_control import MotorControl, VelocityLoop
-from armid_ros.simulation.plant import limit_slack, Plant, State
+from armid_ros.simulation.plant import limit_slack, Plant
 import numpy as np
 import numpy.typing as npt
 
@@ -99,8 +98,15 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     state = plant.state(experiment.q)
     torque = command(plant, control, state, targets.at(0))
     trace = run(plant, control, state, torque, targets[1:])
-    _require_range(plant.robot, trace.state)
-    joints, t = plant.robot.joints, plant.times(0, len(targets))
+    robot, slack, end = plant.robot, limit_slack(plant.robot), trace.state
+    beyond = (end.q < robot.lower - slack) | (end.q > robot.upper + slack)
+    for joint in np.flatnonzero(beyond)[:1]:
+        raise TrajectoryError(
+            f"{robot.name}: joint '{robot.joints[joint]}' reaches {end.q[joint]:.4g} at "
+            f'{end.t:.3f} s, beyond its limits of {robot.lower[joint]:.4g} and '
+            f'{robot.upper[joint]:.4g}'
+        )
+    joints, t = robot.joints, plant.times(0, len(targets))
     q, dq, _ = trace.motors
     motor = Motion(joints, t, q, dq, still, trace.tau)
     return ElasticRun(motor, Motion(joints, t, *trace.links), experiment.velocity)
@@ -119,15 +125,3 @@ def run_all(
         if progress is not None:
             progress((number + 1) / len(experiments))
     return runs
-
-
-def _require_range(robot: Robot, state: State) -> None:
-    """Raise TrajectoryError if a link is beyond a limit."""
-    slack = limit_slack(robot)
-    beyond = (state.q < robot.lower - slack) | (state.q > robot.upper + slack)
-    for joint in np.flatnonzero(beyond)[:1]:
-        raise TrajectoryError(
-            f"{robot.name}: joint '{robot.joints[joint]}' reaches {state.q[joint]:.4g} at "
-            f'{state.t:.3f} s, beyond its limits of {robot.lower[joint]:.4g} and '
-            f'{robot.upper[joint]:.4g}'
-        )

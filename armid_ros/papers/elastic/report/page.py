@@ -63,14 +63,12 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
         value = f'{result.parameters.stiffness[k]:.0f}'
         if result.tuning is not None:
             estimate = result.tuning.estimate
-            value += f' ± {HALF_WIDTH * estimate.std[estimate.index("kg", joint.joint)]:.0f}'
-        springs.append(f'{value} N m/rad at {joint.joint}')
+            value += f' ± {HALF_WIDTH * estimate.std[estimate.index("kg", joint)]:.0f}'
+        springs.append(f'{value} N m/rad at {joint}')
     interval = ' (95 %)' if result.tuning is not None else ''
     sentences = [f'The springs have {" and ".join(springs)}{interval}.']
     poor = [
-        joint.joint
-        for k, joint in enumerate(result.joints)
-        if decibels_apart(result, k) > _CLOSE_DB
+        joint for k, joint in enumerate(result.joints) if decibels_apart(result, k) > _CLOSE_DB
     ]
     beware = (
         [

@@ -30,7 +30,7 @@ def parameters_section(
         Where that comes from.
 
     """
-    names = parameter_names(tuple(joint.joint for joint in result.joints))
+    names = parameter_names(result.joints)
     lines = [(name.name, name.joint, name.unit) for name in names]
     values, untuned = unpack(result.parameters).tolist(), unpack(result.untuned).tolist()
     base = None if known is None else unpack(known).tolist()

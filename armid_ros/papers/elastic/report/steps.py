@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.interaction import coupled_response, decibel_error
-from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.physical import frequencies, ideal_response
 from armid_ros.papers.elastic.identification.three_steps import TwoInertiaIdentification
 from armid_ros.papers.elastic.identification.tuning import Tuning
 from armid_ros.report.blocks import ContentSection, FactList, PageBlock, Panels, Paragraph
@@ -53,24 +53,17 @@ def _joint(
     result: TwoInertiaIdentification, k: int
 ) -> Iterator[tuple[str, str, Sequence[PageBlock]]]:
     """Yield panels of one joint: decoupled, and from motor torque alone."""
-    measured = result.measured[k]
-    parameters = result.parameters
+    measured, joint, parameters = result.measured[k], result.joints[k], result.parameters
     seen = (measured.frequency >= _SHOWN[0]) & (measured.frequency <= _SHOWN[1])
     own = measured.frequency[seen]
     frequency = np.unique(np.concatenate([np.geomspace(*_SHOWN, _POINTS), own]))
     decoupled = ideal_response(parameters, k, frequency)[:, 0, 0]
-    subspaces = result.joints[k].system.response(frequency)[:, 0, 0]
+    subspaces = result.systems[k].response(frequency)[:, 0, 0]
     coupled = coupled_response(parameters, result.angles, frequency)[:, k]
     at = np.searchsorted(frequency, own)
     points, alone = np.full((2, len(frequency)), np.nan, complex)
     points[at], alone[at] = measured.decoupled[seen, 0], measured.coupled[seen, 0]
-    inertia, rotor, spring = (
-        values[k] for values in (parameters.inertia, parameters.rotor, parameters.stiffness)
-    )
-    low, high = (
-        float(np.sqrt(spring * share) / (2.0 * np.pi))
-        for share in (1.0 / inertia, 1.0 / inertia + 1.0 / rotor)
-    )
+    low, high = (float(both[k]) for both in frequencies(parameters))
     marks = [
         Mark(low, f'antiresonance {low:.1f} Hz', before=True),
         Mark(high, f'resonance {high:.1f} Hz'),
@@ -83,12 +76,14 @@ def _joint(
         decibel_error(alone[rows], decoupled[rows]),
         decibel_error(alone[rows], coupled[rows]),
     )
-    dip, peak = _dip_and_peak(own[within], np.abs(alone[rows]))
+    size, compared = np.abs(alone[rows]), own[within]
+    lowest = int(np.argmin(size))
+    dip, peak = compared[lowest], compared[lowest + int(np.argmax(size[lowest:]))]
     decoupled_charts = (
         _chart(frequency, points, modelled, _decibel, _SIZE, 260, marks),
         _chart(frequency, points, modelled, _degrees, 'phase [°]', 150, marks, last=True),
     )
-    yield measured.joint, 'decoupled', decoupled_charts
+    yield joint, 'decoupled', decoupled_charts
     whole = [('whole arm, modelled', coupled), ('this joint', decoupled)]
     alone_chart = _chart(frequency, alone, whole, _decibel, _SIZE, 220, marks, last=True)
     facts = [
@@ -98,7 +93,7 @@ def _joint(
         ('From motor torque alone, against the joint', f'{errors[1]:.1f} dB rms'),
         ('The same against the whole arm', f'{errors[2]:.1f} dB rms'),
     ]
-    yield measured.joint, 'coupled: from motor torque alone', (alone_chart, FactList(facts))
+    yield joint, 'coupled: from motor torque alone', (alone_chart, FactList(facts))
 
 
 def _chart(
@@ -135,12 +130,6 @@ def _decibel(values: npt.NDArray[np.complex128]) -> FloatArray:
 
 def _degrees(values: npt.NDArray[np.complex128]) -> FloatArray:
     return np.asarray(np.degrees(np.angle(values)))
-
-
-def _dip_and_peak(frequency: FloatArray, size: FloatArray) -> tuple[float, float]:
-    """Return where a response is lowest, and where it is highest above that [Hz]."""
-    lowest = int(np.argmin(size))
-    return float(frequency[lowest]), float(frequency[lowest + int(np.argmax(size[lowest:]))])
 
 
 def steps_section(tuning: Tuning) -> ContentSection:

@@ -33,6 +33,8 @@ _LOOK_PERIOD = 0.1
 #: Messages held while an estimate is made: several seconds at 1 kHz.
 _DEPTH = 10_000
 _TOPICS = ('exo/joint_states', 'human/joint_states')
+#: What is taken of the messages of either.
+_FIELDS = (('position', 'effort'), ('position',))
 #: What is said of joint states that are left out.
 _DAMAGED = DISTURBANCES | {
     'spike': 'joint states that jump for single samples are left out',
@@ -95,8 +97,10 @@ class InteractionIdentifierNode(ArmidNode):
         self._stopped = False
         self._epoch: int | None = None
         self.topics = tuple(
-            MatchedSubscription(self, JointState, topic, take, depth=_DEPTH)
-            for topic, take in zip(_TOPICS, (self._on_machine, self._on_wearer), strict=True)
+            MatchedSubscription(
+                self, JointState, topic, lambda message, k=k: self._take(k, message), depth=_DEPTH
+            )
+            for k, topic in enumerate(_TOPICS)
         )
         self.offer('~/reset', self.reset)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -148,39 +152,28 @@ class InteractionIdentifierNode(ArmidNode):
             return DiagnosticStatus.STALE
         return super().level(troubled)
 
-    def _on_wearer(self, message: JointState) -> None:
+    def _take(self, machine: int, message: JointState) -> None:
+        """Take what the machine (0) or its wearer (1) sends."""
         self.received += 1
-        self.freshness[1].heard()
-        for sample in self._signals(1, message, ('position',)):
-            self._follow(1, sample)
-            self.identifier.take_other(sample.t, sample.x)
-
-    def _on_machine(self, message: JointState) -> None:
-        self.received += 1
-        self.freshness[0].heard()
-        n = len(self._joints[0])
-        for sample in self._signals(0, message, ('position', 'effort')):
-            self._follow(0, sample)
+        self.freshness[machine].heard()
+        topic, n = _TOPICS[machine], len(self._joints[machine])
+        for sample in self._signals(machine, message):
+            if sample.begins:
+                self.identifier.interrupt()
+                what = f'{topic}: positions step; what was before them is left behind'
+                self.complaints.say(f'{topic} step', what)
+            q, tau = sample.x[:n], sample.x[n:]
             try:
-                if self.identifier.take(sample.t, sample.x[:n], sample.x[n:]):
+                if machine:
+                    self.identifier.take_other(sample.t, q)
+                elif self.identifier.take(sample.t, q, tau):
                     self._publish(message)
             except ArmidError as error:
-                self.complaints.say(_TOPICS[0], str(error))
+                self.complaints.say(topic, str(error))
 
-    def _follow(self, machine: int, sample: StreamSample) -> None:
-        """Begin a new stretch where positions have stepped, and say so."""
-        if sample.begins:
-            self.identifier.interrupt()
-            topic = _TOPICS[machine]
-            self.complaints.say(
-                f'{topic} step', f'{topic}: positions step; what was before them is left behind'
-            )
-
-    def _signals(
-        self, machine: int, message: JointState, fields: tuple[str, ...]
-    ) -> list[StreamSample]:
+    def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
         """Return samples of what a machine sends, without those that are damaged."""
-        topic, gate = _TOPICS[machine], self._gates[machine]
+        topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
         try:
             order = joint_places(self._joints[machine], message.name)
             parts = [np.array(getattr(message, name)) for name in fields]

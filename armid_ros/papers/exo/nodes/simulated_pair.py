@@ -17,7 +17,7 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.running.real_time import RealTime
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
-from armid_ros.papers.exo.plant.simulated_pair import PairSensors, SimulatedPair
+from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
 import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
@@ -158,9 +158,8 @@ class SimulatedPairNode(ArmidNode):
             driven=pair.robot.joints if driven == (ALL,) else driven,
             torque_rate=self.value('torque_rate'),
             rate=self.value('rate'),
-            sensors=PairSensors(
-                math.radians(self.value('angle_noise')), self.value('torque_noise')
-            ),
+            angle_noise=math.radians(self.value('angle_noise')),
+            torque_noise=self.value('torque_noise'),
             rng=np.random.default_rng(self.value('seed')),
         )
 

@@ -81,25 +81,19 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     plan = EXERCISES[name]
     if name.endswith('step'):
         return stepping(pair, gait or read_gait(), t, plan.period)
-    return following(pair, t, lambda joints, time: _moving(plan, joints, time))
+    w, middle, reach = 2.0 * np.pi / plan.period, np.radians(plan.middle), np.radians(plan.reach)
 
-
-def _moving(plan: Exercise, joints: tuple[str, ...], t: FloatArray) -> Motion:
-    """Return sines of hips and knees with a flat foot and an upright trunk."""
-    w = 2.0 * np.pi / plan.period
-    reach = np.radians(plan.reach)
-    middle = np.radians(plan.middle)
-    hip, knee, far_hip, far_knee = (
-        [
-            m - r * np.cos(w * t),
-            r * w * np.sin(w * t),
-            r * w**2 * np.cos(w * t),
+    def moving(joints: tuple[str, ...], time: FloatArray) -> Motion:
+        """Return sines of hips and knees with a flat foot and an upright trunk."""
+        cosine, sine = (np.outer(f(w * time), reach) for f in (np.cos, np.sin))
+        parts = [
+            np.column_stack([knee - hip, knee, hip, far_hip, far_knee, np.zeros_like(time)])
+            for hip, knee, far_hip, far_knee in (
+                (middle - cosine).T,
+                (w * sine).T,
+                (w**2 * cosine).T,
+            )
         ]
-        for m, r in zip(middle, reach, strict=True)
-    )
-    zero = np.zeros_like(t)
-    parts = [
-        np.column_stack([k - h, k, h, fh, fk, zero])
-        for h, k, fh, fk in zip(hip, knee, far_hip, far_knee, strict=True)
-    ]
-    return Motion(joints, t, *parts)
+        return Motion(joints, time, *parts)
+
+    return following(pair, t, moving)

@@ -146,11 +146,9 @@ def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Pha
 
     """
     speed, acceleration = phase.speed[:, np.newaxis], phase.acceleration[:, np.newaxis]
-    here = [_body(gait, phase.value, derivative) for derivative in range(3)]
+    here = []
+    for derivative in range(3):  # a flat foot and an upright trunk
+        hip, knee, _ = gait(phase.value, derivative).T
+        far = gait(phase.value + 0.5, derivative)
+        here.append(np.column_stack([knee - hip, knee, hip, far]))
     return Motion(joints, t, here[0], here[1] * speed, here[2] * speed**2 + here[1] * acceleration)
-
-
-def _body(gait: Gait, phase: FloatArray, derivative: int) -> FloatArray:
-    """Return the angles of a body with a flat foot and an upright trunk, or a derivative."""
-    hip, knee, _ = gait(phase, derivative).T
-    return np.column_stack([knee - hip, knee, hip, gait(phase + 0.5, derivative)])

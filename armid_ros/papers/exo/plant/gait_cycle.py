@@ -160,7 +160,7 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
 
 def ground_forces(robot: Robot, motion: Motion, ground: Ground) -> FloatArray:
     """Return what the ground does to heels and toes along a motion, shape (N, 4, 2) [N]."""
-    place, jacobian = points_motion(robot, *contacts(robot, leg_length(robot)), motion.q)
+    place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
     return ground.force(place[..., 2], speed[..., 2], speed[..., 0])
 
@@ -182,20 +182,14 @@ def walking_torques(
 
     """
     found = pair_torques(pair, *motions)
-    parts = [
-        tau - ground_torques(robot, motion.q, forces)
-        for robot, motion, forces, tau in (
-            (pair.robot, motions.own, ground, found.tau),
-            (pair.other, motions.other, other_ground, found.other_tau),
-        )
-    ]
+    parts = []
+    for robot, motion, forces, tau in (
+        (pair.robot, motions.own, ground, found.tau),
+        (pair.other, motions.other, other_ground, found.other_tau),
+    ):
+        _, jacobian = points_motion(robot, *contacts(robot), motion.q)
+        parts.append(tau - np.einsum('ncxj,ncx->nj', jacobian[:, :, _PLANE], forces))
     return replace(found, tau=read_only(parts[0]), other_tau=read_only(parts[1]))
-
-
-def ground_torques(robot: Robot, q: FloatArray, forces: FloatArray) -> FloatArray:
-    """Return what forces on heels and toes, (N, 4, 2) [N], do to the joints, (N, n) [N m]."""
-    _, jacobian = points_motion(robot, *contacts(robot, leg_length(robot)), q)
-    return np.asarray(np.einsum('ncxj,ncx->nj', jacobian[:, :, _PLANE], forces))
 
 
 def _joint_motion(
@@ -213,7 +207,7 @@ def _joint_motion(
 
 def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
     robot = pair.other if other else pair.robot
-    joints, points = contacts(robot, leg_length(robot))
+    joints, points = contacts(robot)
     ties = [(t.other_joint, t.other_point) if other else (t.joint, t.point) for t in pair.ties]
     contact, jacobian = points_motion(robot, joints, points, motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
@@ -323,13 +317,9 @@ def check_cycle(
     """
     pair, motions = cycle.pair, cycle.motions
     torque = driving_torque(cycle, joint, rate, believed, ground_forces)
-    moved = drive_by_torque(pair, *motions, driven_joints(pair.robot, joint), torque, cycle.soil)
+    hips = [pair.robot.joints[place] for place in floating(pair.robot)[:2]]
+    moved = drive_by_torque(pair, *motions, [*hips, joint], torque, cycle.soil)
     return GaitCheck(joint, motions.own.q[::2, pair.robot.index(joint)], moved)
-
-
-def driven_joints(robot: Robot, joint: str) -> list[str]:
-    """Return what moves freely when a joint is driven: hips forward and up, and the joint."""
-    return [*(robot.joints[place] for place in floating(robot)[:2]), joint]
 
 
 def driving_torque(

@@ -23,24 +23,6 @@ _INTEGRATED = 10
 _FALLEN = np.radians(60.0)
 
 
-@dataclass(frozen=True)
-class PairSensors:
-    """
-    What is measured of a pair.
-
-    Attributes
-    ----------
-    angle_noise : float
-        Standard deviation of all angles [rad].
-    torque_noise : float
-        Standard deviation of the machine's torques [N m].
-
-    """
-
-    angle_noise: float = 0.0
-    torque_noise: float = 0.0
-
-
 @dataclass(frozen=True, eq=False)
 class PairSample:
     """
@@ -85,8 +67,8 @@ class SimulatedPair:
         Torque samples per second [Hz].
     rate : float
         Samples per second [Hz].
-    sensors : PairSensors, optional
-        Perfect by default.
+    angle_noise, torque_noise : float
+        Standard deviation of all angles [rad], and of the machine's torques [N m].
     rng : numpy.random.Generator
         Source of the noise.
 
@@ -105,7 +87,8 @@ class SimulatedPair:
         driven: Sequence[str] = (),
         torque_rate: float = 100.0,
         rate: float = 1000.0,
-        sensors: PairSensors | None = None,
+        angle_noise: float = 0.0,
+        torque_noise: float = 0.0,
         rng: np.random.Generator,
     ) -> None:
         self.pair = pair
@@ -113,7 +96,7 @@ class SimulatedPair:
         self._columns = [self.pair.robot.index(joint) for joint in self.driven]
         self._gait = gait
         self._rate = rate
-        self._sensors = sensors or PairSensors()
+        self._noise = angle_noise, torque_noise
         self._rng = rng
         period = float(read_assumptions()['stepping_period'].value)
         knots = np.linspace(0.0, period, round(period * torque_rate))
@@ -149,7 +132,7 @@ class SimulatedPair:
         (own, other), tau = self._block
         k = self._steps - self._first
         noise = self._rng.standard_normal((3, len(tau[k])))
-        angles, torques = self._sensors.angle_noise, self._sensors.torque_noise
+        angles, torques = self._noise
         return PairSample(
             self.t,
             own.q[k] + angles * noise[0],

@@ -15,11 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.model import points_motion
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.papers.exo.plant.contact import Ground
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
-from armid_ros.papers.exo.plant.walkers import contacts, leg_length
+from armid_ros.papers.exo.plant.walkers import contacts
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
@@ -117,11 +116,7 @@ def drive_by_torque(
     if len(motion) % 2 == 0:
         raise TrajectoryError(f'{len(motion)} samples; steps of two take an odd number')
     columns = [pair.robot.index(joint) for joint in driven]
-    machine = _Machine(pair, PairMotion(motion, other_motion), columns, ground)
-
-    def rate(k: int, x: FloatArray) -> FloatArray:
-        return machine.rate(k, x, torque(float(motion.t[k])))
-
+    rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, ground)
     x = np.concatenate([motion.q[0, columns], motion.dq[0, columns]])
     rows = []
     for k in range(0, len(motion) - 2, 2):
@@ -137,56 +132,50 @@ def drive_by_torque(
     return replace(motion, t=motion.t[::2], q=result[0], dq=result[1], ddq=result[2], tau=None)
 
 
-class _Machine:
-    """The machine of a pair, of which some joints move freely and all others as prescribed."""
+def _forward_dynamics(
+    pair: TiedPair,
+    motions: PairMotion,
+    free: list[int],
+    torque: DrivingTorque,
+    ground: Ground | None,
+) -> Rate:
+    """Return what gives speeds and accelerations of the free joints at a sample, shape (2 d,)."""
+    robot, own, tied = pair.robot, motions.own, len(pair.ties)
+    ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
+    if ground is not None:
+        ends += zip(*contacts(robot), strict=True)
+    model, operational = pin.Model(robot.model), pin.FrameType.OP_FRAME
+    frames = [
+        model.addFrame(
+            pin.Frame(f'end {k}', robot.index(joint) + 1, pin.SE3(np.eye(3), point), operational)
+        )
+        for k, (joint, point) in enumerate(ends)
+    ]
+    data, count = model.createData(), len(free)
+    far = pair.geometry(own, motions.other).other_position
+    aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
-    def __init__(
-        self, pair: TiedPair, motions: PairMotion, free: list[int], ground: Ground | None
-    ):
-        robot, ties = pair.robot, pair.ties
-        self._pair, self._own, self._free, self._ground = pair, motions.own, free, ground
-        ends = [(tie.joint, np.array(tie.point)) for tie in ties]
-        if ground is not None:
-            ends += zip(*contacts(robot, leg_length(robot)), strict=True)
-        self._model = pin.Model(robot.model)
-        self._frames = [
-            self._model.addFrame(
-                pin.Frame(
-                    f'end {number}',
-                    robot.index(joint) + 1,
-                    pin.SE3(np.eye(3), point),
-                    pin.FrameType.OP_FRAME,
-                )
-            )
-            for number, (joint, point) in enumerate(ends)
-        ]
-        self._data = self._model.createData()
-        joints = [tie.other_joint for tie in ties]
-        points = np.array([tie.other_point for tie in ties]).reshape(-1, 3)
-        self._far, _ = points_motion(pair.other, joints, points, motions.other.q)
-
-    def rate(self, k: int, x: FloatArray, tau: FloatArray) -> FloatArray:
-        """Return speeds and accelerations of the free joints at sample k, shape (2 d,)."""
-        model, data, free, own = self._model, self._data, self._free, self._own
-        count, tied = len(free), len(self._pair.ties)
+    def rate(k: int, x: FloatArray) -> FloatArray:
         q, dq, ddq = (np.array(part[k]) for part in (own.q, own.dq, own.ddq))
         q[free], dq[free], ddq[free] = x[:count], x[count:], 0.0
         load = pin.rnea(model, data, q, dq, ddq)
         inertia = pin.crba(model, data, q)
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        place = np.array([data.oMf[frame].translation for frame in self._frames])
+        place = np.array([data.oMf[frame].translation for frame in frames])
         jacobian = np.array(
-            [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in self._frames]
+            [pin.getFrameJacobian(model, data, frame, aligned)[:3] for frame in frames]
         )
         force = np.zeros_like(place)
-        force[:tied] = self._pair.forces(place[:tied] - self._far[k])
-        if self._ground is not None:
+        force[:tied] = pair.forces(place[:tied] - far[k])
+        if ground is not None:
             feet, moving = place[tied:], jacobian[tied:] @ dq
-            force[tied:, ::2] = self._ground.force(feet[:, 2], moving[:, 2], moving[:, 0])
-        push = tau - load[free] + np.einsum('cxj,cx->j', jacobian, force)[free]
+            force[tied:, ::2] = ground.force(feet[:, 2], moving[:, 2], moving[:, 0])
+        push = torque(float(own.t[k])) - load[free]
+        push += np.einsum('cxj,cx->j', jacobian, force)[free]
         return np.concatenate([x[count:], np.linalg.solve(inertia[np.ix_(free, free)], push)])
+
+    return rate
 
 
 @dataclass(frozen=True)

@@ -164,13 +164,10 @@ def walkable(
 
 
 class _Curves:
-    """
-    Curves of a leg and a path of the hips, by the coefficients of their series.
+    """Curves of a leg and a path of the hips, by the coefficients of their series."""
 
-    The vector has those of hip, knee and ankle, of the hips forward and up, then lean, stride and
-    the place where the foot stands.
-
-    """
+    # the vector has those of hip, knee and ankle, of the hips forward and up, then lean, stride
+    # and the place where the foot stands
 
     def __init__(self, cycle: float, stride: float | None, lean: float | None):
         self.phase = np.arange(_SAMPLES) / _SAMPLES

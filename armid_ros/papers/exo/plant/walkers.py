@@ -12,7 +12,6 @@ stay what they are; only the root moves from the foot to the hips, so that eithe
 from __future__ import annotations
 
 from dataclasses import replace
-from xml.etree import ElementTree
 
 from armid_ros.model.spring_ties import centroid_ties
 from armid_ros.motion import FloatArray
@@ -23,6 +22,7 @@ from armid_ros.robots import load_robot, Robot
 from armid_ros.robots.load import robot_from_urdf
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 SIDES = ('right', 'left')
 #: What carries the trunk: way forward and up [m], lean [rad].
@@ -51,26 +51,26 @@ def walker(robot: Robot) -> Robot:
 
     """
     prefix = robot.joints[0].split('_')[0]
-    root = ElementTree.Element('robot', name=robot.name.replace('legs', 'walker'))
-    ElementTree.SubElement(root, 'link', name=f'{prefix}_ground')
-    parent = f'{prefix}_ground'
-    axes = ('1 0 0', '0 0 1', '0 1 0')
-    trunk = _inertial(robot, f'{prefix}_stance_hip')
-    for name, axis in zip(FLOATING, axes, strict=True):
-        child = f'{prefix}_trunk' if name == 'lean' else f'{prefix}_{name}_slide'
-        _joint(root, f'{prefix}_{name}', parent, child, axis, 0.0, slides=name != 'lean')
-        _link(root, child, trunk if name == 'lean' else None)
+    trunk, parent = f'{prefix}_trunk', f'{prefix}_ground'
+    parts = [f'<robot name="{robot.name.replace("legs", "walker")}"><link name="{parent}"/>']
+    for joint, child, axis, of in (
+        (FLOATING[0], f'{prefix}_forward_slide', '1 0 0', None),
+        (FLOATING[1], f'{prefix}_up_slide', '0 0 1', None),
+        (FLOATING[2], trunk, '0 1 0', 'stance_hip'),
+    ):
+        body = None if of is None else robot.model.inertias[robot.index(f'{prefix}_{of}') + 1]
+        parts.append(_hung(f'{prefix}_{joint}', parent, child, axis, body))
         parent = child
     lengths = leg_length(robot)
     for side in SIDES:
-        parent = f'{prefix}_trunk'
+        parent = trunk
         ends = (0.0, -lengths.thigh, -lengths.shank)
         for joint, link, axis, end in zip(_LEG, _LINKS, _AXES, ends, strict=True):
             child = f'{prefix}_{side}_{link}'
-            _joint(root, f'{prefix}_{side}_{joint}', parent, child, axis, end)
-            _link(root, child, _inertial(robot, f'{prefix}_swing_{joint}'))
+            body = robot.model.inertias[robot.index(f'{prefix}_swing_{joint}') + 1]
+            parts.append(_hung(f'{prefix}_{side}_{joint}', parent, child, axis, body, end))
             parent = child
-    return robot_from_urdf(ElementTree.tostring(root, encoding='unicode'), source=robot.name)
+    return robot_from_urdf(''.join([*parts, '</robot>']), source=robot.name)
 
 
 def leg_length(robot: Robot) -> LegLength:
@@ -117,50 +117,29 @@ def floating(robot: Robot) -> list[int]:
     return [robot.index(f'{prefix}_{name}') for name in FLOATING]
 
 
-def contacts(robot: Robot, leg: LegLength) -> tuple[list[str], FloatArray]:
+def contacts(robot: Robot) -> tuple[list[str], FloatArray]:
     """Return joints and points of right heel, right toe, left heel and left toe, (4, 3) [m]."""
     prefix = robot.joints[0].split('_')[0]
     ankles = [f'{prefix}_{side}_ankle' for side in SIDES for _ in range(2)]
-    return ankles, np.tile([[0.0, 0.0, 0.0], [leg.foot, 0.0, 0.0]], (2, 1))
+    return ankles, np.tile([[0.0, 0.0, 0.0], [leg_length(robot).foot, 0.0, 0.0]], (2, 1))
 
 
-def _inertial(robot: Robot, joint: str) -> tuple[float, FloatArray, FloatArray]:
-    body = robot.model.inertias[robot.index(joint) + 1]
-    return float(body.mass), np.array(body.lever), np.array(body.inertia)
-
-
-def _link(
-    root: ElementTree.Element, name: str, body: tuple[float, FloatArray, FloatArray] | None
-) -> None:
-    link = ElementTree.SubElement(root, 'link', name=name)
-    if body is None:
-        return
-    mass, lever, inertia = body
-    parts = ElementTree.SubElement(link, 'inertial')
-    ElementTree.SubElement(parts, 'origin', xyz=' '.join(map(repr, lever.tolist())))
-    ElementTree.SubElement(parts, 'mass', value=repr(mass))
-    names = {'ixx': (0, 0), 'ixy': (0, 1), 'ixz': (0, 2), 'iyy': (1, 1), 'iyz': (1, 2)}
-    entries = {key: repr(float(inertia[place])) for key, place in names.items()}
-    ElementTree.SubElement(parts, 'inertia', {**entries, 'izz': repr(float(inertia[2, 2]))})
-
-
-def _joint(
-    root: ElementTree.Element,
-    name: str,
-    parent: str,
-    child: str,
-    axis: str,
-    up: float,
-    *,
-    slides: bool = False,
-) -> None:
-    kind = 'prismatic' if slides else 'revolute'
-    joint = ElementTree.SubElement(root, 'joint', name=name, type=kind)
-    ElementTree.SubElement(joint, 'origin', xyz=f'0 0 {up!r}')
-    ElementTree.SubElement(joint, 'parent', link=parent)
-    ElementTree.SubElement(joint, 'child', link=child)
-    ElementTree.SubElement(joint, 'axis', xyz=axis)
-    far = '1000' if slides else '3.2'
-    ElementTree.SubElement(
-        joint, 'limit', lower=f'-{far}', upper=far, velocity='100', effort='1e6'
+def _hung(
+    joint: str, parent: str, child: str, axis: str, body: pin.Inertia | None, up: float = 0.0
+) -> str:
+    """Return the URDF of a joint and the link that it moves; one without a body slides."""
+    kind, far, inside = 'prismatic', '1000', ''
+    if body is not None:
+        kind, far = 'revolute', '3.2'
+        lever = ' '.join(map(repr, body.lever.tolist()))
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia.tolist()
+        inside = (
+            f'<inertial><origin xyz="{lever}"/><mass value="{body.mass!r}"/><inertia ixx="{xx!r}" '
+            f'ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"/></inertial>'
+        )
+    return (
+        f'<joint name="{joint}" type="{kind}"><origin xyz="0 0 {up!r}"/><parent link="{parent}"/>'
+        f'<child link="{child}"/><axis xyz="{axis}"/>'
+        f'<limit lower="-{far}" upper="{far}" velocity="100" effort="1e6"/></joint>'
+        f'<link name="{child}">{inside}</link>'
     )

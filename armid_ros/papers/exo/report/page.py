@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
-from armid_ros.papers.exo.plant.leg_pair import TiedPair
+from armid_ros.motion import FloatArray
+from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.papers.exo.report.poses import draw_poses
 from armid_ros.papers.exo.report.sections import (
     assumptions_section,
     forces_section,
-    ShownMotion,
     stiffness_section,
 )
 from armid_ros.papers.exo.report.walk import by_torque_section, feet_section, SimulatedWalk, Walk
@@ -28,7 +29,9 @@ _NARROW = 0.1
 
 def exo_report(
     pair: TiedPair,
-    shown: ShownMotion,
+    motions: PairMotion,
+    abscissa: FloatArray,
+    name: str,
     found: Sequence[Interaction],
     walked: SimulatedWalk | None,
     provenance: Provenance,
@@ -40,8 +43,12 @@ def exo_report(
     ----------
     pair : TiedPair
         Both machines, with the stiffness that was found.
-    shown : ShownMotion
-        The motion that is shown.
+    motions : PairMotion
+        The motion of both that is shown.
+    abscissa : ndarray, shape (N,)
+        What it is drawn over.
+    name : str
+        Name and unit of the abscissa.
     found : sequence of Interaction
         One stiffness for all, then one for each.
     walked : SimulatedWalk or None
@@ -50,7 +57,6 @@ def exo_report(
         Files, versions, settings, seed.
 
     """
-    motions, abscissa = shown.motions, shown.abscissa
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
     sections: list[Section] = [
@@ -64,7 +70,7 @@ def exo_report(
             feet_section(walked.cycle),
         ]
     sections += [
-        forces_section(pair, shown),
+        forces_section(pair, motions, abscissa, name),
         draw_poses(pair, motions, samples, captions),
         assumptions_section(),
         Origin(provenance),
@@ -76,13 +82,13 @@ def exo_report(
 def _verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
-    k, reach = overall.stiffness[0], 1.96 * overall.std[0]
+    k, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]
     sentences = [f'The straps between exoskeleton and wearer have {k:.0f} ± {reach:.0f} N/m.']
     weak = [
         name.replace('_', ' ')
         for part in found[1:]
         for name, value, std in zip(part.segments, part.stiffness, part.std, strict=True)
-        if 1.96 * std > _NARROW * abs(value)
+        if HALF_WIDTH * std > _NARROW * abs(value)
     ]
     if walked is not None:
         each = ', '.join(f'{d.joint} {d.right.most:.2g}°' for d in walked.driven)

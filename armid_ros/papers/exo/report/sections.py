@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from armid_ros.identification.fitting.identifiability import HALF_WIDTH
 from armid_ros.identification.ties.stiffness import Interaction
@@ -25,27 +24,6 @@ from armid_ros.report.notation import measured
 import numpy as np
 
 _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
-
-
-@dataclass(frozen=True)
-class ShownMotion:
-    """
-    The motion that is shown.
-
-    Attributes
-    ----------
-    motions : PairMotion
-        Of both.
-    abscissa : ndarray, shape (N,)
-        What it is drawn over.
-    name : str
-        Name and unit of the abscissa.
-
-    """
-
-    motions: PairMotion
-    abscissa: FloatArray
-    name: str
 
 
 def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) -> ContentSection:
@@ -90,9 +68,10 @@ def _range(values: FloatArray) -> str:
     return ' to '.join(ends)
 
 
-def forces_section(pair: TiedPair, shown: ShownMotion) -> ContentSection:
+def forces_section(
+    pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
+) -> ContentSection:
     """Show what each segment feels of the other machine, and what that makes of the torques."""
-    motions, abscissa = shown.motions, shown.abscissa
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     size = np.linalg.norm(torques.forces, axis=2)
@@ -108,13 +87,13 @@ def forces_section(pair: TiedPair, shown: ShownMotion) -> ContentSection:
             Series('alone', alone.tau[:, k], 'measured'),
             Series('with springs', torques.tau[:, k], 'residual'),
         ]
-        chart = Chart(abscissa, both, shown.name, 'torque [N m]', height=180, link='torques')
+        chart = Chart(abscissa, both, name, 'torque [N m]', height=180, link='torques')
         panels.append((joint, '', [chart]))
     return ContentSection(
         'Interaction',
         [
             Paragraph('Force of each spring on the machine; the wearer feels the opposite.'),
-            Chart(abscissa, series, shown.name, 'force [N]', height=260),
+            Chart(abscissa, series, name, 'force [N]', height=260),
             DataTable(['Segment', 'Mean [N]', 'Largest [N]'], rows),
             Fold('What the springs make of the joint torques', [Panels(panels)]),
         ],

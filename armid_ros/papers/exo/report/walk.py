@@ -105,6 +105,8 @@ class Walk(Section):
     title: ClassVar[str] = 'Walking'
     package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'walk.html'
+    #: Width and height of the drawing, and where the ground is [px].
+    size: ClassVar[tuple[int, int, float]] = (_WIDTH, _HEIGHT, _GROUND)
 
     cycle: GaitCycle
     driven: Sequence[Driven]
@@ -129,11 +131,6 @@ class Walk(Section):
             f'{np.abs(self.cycle.trunk_moment(other=other)).max():.0f}' for other in (False, True)
         )
         return own, other
-
-    @property
-    def size(self) -> tuple[int, int, float]:
-        """Width and height of the drawing, and where the ground is [px]."""
-        return _WIDTH, _HEIGHT, _GROUND
 
     @property
     def data(self) -> Markup:
@@ -169,7 +166,7 @@ class Walk(Section):
             motion = self.cycle.motions.other if other else self.cycle.motions.own
             ground = self.cycle.other_ground if other else self.cycle.ground
             force = ground[rows].reshape(len(rows), 2, 2, 2)
-            place = points_motion(robot, *contacts(robot, leg_length(robot)), motion.q[rows])[0]
+            place = points_motion(robot, *contacts(robot), motion.q[rows])[0]
             place = place[..., [0, 2]].reshape(len(rows), 2, 2, 2)
             up = force[..., 1:]
             middle = (place * up).sum(axis=2) / np.maximum(up.sum(axis=2), 1e-9)

@@ -11,9 +11,13 @@ from armid_ros.papers.elastic.identification.interaction import (
     decouple,
     interaction_torques,
     joint_signals,
+    measured_response,
 )
-from armid_ros.papers.elastic.identification.physical import fit_joint, ideal_response
-from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.physical import (
+    fit_joints,
+    frequencies,
+    ideal_response,
+)
 from armid_ros.robots import load_robot
 import control
 import numpy as np
@@ -47,7 +51,7 @@ def test_ideal_response_is_that_of_python_control(truth, joint) -> None:
 def test_decoupled_joints_are_one_link_systems(truth, runs) -> None:
     for joint, found in enumerate(decouple(runs, truth)):
         ideal = ideal_response(truth, joint, FREQUENCY)
-        response = found.system.response(FREQUENCY)
+        response = found.response(FREQUENCY)
         assert decibel_error(response[:, 0, 0], ideal[:, 0, 0]) < 0.1
         assert decibel_error(response[:, 1, 0], ideal[:, 1, 0]) < 0.1
 
@@ -65,20 +69,16 @@ def test_motor_torque_alone_shows_another_system_and_more_so_at_link_2(truth, ru
 
 
 def test_physical_parameters_follow_from_the_responses(truth, runs) -> None:
-    for joint, found in enumerate(decouple(runs, truth)):
-        fit = fit_joint(found)
-        assert fit.rotor == pytest.approx(truth.rotor[joint], rel=0.02)
-        assert fit.inertia == pytest.approx(truth.inertia[joint], rel=0.02)
-        assert fit.stiffness == pytest.approx(truth.stiffness[joint], rel=0.02)
-        assert fit.spring_damping == pytest.approx(truth.spring_damping[joint], rel=0.05)
-        total = fit.motor_damping + fit.link_damping
-        assert total == pytest.approx(truth.total_damping[joint], rel=0.05)
-        assert fit.interaction_gain == pytest.approx(1.0, abs=0.01)
-
-
-def test_antiresonance_and_resonance_are_those_of_the_literature(truth, runs) -> None:
-    wanted = ((22.7, 35.5), (29.4, 42.2))
-    for found, (anti, resonance) in zip(decouple(runs, truth), wanted, strict=True):
-        fit = fit_joint(found)
-        assert fit.antiresonance == pytest.approx(anti, abs=0.25)
-        assert fit.resonance == pytest.approx(resonance, abs=0.35)
+    fit, gain = fit_joints(decouple(runs, truth), ('joint1', 'joint2'), truth)
+    for name, tolerance in (
+        ('rotor', 0.02),
+        ('inertia', 0.02),
+        ('stiffness', 0.02),
+        ('spring_damping', 0.05),
+        ('total_damping', 0.05),
+    ):
+        np.testing.assert_allclose(getattr(fit, name), getattr(truth, name), rtol=tolerance)
+    np.testing.assert_allclose(gain, 1.0, atol=0.01)
+    antiresonance, resonance = frequencies(fit)
+    np.testing.assert_allclose(antiresonance, (22.7, 29.4), atol=0.25)
+    np.testing.assert_allclose(resonance, (35.5, 42.2), atol=0.35)

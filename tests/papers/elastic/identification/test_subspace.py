@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.errors import IdentificationError
-from armid_ros.papers.elastic.identification.spectra import measured_response
+from armid_ros.papers.elastic.identification.interaction import measured_response
 from armid_ros.papers.elastic.identification.subspace import identify_subspace, Signals
 import control
 import numpy as np

@@ -9,6 +9,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.errors import ModelError, TrajectoryError
+from armid_ros.motion import Motion
 from armid_ros.papers.elastic.plant.run import Experiment, run_elastic
 from armid_ros.papers.elastic.plant.signals import step_experiments
 from armid_ros.robots import load_robot
@@ -19,10 +20,8 @@ from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 import pytest
 
-from benchmarks.elastic import modes
+from benchmarks.elastic import FREE, LOCKED, modes
 
-FREE = {0: (31.5, 63.0), 45: (31.9, 55.7), 90: (33.3, 47.0), 135: (36.4, 42.9), 180: (38.9, 42.2)}
-LOCKED = {0: (14.6, 55.5), 45: (15.5, 47.1), 90: (18.3, 36.4), 180: (27.7, 29.4)}
 SHIPPED = two_link_set('after')
 
 
@@ -123,17 +122,10 @@ def test_any_arm_may_be_elastic_in_some_joints() -> None:
     for _ in range(300):
         state = step(plant, state, np.zeros(6))
     motor, speed, _ = plant.motors(state)
-    load = arm.load(_at_rest(robot, state.q))[0]
+    load = arm.load(Motion.of_states(robot.joints, state.q, 0.0, 0.0))[0]
     np.testing.assert_array_equal(speed, 0.0)
     elastic = [robot.index(joint) for joint in joints]
     np.testing.assert_allclose((motor - state.q)[elastic], load[elastic] / stiffness, atol=1e-7)
-
-
-def _at_rest(robot, q):
-    from armid_ros.motion import Motion
-
-    zero = np.zeros((1, robot.n_joints))
-    return Motion(robot.joints, np.zeros(1), q[np.newaxis], zero, zero)
 
 
 def test_backlash_lets_the_link_fly_between_its_flanks() -> None:
