@@ -25,8 +25,7 @@ from armid_ros.errors import ArmidError
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
-from armid_ros.robots.geometry import LinkShape, shapes_of
-from armid_ros.robots.sticks import sticks
+from armid_ros.robots.geometry import LinkShape, shapes_of, sticks
 from armid_ros.view.scene import joint_frames, poses, torques
 import numpy as np
 from scipy.spatial.transform import Rotation
