@@ -121,7 +121,7 @@ class Motion:
     ) -> Motion:
         """Return states as a motion, one a second; arrays of shape (N, n) or (n,), or numbers."""
         parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
-        return cls(joints, np.arange(len(parts[0]), dtype=float), *parts)
+        return cls(joints, np.arange(len(parts[0]), dtype=float), *map(np.array, parts))
 
     def __len__(self) -> int:
         """Return the number of samples N."""

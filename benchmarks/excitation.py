@@ -122,7 +122,7 @@ def humanoid(seed):
 
 def narrow(arm, problem, clearance, rng):
     """Draw a clear trajectory that spans 20 % of every joint's range about its middle."""
-    lower, upper = position_range(problem.limits)
+    lower, upper = position_range(problem.limits.lower, problem.limits.upper)
     while True:
         a, b = rng.normal(size=(2, len(lower), 3)) * np.arange(1, 4)
         raw = FourierTrajectory(problem.limits.joints, 20.0, np.zeros(len(lower)), a, b)
@@ -286,7 +286,7 @@ def figaroh(urdf, iterations, seed, out):
     arm = friction_arm(str(urdf))
     robot, limits, collision = arm.robot, Limits.of(arm.robot), collision_model(arm.robot)
     model = robot.model.copy()
-    model.lowerPositionLimit, model.upperPositionLimit = position_range(limits)
+    model.lowerPositionLimit, model.upperPositionLimit = position_range(limits.lower, limits.upper)
     model.velocityLimit, model.effortLimit = np.array(limits.velocity), np.array(limits.torque)
     wrapper = RobotWrapper(model, collision.geometry.copy(), collision.geometry.copy())
     wrapper.geom_model = wrapper.collision_model

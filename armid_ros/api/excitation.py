@@ -121,7 +121,7 @@ class ExcitationResult(Shown):
     @cached_property
     def start(self) -> FloatArray:
         """Return the pose that the run leaves from and returns to, shape (n,) [rad or m]."""
-        return self.planner.free_start()[0] if self.given_start is None else self.given_start
+        return self.planner.free_start() if self.given_start is None else self.given_start
 
     @cached_property
     def run(self) -> Run:
@@ -132,7 +132,7 @@ class ExcitationResult(Shown):
     @cached_property
     def fitness(self) -> Fitness:
         """Return the results of the checks of the run."""
-        return fitness(self.run, self.core.limits, self.scene)
+        return fitness(self.run.motion(), self.core.limits, self.scene)
 
     def document(self, origin: ResultOrigin = DEFAULT_ORIGIN) -> dict[str, Any]:
         """Return what excitation.json holds."""

@@ -31,7 +31,6 @@ from armid_ros.recording.anything import read_anything
 from armid_ros.recording.tables import is_table, TablePlan
 from armid_ros.robots import (
     driven_in_words,
-    inertia_doubts,
     load_robot,
     parse_gravity,
     Robot,
@@ -150,7 +149,8 @@ def open_robot(
     lines = driven_in_words(robot) if joints is None else ()
     if tell:
         notes = click.get_current_context().meta.setdefault(NOTES, [])
-        found = [visible(f'note: {line}') for line in (*lines, *inertia_doubts(robot))]
+        doubts = robot.description.inertia_doubts()
+        found = [visible(f'note: {line}') for line in (*lines, *doubts)]
         notes += [line for line in found if line not in notes]
     return robot
 

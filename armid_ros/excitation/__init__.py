@@ -32,19 +32,17 @@ from armid_ros.excitation.limits import (
 from armid_ros.excitation.pose_monitor import JointState, PoseMonitor
 from armid_ros.excitation.problem import DesignProblem
 from armid_ros.excitation.random_trajectory import random_feasible
-from armid_ros.excitation.rehearsal import Rehearsal, RehearsalReport
+from armid_ros.excitation.rehearsal import Rehearsal
 from armid_ros.excitation.run import plan_run, Run
 from armid_ros.excitation.scene import CollisionScene
 from armid_ros.excitation.schedule import Excitation
 from armid_ros.excitation.search.criteria import CRITERIA, Information
 from armid_ros.excitation.settings import DesignSettings, TARGETS, whole_period
-from armid_ros.excitation.supervision import held, jump_fault, MeasuredPose, slowed, tracking_fault
+from armid_ros.excitation.supervision import jump_fault, MeasuredPose, slowed, tracking_fault
 from armid_ros.excitation.transfer import Transfer, transfer_limits, TransferPlanner
 
 __all__ = [
     'Rehearsal',
-    'RehearsalReport',
-    'held',
     'Approach',
     'CRITERIA',
     'ClearanceModel',

@@ -229,11 +229,12 @@ def evaluate(
     settings = problem.settings
     if isinstance(excitation, FourierTrajectory):
         excitation = Excitation(excitation, settings.n_periods, settings.run_in)
-    trajectory = excitation.trajectory
-    information = problem.recorded(trajectory, excitation.n_periods)
+    information = problem.recorded(excitation.trajectory, excitation.n_periods)
+    as_wanted = settings.n_periods / excitation.n_periods * information.matrix
     if prior_information is not None:
         information = replace(information, matrix=information.matrix + prior_information)
-    cost = problem.cost(trajectory, prior_information)
+        as_wanted = as_wanted + prior_information
+    cost = problem.criterion.cost(as_wanted)
     described = problem.base.values(problem.arm.theta)
     return Design(
         excitation, information, described, problem.noise, cost, problem.limits, settings, stopped

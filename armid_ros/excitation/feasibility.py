@@ -10,8 +10,6 @@ two samples is added; the clearance is proven on every interval.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from armid_ros.arm import ArmModel
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
@@ -27,30 +25,14 @@ _DENSITY = 200
 _INTERVALS = 20
 
 
-@dataclass(frozen=True)
-class Faults:
-    """
-    What stands against running a trajectory.
+class Faults(tuple[Violation | Approach, ...]):
+    """What stands against running a trajectory: limits exceeded, and bodies too near."""
 
-    Attributes
-    ----------
-    violations : tuple of Violation
-        Limits exceeded.
-    approaches : tuple of Approach
-        Bodies too near each other.
-
-    """
-
-    violations: tuple[Violation, ...] = ()
-    approaches: tuple[Approach, ...] = ()
-
-    def __bool__(self) -> bool:
-        """Return whether there is any."""
-        return bool(self.violations or self.approaches)
+    __slots__ = ()
 
     def __str__(self) -> str:
         """List them all in a line."""
-        return '; '.join(map(str, (*self.violations, *self.approaches)))
+        return '; '.join(map(str, self))
 
 
 def trajectory_faults(
@@ -84,7 +66,7 @@ def trajectory_faults(
     times = np.linspace(0.0, trajectory.period, _INTERVALS * trajectory.harmonics + 1)
     _, acceleration, _ = trajectory.bounds()
     approach = clearance.first_fault(trajectory.motion, acceleration, times, margin)
-    return Faults(violations, () if approach is None else (approach,))
+    return Faults(violations if approach is None else (*violations, approach))
 
 
 def excitation_faults(arm: ArmModel, limits: Limits, excitation: Excitation) -> Faults:
@@ -100,7 +82,7 @@ def excitation_faults(arm: ArmModel, limits: Limits, excitation: Excitation) -> 
     for start in (0.0, excitation.duration - excitation.run_in):
         way = excitation.at(start + np.linspace(0.0, excitation.run_in, count + 1))
         violations += _violations(arm, limits, way, periodic=False)
-    return Faults(tuple(violations))
+    return Faults(violations)
 
 
 def _violations(
@@ -116,13 +98,9 @@ def _violations(
 
 
 def _outward(values: FloatArray, periodic: bool) -> FloatArray:
-    """
-    Move samples away from their mean by what a curve can gain between two of them.
-
-    A curve with second derivative below M leaves its samples by h^2 M / 8 at most; M is read off
-    the second differences, which jump where dry friction does: there nothing is added.
-
-    """
+    """Move samples away from their mean by what a curve can gain between two of them."""
+    # h^2 M / 8 at most with second derivatives below M, which is read off the second differences;
+    # these jump where dry friction does: there nothing is added
     if periodic:
         bend = np.roll(values, -1, axis=0) - 2.0 * values + np.roll(values, 1, axis=0)
     else:

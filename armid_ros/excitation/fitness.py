@@ -10,7 +10,6 @@ from armid_ros.excitation.geometry.clearance import Approach, ClearanceModel
 from armid_ros.excitation.geometry.floor import Floor
 from armid_ros.excitation.geometry.heights import lowest_point, LowestPoint
 from armid_ros.excitation.limits import Limits
-from armid_ros.excitation.run import Run
 from armid_ros.excitation.scene import CollisionScene
 from armid_ros.motion import Motion
 
@@ -73,13 +72,13 @@ class Fitness:
         return f'lowest point {abs(height):.3f} m {side} the {what} ({self.lowest.link})'
 
 
-def fitness(run: Run | Motion, limits: Limits, scene: CollisionScene) -> Fitness:
+def fitness(motion: Motion, limits: Limits, scene: CollisionScene) -> Fitness:
     """
     Look at a run that keeps its limits and its clearance.
 
     Parameters
     ----------
-    run : Run or Motion
+    motion : Motion
         From the first sample to the last.
     limits : Limits
         Limits in force.
@@ -87,7 +86,6 @@ def fitness(run: Run | Motion, limits: Limits, scene: CollisionScene) -> Fitness
         What it was kept clear of.
 
     """
-    motion = run.motion() if isinstance(run, Run) else run
     exempt = [link for o in scene.obstacles if o.kind == 'plane' for link in o.ignore]
     return Fitness(
         lowest_point(scene.collision, scene.floor.up, motion, exempt),

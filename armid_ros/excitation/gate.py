@@ -11,7 +11,7 @@ from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.geometry.paths import clear_line
 from armid_ros.excitation.limits import check_limits, Limits, SLOW_VELOCITY
 from armid_ros.excitation.run import Run
-from armid_ros.excitation.supervision import HANDOVER, held, slowed
+from armid_ros.excitation.supervision import HANDOVER, slowed
 from armid_ros.excitation.transfer import TransferPlanner
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -38,8 +38,6 @@ class MotionGate:
     ----------
     run : Run
         Run that was planned.
-    rate : float
-        Samples per second [Hz].
     limits : Limits
         Limits of the robot; the acceleration is that of the run where the run has more than a
         description without acceleration limits would allow.
@@ -53,14 +51,13 @@ class MotionGate:
     """
 
     run: Run
-    rate: float
     limits: Limits
     clearance: ClearanceModel | None
     margin: float
     effort: FloatArray
 
     @classmethod
-    def of(cls, run: Run, planner: TransferPlanner, rate: float) -> MotionGate:
+    def of(cls, run: Run, planner: TransferPlanner) -> MotionGate:
         """
         Check a run at all its samples, and return the gate for what follows it.
 
@@ -70,8 +67,6 @@ class MotionGate:
             What is to be sent.
         planner : TransferPlanner
             Arm, limits and bodies. Without limits none are checked.
-        rate : float
-            Samples per second [Hz].
 
         Raises
         ------
@@ -87,19 +82,14 @@ class MotionGate:
         none = np.full(robot.n_joints, np.inf)
         limits = Limits(robot.joints, robot.lower, robot.upper, none, none, none, robot.prismatic)
         if planner.limits is not None:
-            limits = Limits.of(
-                robot,
-                speed=1.0,
-                torque_fraction=1.0,
-                position_margin=0.0,
-                acceleration=planner.acceleration,
-            )
+            given = planner.acceleration
+            limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
         usual = np.maximum(limits.acceleration, 1.001 * peak)
-        given = np.isfinite(planner.given_acceleration)
-        limits = replace(limits, acceleration=np.where(given, limits.acceleration, usual))
+        fixed = np.isfinite(planner.given_acceleration)
+        limits = replace(limits, acceleration=np.where(fixed, limits.acceleration, usual))
         room = np.where(np.isfinite(robot.torque_limit), _LEAST_EFFORT * robot.torque_limit, 0.0)
         effort = np.maximum(np.abs(torque).max(axis=0), room)
-        gate = cls(run, rate, limits, planner.clearance, planner.margin, effort)
+        gate = cls(run, limits, planner.clearance, planner.margin, effort)
         violations = check_limits(limits, motion, torque) if planner.limits is not None else ()
         if violations:
             raise TrajectoryError(f'the run is not sent: {violations[0]}')
@@ -135,7 +125,7 @@ class MotionGate:
         """
         phase = float(np.clip(phase, 0.0, self.run.duration))
         for _ in range(_TRIES):
-            motion = slowed(self.run, phase, duration, self.rate)
+            motion = slowed(self.run, phase, duration, self.run.rate)
             if not check_limits(self.limits, motion):
                 break
             duration *= _LONGER
@@ -177,8 +167,8 @@ class MotionGate:
                 f'{near.first} and {near.second} would be {near.distance:.4f} m apart'
             )
         needed = max(self._time_of(step), HANDOVER)
-        motion = held(self.limits.joints, inside, HANDOVER)
-        return replace(motion, t=motion.t - motion.t[0] + needed)
+        t, still = needed + np.array([0.0, HANDOVER / 2.0]), np.zeros((2, len(step)))
+        return Motion(self.limits.joints, t, np.vstack([inside, inside]), still, still)
 
     def overload(self, effort: FloatArray, factor: float) -> str:
         """

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from armid_ros.errors import TrajectoryError
-from armid_ros.files import load_yaml, read_text, reading
+from armid_ros.files import finite, load_yaml, read_text, reading
 from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.robots import Robot
 import numpy as np
@@ -27,6 +27,9 @@ SLOW_VELOCITY = 0.5
 
 #: Share of the velocity and acceleration limits that a run of each speed class may use.
 SPEED_CLASSES = {'slow': 0.15, 'medium': 0.4, 'fast': 0.9}
+
+#: Share of the range of a joint that is kept free at each end, and of its torque.
+_POSITION_RESERVE, _TORQUE_RESERVE = 0.02, 0.1
 
 #: Positions and rates are compared with this relative slack, which is rounding.
 _ROUNDING = 1e-9
@@ -88,12 +91,11 @@ class Limits:
         robot: Robot,
         *,
         speed: str | float = 'fast',
-        torque_fraction: float = 0.9,
-        position_margin: float = 0.02,
+        reserve: bool = True,
         acceleration: npt.ArrayLike | None = None,
     ) -> Limits:
         """
-        Take the limits of a robot, with room to spare.
+        Take the limits of a robot, by default with room to spare.
 
         Parameters
         ----------
@@ -103,10 +105,9 @@ class Limits:
         speed : str or float
             'slow', 'medium' or 'fast', or the share of the velocity and acceleration limits that
             may be used.
-        torque_fraction : float
-            Share of the torque limits that may be used; the prior model is not exact.
-        position_margin : float
-            Distance to keep from every position limit, as a share of the joint's range.
+        reserve : bool
+            Whether a tenth of the torque limits is kept free, as the prior model is not exact,
+            and 2 % of the joint's range at every position limit.
         acceleration : array_like, shape (n,), optional
             Acceleration limits [rad/s^2 or m/s^2]. By default, and where one is NaN, a joint
             reaches its top speed in 0.25 s.
@@ -126,7 +127,7 @@ class Limits:
         if not 0.0 < share <= 1.0:
             raise TrajectoryError(f'speed: a share of the limits in (0, 1], not {share:g}')
         span = robot.upper - robot.lower
-        margin = position_margin * np.where(np.isfinite(span), span, 0.0)
+        margin = _POSITION_RESERVE * reserve * np.where(np.isfinite(span), span, 0.0)
         top = np.where(has_velocity_limit(robot), robot.velocity_limit, SLOW_VELOCITY)
         given = (
             np.full(robot.n_joints, np.nan) if acceleration is None else np.asarray(acceleration)
@@ -137,7 +138,7 @@ class Limits:
             upper=robot.upper - margin,
             velocity=share * top,
             acceleration=share * np.where(np.isnan(given), top / TIME_TO_TOP_SPEED, given),
-            torque=torque_fraction * robot.torque_limit,
+            torque=(1.0 - _TORQUE_RESERVE * reserve) * robot.torque_limit,
             prismatic=robot.prismatic,
         )
 
@@ -228,20 +229,15 @@ def check_limits(
             f'the motion has joints {", ".join(motion.joints)}, '
             f'but the limits are for {", ".join(limits.joints)}'
         )
-    torque = motion.tau if torque is None else torque
     slack = _ROUNDING * np.where(np.isfinite(limits.upper), np.abs(limits.upper) + 1.0, 1.0)
-    checks: list[tuple[str, str, FloatArray, FloatArray, FloatArray]] = [
-        ('lower position', 'position', motion.q, limits.lower, limits.lower - slack - motion.q),
-        ('upper position', 'position', motion.q, limits.upper, motion.q - limits.upper - slack),
+    checks = [
+        ('lower position', motion.q, limits.lower, limits.lower - slack - motion.q),
+        ('upper position', motion.q, limits.upper, motion.q - limits.upper - slack),
     ]
-    rates = [('velocity', motion.dq, limits.velocity)]
-    rates.append(('acceleration', motion.ddq, limits.acceleration))
-    if torque is not None:
-        rates.append(('torque', torque, limits.torque))
-    for name, values, bound in rates:
-        checks.append((name, name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
+    for name, values, bound in _rates(limits, motion, motion.tau if torque is None else torque):
+        checks.append((name, values, bound, np.abs(values) - (1.0 + _ROUNDING) * bound))
     found = []
-    for name, quantity, values, bound, excess in checks:
+    for name, values, bound, excess in checks:
         for j in np.flatnonzero((excess > 0.0).any(axis=0)):
             worst = int(excess[:, j].argmax())
             found.append(
@@ -252,10 +248,21 @@ def check_limits(
                     value=float(values[worst, j]),
                     bound=float(bound[j]),
                     samples=int(np.count_nonzero(excess[:, j] > 0.0)),
-                    unit=limits.unit(quantity, int(j)),
+                    unit=limits.unit(name.split()[-1], int(j)),
                 )
             )
     return tuple(found)
+
+
+def _rates(
+    limits: Limits, motion: Motion, torque: FloatArray | None
+) -> list[tuple[str, FloatArray, FloatArray]]:
+    """Return name, values and limits of what is limited either way."""
+    rates = [
+        ('velocity', motion.dq, limits.velocity),
+        ('acceleration', motion.ddq, limits.acceleration),
+    ]
+    return rates if torque is None else [*rates, ('torque', torque, limits.torque)]
 
 
 def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str, FloatArray]:
@@ -273,11 +280,7 @@ def used_shares(limits: Limits, motion: Motion, torque: FloatArray) -> dict[str,
     half = 0.5 * (limits.upper - limits.lower)
     middle = np.subtract(limits.upper, half, out=np.zeros_like(half), where=np.isfinite(half))
     shares = {'position': np.abs(motion.q - middle).max(axis=0) / half}
-    for name, values, bound in (
-        ('velocity', motion.dq, limits.velocity),
-        ('acceleration', motion.ddq, limits.acceleration),
-        ('torque', torque, limits.torque),
-    ):
+    for name, values, bound in _rates(limits, motion, torque):
         shares[name] = np.abs(values).max(axis=0) / bound
     return shares
 
@@ -336,7 +339,8 @@ def with_joint_limits(
             raise TrajectoryError(
                 f"velocity '{text}': write joint:=value for one of {', '.join(robot.joints)}"
             )
-        top[robot.joints.index(joint)] = _positive(number, f'velocity of joint {joint}')
+        with reading(f'joint {joint}', TrajectoryError):
+            top[robot.joints.index(joint)] = _positive(number, 'velocity')
     return replace(robot, velocity_limit=top), acceleration
 
 
@@ -346,50 +350,40 @@ def _with_file(robot: Robot, path: Path) -> tuple[Robot, FloatArray]:
         np.array(limit) for limit in (robot.velocity_limit, robot.lower, robot.upper)
     )
     acceleration = np.full(robot.n_joints, np.nan)
+    text = read_text(path, TrajectoryError)
     with reading(path, TrajectoryError):
-        document = load_yaml(read_text(path, TrajectoryError))
-    entries = document.get('joint_limits') if isinstance(document, dict) else None
-    if not isinstance(entries, dict):
-        raise TrajectoryError(f'{path}: no mapping joint_limits, as MoveIt has it')
-    if not entries.keys() & set(robot.joints):
-        raise TrajectoryError(f'{path}: no limits for any of {", ".join(robot.joints)}')
-    for j, joint in enumerate(robot.joints):
-        entry = {} if entries.get(joint) is None else entries[joint]
-        if not isinstance(entry, dict):
-            raise TrajectoryError(f'{path}: joint {joint}: no mapping of limits')
-        if entry.get('has_position_limits'):
-            ends = [
-                _number(entry.get(key), f'{path}: {joint}: {key}')
-                for key in ('min_position', 'max_position')
-            ]
-            lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
-            if not lower[j] < upper[j]:
-                raise TrajectoryError(
-                    f'{path}: {joint}: positions from {ends[0]:g} to {ends[1]:g} leave '
-                    f'nothing of {robot.lower[j]:g} to {robot.upper[j]:g} in the description'
-                )
-        if entry.get('has_velocity_limits'):
-            given = _positive(entry.get('max_velocity'), f'{path}: {joint}: max_velocity')
-            top[j] = min(top[j], given) if top[j] > 0.0 else given
-        if entry.get('has_acceleration_limits'):
-            acceleration[j] = _positive(
-                entry.get('max_acceleration'), f'{path}: {joint}: max_acceleration'
-            )
+        document = load_yaml(text)
+        entries = document.get('joint_limits') if isinstance(document, dict) else None
+        if not isinstance(entries, dict):
+            raise TrajectoryError('no mapping joint_limits, as MoveIt has it')
+        if not entries.keys() & set(robot.joints):
+            raise TrajectoryError(f'no limits for any of {", ".join(robot.joints)}')
+        for j, joint in enumerate(robot.joints):
+            entry = {} if entries.get(joint) is None else entries[joint]
+            if not isinstance(entry, dict):
+                raise TrajectoryError(f'joint {joint}: no mapping of limits')
+            if entry.get('has_position_limits'):
+                ends = [
+                    finite(entry.get(key), f'{joint}: {key}')
+                    for key in ('min_position', 'max_position')
+                ]
+                lower[j], upper[j] = max(lower[j], ends[0]), min(upper[j], ends[1])
+                if not lower[j] < upper[j]:
+                    raise TrajectoryError(
+                        f'{joint}: positions from {ends[0]:g} to {ends[1]:g} leave nothing of '
+                        f'{robot.lower[j]:g} to {robot.upper[j]:g} in the description'
+                    )
+            if entry.get('has_velocity_limits'):
+                given = _positive(entry.get('max_velocity'), f'{joint}: max_velocity')
+                top[j] = min(top[j], given) if top[j] > 0.0 else given
+            if entry.get('has_acceleration_limits'):
+                most = entry.get('max_acceleration')
+                acceleration[j] = _positive(most, f'{joint}: max_acceleration')
     return replace(robot, lower=lower, upper=upper, velocity_limit=top), acceleration
 
 
 def _positive(value: Any, where: str) -> float:
-    number = _number(value, where)
+    number = finite(value, where)
     if number <= 0.0:
-        raise TrajectoryError(f"{where} has to be a positive number, not '{value}'")
-    return number
-
-
-def _number(value: Any, where: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise TrajectoryError(f"{where} has to be a number, not '{value}'")
+        raise ValueError(f"{where} has to be a positive number, not '{value}'")
     return number

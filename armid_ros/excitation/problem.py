@@ -127,17 +127,10 @@ class DesignProblem:
 
     def recorded(self, trajectory: FourierTrajectory, n_periods: int) -> Information:
         """Return what a recording of a number of periods tells about the base parameters."""
-        count = _EXACT * self.settings.samples
-        motion = trajectory.with_margins(count)
-        rows = self.columns(motion).reshape(len(motion), -1)[MARGIN:-MARGIN]
-        w = rows.reshape(count * trajectory.n_joints, -1)[:, self.base.independent]
+        count, margin = _EXACT * self.settings.samples, MARGIN * trajectory.n_joints
+        columns = self.columns(trajectory.with_margins(count))[margin:-margin]
         weight = self.settings.rate * trajectory.period * n_periods / count
-        return Information(self.base.parameters, weight * (w.T @ w), self.scale)
-
-    def cost(self, trajectory: FourierTrajectory, prior: FloatArray | None = None) -> float:
-        """Return the cost of a trajectory, given prior information of shape (r, r)."""
-        matrix = self.recorded(trajectory, self.settings.n_periods).matrix
-        return self.criterion.cost(matrix if prior is None else matrix + prior)
+        return self._information(columns, weight)
 
     def information(self, motion: Motion, n_recorded: float | None = None) -> Information:
         """
@@ -151,8 +144,11 @@ class DesignProblem:
             Number of samples that will be recorded; by default those of the motion.
 
         """
-        w = self.columns(motion)[:, self.base.independent]
         weight = 1.0 if n_recorded is None else n_recorded / len(motion)
+        return self._information(self.columns(motion), weight)
+
+    def _information(self, columns: FloatArray, weight: float) -> Information:
+        w = columns[:, self.base.independent]
         return Information(self.base.parameters, weight * (w.T @ w), self.scale)
 
 
@@ -188,16 +184,12 @@ def _noise(arm: ArmModel, settings: DesignSettings) -> FloatArray:
     return np.asarray(NOISE_SHARE * np.where(finite, limit, fallback))
 
 
-def _key(effect: Effect) -> tuple[str, tuple[str, ...]]:
-    return effect.name, effect.joints
-
-
 def _joined(arm: ArmModel, rival: ArmModel) -> ArmModel:
     """Return the rival's effects and those it lacks, these last."""
-    known = {_key(effect) for effect in rival.effects}
+    known = {(effect.name, effect.joints) for effect in rival.effects}
     joined = replace(rival, robot=arm.robot)
     for effect, values in zip(arm.effects, arm.values, strict=True):
-        if _key(effect) not in known:
+        if (effect.name, effect.joints) not in known:
             joined = joined.with_effect(effect, values)
     return joined
 

@@ -12,7 +12,7 @@ from armid_ros.excitation.geometry.clearance import ClearanceModel
 from armid_ros.excitation.limits import Limits
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import CollisionModel
-from armid_ros.robots.robot import UNLIMITED_HALF_RANGE
+from armid_ros.robots.robot import position_range
 import numpy as np
 
 #: Trajectories drawn before the rest is looked for around single poses.
@@ -104,10 +104,9 @@ def feasible_pose(
         If there is none; names the limit of the joint, or the bodies, in the way.
 
     """
-    lower, upper = position_range(limits)
+    lower, upper = position_range(limits.lower, limits.upper)
     q = rng.uniform(lower, upper, (_POSES, len(lower)))
-    rest = np.zeros_like(q)
-    motion = Motion(limits.joints, np.arange(_POSES, dtype=float), q, rest, rest)
+    motion = Motion.of_states(limits.joints, q, 0.0, 0.0)
     load = np.abs(arm.joint_torque(motion)) / limits.torque
     for j in np.flatnonzero(load.min(axis=0) > 1.0):
         least = float(load[:, j].min() * limits.torque[j])
@@ -132,20 +131,12 @@ def feasible_pose(
     best = int(np.argmax(apart))
     if apart[best] <= margin:
         nearest = clearance.closest(motion.select(np.array([best])))
+        assert nearest is not None  # without pairs all is apart
         raise TrajectoryError(
             f'no pose keeps a clearance of {margin:g} m; in the best one '
             f'{nearest.first} and {nearest.second} are {nearest.distance:.4f} m apart'
-            if nearest
-            else 'no pose is clear'
         )
     return np.asarray(q[best])
-
-
-def position_range(limits: Limits) -> tuple[FloatArray, FloatArray]:
-    """Return the position limits, those of an unlimited joint half a turn either way."""
-    lower = np.where(np.isfinite(limits.lower), limits.lower, -UNLIMITED_HALF_RANGE)
-    upper = np.where(np.isfinite(limits.upper), limits.upper, UNLIMITED_HALF_RANGE)
-    return lower, upper
 
 
 def _draw(
@@ -162,7 +153,7 @@ def _draw(
     )
     motion = raw.one_period(_SAMPLES * harmonics)
     low, high = motion.q.min(axis=0), motion.q.max(axis=0)
-    lower, upper = position_range(limits)
+    lower, upper = position_range(limits.lower, limits.upper)
     largest = np.minimum.reduce(
         [
             (upper - lower) / (high - low),
@@ -185,24 +176,15 @@ def _shrunk(
     shrinks: int,
 ) -> FourierTrajectory | None:
     """Make a trajectory smaller about its centre until nothing is wrong with it."""
+
+    def clear(q: FloatArray) -> bool:
+        return clearance is None or bool(clearance.smallest(q, margin + 1e-6).min() > margin)
+
     for _ in range(shrinks):
-        if _looks_clear(trajectory, clearance, margin) and not trajectory_faults(
-            arm, limits, trajectory, clearance, margin
-        ):
-            return trajectory
+        # most trajectories that collide do so in a few samples
+        coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
+        if clear(trajectory.q0[np.newaxis]) and clear(coarse):
+            if not trajectory_faults(arm, limits, trajectory, clearance, margin):
+                return trajectory
         trajectory = trajectory.scaled(_SHRINK)
     return None
-
-
-def _looks_clear(
-    trajectory: FourierTrajectory, clearance: ClearanceModel | None, margin: float
-) -> bool:
-    """Look at a few samples, which most trajectories that collide do not pass."""
-    if clearance is None:
-        return True
-    centre = trajectory.q0[np.newaxis]
-    coarse = trajectory.one_period(_SAMPLES * trajectory.harmonics).q
-    return bool(
-        clearance.smallest(centre, reach=margin + 1e-6).min() > margin
-        and clearance.smallest(coarse, reach=margin + 1e-6).min() > margin
-    )

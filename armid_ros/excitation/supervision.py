@@ -195,22 +195,3 @@ def slowed(path: Path, phase: float, duration: float, rate: float) -> Motion:
         speed * motion.dq,
         speed**2 * motion.ddq + change * motion.dq,
     )
-
-
-def held(joints: tuple[str, ...], q: FloatArray, duration: float) -> Motion:
-    """
-    Return the motion of an arm that stays where it is.
-
-    Parameters
-    ----------
-    joints : tuple of str
-        n joint names.
-    q : ndarray, shape (n,)
-        Where it is [rad or m].
-    duration : float
-        How long [s].
-
-    """
-    t = np.array([min(HANDOVER, duration / 2.0), duration])
-    still = np.zeros((2, len(joints)))
-    return Motion(joints, t, np.vstack([q, q]), still, still)

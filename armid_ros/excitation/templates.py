@@ -78,21 +78,15 @@ class Template:
                 collision=clearance,
                 margin=CLEARANCE,
             )
-            trajectory = whole.scaled(self._factor(whole))
-            if trajectory is whole:
-                return whole
+            size = np.ptp(whole.one_period(40 * self.harmonics).q, axis=0) / 2.0
+            moving = [not self.joints or joint in self.joints for joint in whole.joints]
+            share = np.minimum(1.0, self.amplitude / np.maximum(size, 1e-9))
+            trajectory = whole.scaled(np.where(moving, share, 0.0))
             found = trajectory_faults(arm, limits, trajectory, clearance, CLEARANCE)
             if not found:
                 return trajectory
             faults = str(found)
         raise TrajectoryError(f'{self.name}: {faults}')
-
-    def _factor(self, trajectory: FourierTrajectory) -> np.ndarray:
-        """Return what is left of the amplitude of each joint, shape (n,)."""
-        motion = trajectory.one_period(40 * trajectory.harmonics)
-        size = np.maximum(np.ptp(motion.q, axis=0) / 2.0, 1e-9)
-        moving = [not self.joints or joint in self.joints for joint in trajectory.joints]
-        return np.where(moving, np.minimum(1.0, self.amplitude / size), 0.0)
 
 
 #: All joints together, slow to fast, and as quick as accelerations allow.

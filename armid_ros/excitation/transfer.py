@@ -65,9 +65,6 @@ class Transfer:
     def at(self, t: npt.ArrayLike) -> Motion:
         """Evaluate the way at times of shape (N,) [s]; at rest before its start and after it."""
         time = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        if len(self.t) == 1:
-            q = np.broadcast_to(self.q[0], (len(time), len(self.joints)))
-            return Motion(self.joints, time, q, np.zeros_like(q), np.zeros_like(q))
         k = np.clip(np.searchsorted(self.t, time, side='right') - 1, 0, len(self.t) - 2)
         span = np.diff(self.t)[k][:, np.newaxis]
         x = (time - self.t[k])[:, np.newaxis] / span
@@ -83,7 +80,7 @@ class Transfer:
     def lasting(self, duration: float) -> Transfer:
         """Return the same way in another time [s]."""
         if not self.duration > 0.0:
-            return replace(self, t=np.array([0.0, duration]), q=np.vstack([self.q, self.q]))
+            return replace(self, t=np.linspace(0.0, duration, len(self.t)))
         return replace(self, t=self.t * (duration / self.duration))
 
     def reversed(self) -> Transfer:
@@ -149,7 +146,9 @@ class TransferPlanner:
         joints = self.arm.robot.joints
         if self.limits is None:
             return Transfer(joints, np.array([0.0, shortest]), np.vstack([start, goal]))
-        start = self._within(start)
+        # a pose that is measured a little beyond a limit is put onto it
+        inside = np.clip(start, self.limits.lower, self.limits.upper)
+        start = np.where(np.abs(start - inside) <= _BEYOND, inside, start)
         for name, q in (('it would leave from', start), ('it would go to', goal)):
             fault = self.fault(q)
             if fault:
@@ -167,7 +166,7 @@ class TransferPlanner:
     def fault(self, q: FloatArray) -> str:
         """Say why an arm may not stand in a pose, shape (n,); empty where it may."""
         assert self.limits is not None
-        violations = check_limits(self.limits, _still(self.limits.joints, q[np.newaxis]))
+        violations = check_limits(self.limits, Motion.of_states(self.limits.joints, q, 0.0, 0.0))
         overload = self._overload(q[np.newaxis])
         if violations or overload:
             return '; '.join([*map(str, violations), *filter(None, [overload])])
@@ -179,16 +178,9 @@ class TransferPlanner:
             f'clearance of {self.margin:g} m'
         )
 
-    def free_start(self) -> tuple[FloatArray, str]:
+    def free_start(self) -> FloatArray:
         """
-        Return the zero of the description, or the pose nearest to it that is free.
-
-        Returns
-        -------
-        q : ndarray, shape (n,)
-            The pose [rad or m].
-        reason : str
-            What is wrong with zero; empty where the pose is zero.
+        Return the zero of the description, or the pose nearest to it that is free, shape (n,).
 
         Raises
         ------
@@ -200,7 +192,7 @@ class TransferPlanner:
         zero = self.arm.robot.zero_pose
         reason = self.fault(zero)
         if not reason:
-            return zero, ''
+            return zero
         rng = np.random.default_rng(_SEED)
         for distance in _DISTANCES:
             about = zero + distance * rng.uniform(-1.0, 1.0, (_NEARBY, len(zero)))
@@ -208,7 +200,7 @@ class TransferPlanner:
             about = about[np.argsort(np.linalg.norm(about - zero, axis=1))]
             for q in about:
                 if not self.fault(q):
-                    return self._simplified(q, zero), reason
+                    return self._simplified(q, zero)
         raise TrajectoryError(
             f'the zero of {self.arm.robot.name} is not free, nor is a pose about it: {reason}; '
             f'give a pose to start from, --start{self._always_near(about)}'
@@ -237,18 +229,12 @@ class TransferPlanner:
         rounded = np.where(q == zero, zero, np.round(q, _DIGITS))
         return q if self.fault(rounded) else rounded
 
-    def _within(self, q: FloatArray) -> FloatArray:
-        """Put a pose that is measured a little beyond a limit onto it."""
-        assert self.limits is not None
-        inside = np.clip(q, self.limits.lower, self.limits.upper)
-        return np.where(np.abs(q - inside) <= _BEYOND, inside, q)
-
     def _overload(self, q: FloatArray) -> str:
         """Say which joint cannot hold some of the poses, shape (N, n)."""
         assert self.limits is not None
         if not np.isfinite(self.limits.torque).any():
             return ''
-        torque = np.abs(self.arm.joint_torque(_still(self.limits.joints, q)))
+        torque = np.abs(self.arm.joint_torque(Motion.of_states(self.limits.joints, q, 0.0, 0.0)))
         excess = (torque - self.limits.torque).max(axis=0)
         worst = int(np.argmax(excess))
         if excess[worst] <= 0.0:
@@ -297,13 +283,7 @@ def transfer_limits(
         Acceleration limits [rad/s^2 or m/s^2].
 
     """
-    run = Limits.of(
-        robot,
-        speed=speed,
-        torque_fraction=1.0,
-        position_margin=0.0,
-        acceleration=acceleration,
-    )
+    run = Limits.of(robot, speed=speed, reserve=False, acceleration=acceleration)
     share = SPEED_CLASSES[speed] if isinstance(speed, str) else float(speed)
     slow = min(1.0, SPEED_CLASSES['slow'] / share)
     return replace(
@@ -313,8 +293,3 @@ def transfer_limits(
             run.acceleration, np.maximum(slow * run.acceleration, _SLOW_ACCELERATION)
         ),
     )
-
-
-def _still(joints: tuple[str, ...], q: FloatArray) -> Motion:
-    rest = np.zeros_like(q)
-    return Motion(joints, np.arange(len(q), dtype=float), q, rest, rest)

@@ -21,7 +21,7 @@ from armid_ros.identification import Identification, Score
 from armid_ros.inspection.inspect import Remark, worst_first
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
-from armid_ros.robots import driven_in_words, inertia_doubts, NO_MASS, Robot
+from armid_ros.robots import driven_in_words, NO_MASS, Robot
 from armid_ros.robots.geometry import collision_geometry
 import numpy as np
 
@@ -106,8 +106,8 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
         If a shape has no geometry, or a mesh cannot be read.
 
     """
-    found = [*(Remark('bad', text) for text in inertia_doubts(robot)), *_of_limits(robot)]
-    found += _of_shapes(robot)
+    found = [Remark('bad', text) for text in robot.description.inertia_doubts()]
+    found += [*_of_limits(robot), *_of_shapes(robot)]
     known = {remark.text for remark in found}
     notes = dict.fromkeys([*robot.notes, *driven_in_words(robot)])
     return worst_first([*found, *(Remark('note', note) for note in notes if note not in known)])

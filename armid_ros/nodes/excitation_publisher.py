@@ -211,7 +211,7 @@ class ExcitationPublisherNode(ArmidNode):
             shortest=self.value('approach'),
             back=False,
         )
-        gate = MotionGate.of(planned, self._planner, self._rate)
+        gate = MotionGate.of(planned, self._planner)
         motion = planned.motion()
         first = max(math.ceil(HANDOVER * self._rate), 1)  # the set point is not where the arm is
         message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
@@ -416,10 +416,10 @@ class ExcitationPublisherNode(ArmidNode):
     def _end_rehearsal(self, rehearsal: Rehearsal) -> None:
         """Say how the rehearsal went, and what to do next."""
         self._rehearsal = None
-        report = rehearsal.report()
+        report, surprises = rehearsal.report()
         speed = 100.0 * self.value('speed_scaling')
         advice = f'~/start runs it at {speed:.0f} % of its speed'
-        if report.surprises:
+        if surprises:
             self._say_trouble(f'rehearsed: {report}; look into it before ~/start')
         else:
             self._rehearsed = self.tell(f'rehearsed: {report}; {advice}')

@@ -18,7 +18,7 @@ from armid_ros.excitation.geometry.heights import outline
 from armid_ros.motion import FloatArray
 from armid_ros.report.page import Templated
 from armid_ros.robots import collision_model, CollisionModel, Robot
-from armid_ros.robots.sticks import sticks
+from armid_ros.robots.geometry import sticks
 import coal
 import numpy as np
 import pinocchio as pin

@@ -10,15 +10,19 @@ Robots: what a URDF says of an arm, and the robots that come with the package.
 """
 
 from armid_ros.robots.collision import collision_model, CollisionModel
-from armid_ros.robots.gravity import GRAVITIES, parse_gravity
 from armid_ros.robots.load import described_at, load_robot, robot_from_urdf
-from armid_ros.robots.mounting import Mounting, read_mounting
-from armid_ros.robots.robot import NO_MASS, PARAMETERS_PER_BODY, Robot
+from armid_ros.robots.mounting import read_mounting
+from armid_ros.robots.robot import (
+    GRAVITIES,
+    NO_MASS,
+    PARAMETERS_PER_BODY,
+    parse_gravity,
+    Robot,
+)
 from armid_ros.robots.selection import (
     driven_in_words,
     held_joints,
     HeldJoint,
-    inertia_doubts,
     joints_beside_arms,
     load_arms,
 )
@@ -29,7 +33,6 @@ __all__ = [
     'robot_from_urdf',
     'shipped_robots',
     'driven_in_words',
-    'inertia_doubts',
     'joints_beside_arms',
     'load_arms',
     'held_joints',
@@ -42,6 +45,5 @@ __all__ = [
     'GRAVITIES',
     'collision_model',
     'CollisionModel',
-    'Mounting',
     'read_mounting',
 ]

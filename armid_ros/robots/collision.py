@@ -10,7 +10,7 @@ from itertools import combinations
 from pathlib import Path
 
 from armid_ros.errors import RobotError
-from armid_ros.files import read_text
+from armid_ros.files import read_text, reading
 from armid_ros.robots.description import parse_xml
 from armid_ros.robots.geometry import collision_geometry
 from armid_ros.robots.robot import Robot
@@ -82,8 +82,11 @@ def collision_model(
 
     """
     geometry, missing = collision_geometry(robot, progress)
-    path = _find_srdf(robot)
-    disabled = _disabled_pairs(robot, path)
+    path, disabled = _find_srdf(robot), set[frozenset[str]]()
+    if path is not None:
+        with reading(path, RobotError):
+            elements = parse_xml(read_text(path, RobotError)).iter('disable_collisions')
+            disabled = {frozenset((e.get('link1', ''), e.get('link2', ''))) for e in elements}
     description = robot.description
     joined = {frozenset((joint.parent, joint.child)) for joint in description.joints}
     bodies, excluded = list(geometry.geometryObjects), set[frozenset[str]]()
@@ -121,13 +124,7 @@ def _leave_out_touching(robot: Robot, geometry: pin.GeometryModel) -> tuple[tupl
 
 
 def _leave_out_separate(robot: Robot, geometry: pin.GeometryModel) -> None:
-    """
-    Remove pairs that only one joint moves and that do not touch anywhere in its range.
-
-    A flange keeps the same small distance to the wrist that turns it, which would hide what
-    matters.
-
-    """
+    """Remove pairs that one joint moves and that never touch, as a flange and its wrist."""
     data, placed = robot.model.createData(), geometry.createData()
     by_joint: dict[int, list[int]] = {}
     for number, pair in enumerate(geometry.collisionPairs):
@@ -183,10 +180,3 @@ def _find_srdf(robot: Robot) -> Path | None:
         if len(present) == 1:
             return present[0]
     return None
-
-
-def _disabled_pairs(robot: Robot, path: Path | None) -> set[frozenset[str]]:
-    if path is None:
-        return set()
-    elements = parse_xml(read_text(path, RobotError), str(path)).iter('disable_collisions')
-    return {frozenset((e.get('link1', ''), e.get('link2', ''))) for e in elements}

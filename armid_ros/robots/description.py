@@ -105,13 +105,18 @@ class Description:
         """Joints with a degree of freedom."""
         return tuple(joint for joint in self.joints if joint.movable)
 
+    def inertia_doubts(self) -> tuple[str, ...]:
+        """Return one line for every link whose inertia no mass distribution has."""
+        doubts = {link: inertial.doubt() for link, inertial in self.links.items() if inertial}
+        return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
+
     @cached_property
     def by_name(self) -> Mapping[str, Joint]:
         """Joints by their name."""
         return {joint.name: joint for joint in self.joints}
 
 
-def parse_xml(text: str, source: str) -> ElementTree.Element:
+def parse_xml(text: str) -> ElementTree.Element:
     """
     Return the root element of a URDF; RobotError says the line where the XML is broken.
 
@@ -119,7 +124,7 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
 
     """
     if len(text) > TEXT_LIMIT:
-        raise RobotError(f'{source}: {len(text)} characters, which no description has')
+        raise RobotError(f'{len(text)} characters, which no description has')
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -127,19 +132,17 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
         parser.Parse(text, True)
         root = builder.close()
     except ValueError as error:  # an encoding that is not known, characters that are none
-        raise RobotError(f'{source}: malformed XML: {error}') from None
+        raise RobotError(f'malformed XML: {error}') from None
     except expat.ExpatError as error:
         reason = str(error).split(':')[0]
         raise RobotError(
-            f'{source}: malformed XML at line {error.lineno}, column {error.offset + 1}: {reason}'
+            f'malformed XML at line {error.lineno}, column {error.offset + 1}: {reason}'
         ) from None
     if root.tag != 'robot':
         hints = {'mujoco': 'an MJCF is loaded by its path'}
         hints['mujocoinclude'] = 'load the MJCF that includes it'
         hint = f'; {hints[root.tag]}' if root.tag in hints else ''
-        raise RobotError(
-            f'{source}: not a URDF: its root element is <{root.tag}>, not <robot>{hint}'
-        )
+        raise RobotError(f'not a URDF: its root element is <{root.tag}>, not <robot>{hint}')
     return root
 
 
@@ -147,7 +150,7 @@ def parse_xml(text: str, source: str) -> ElementTree.Element:
 GROUND = 'world'
 
 
-def parse_description(root: ElementTree.Element, source: str) -> Description:
+def parse_description(root: ElementTree.Element) -> Description:
     """
     Return the kinematic tree of a URDF.
 
@@ -159,63 +162,61 @@ def parse_description(root: ElementTree.Element, source: str) -> Description:
         joints), with the name of the link or joint.
 
     """
-    reader = _Reader(source)
+    notes: list[str] = []
     links: dict[str, Inertial | None] = {}
     for element in root.findall('link'):
-        name = reader.name(element, links)
-        links[name] = reader.inertial(element, name)
+        name = _name(element, links)
+        links[name] = _inertial(element, name)
     if not links:
-        raise RobotError(f'{source}: not a URDF: it has no links')
+        raise RobotError('not a URDF: it has no links')
     joints: dict[str, Joint] = {}
     for element in root.findall('joint'):
-        name = reader.name(element, joints)
-        joints[name] = reader.joint(element, name)
+        name = _name(element, joints)
+        joints[name] = _joint(element, name, notes)
     if GROUND not in links and any(joint.parent == GROUND for joint in joints.values()):
-        reader.notes.append(f"link '{GROUND}' is not in the file; taken as the ground")
+        notes.append(f"link '{GROUND}' is not in the file; taken as the ground")
         links = {GROUND: None, **links}
-    _check_tree(source, links, joints.values())
+    _check_tree(links, joints.values())
     return Description(
         name=root.get('name') or 'robot',
         links=links,
         joints=tuple(joints.values()),
-        notes=tuple(reader.notes),
+        notes=tuple(notes),
     )
 
 
-def _carriers(
-    source: str, links: dict[str, Inertial | None], joints: Iterable[Joint]
-) -> dict[str, Joint]:
+def _carriers(links: Iterable[str], joints: Iterable[Joint]) -> dict[str, Joint]:
     """Return the joint that carries each link; of a tree every link but the base has one."""
     carriers: dict[str, Joint] = {}
     for joint in joints:
         for role, link in (('parent', joint.parent), ('child', joint.child)):
             if link not in links:
                 raise RobotError(
-                    f"{source}: joint '{joint.name}' has the {role} link '{link}', which does "
+                    f"joint '{joint.name}' has the {role} link '{link}', which does "
                     f'not exist; links: {", ".join(links)}'
                 )
         if joint.child in carriers:
             raise RobotError(
-                f"{source}: link '{joint.child}' is the child of two joints, "
+                f"link '{joint.child}' is the child of two joints, "
                 f"'{carriers[joint.child].name}' and '{joint.name}'; a URDF is a tree"
             )
         carriers[joint.child] = joint
     return carriers
 
 
-def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable[Joint]) -> None:
-    carriers = _carriers(source, links, joints)
+def _check_tree(links: Iterable[str], joints: Iterable[Joint]) -> None:
+    carriers = _carriers(links, joints)
     roots = [link for link in links if link not in carriers]
     if len(roots) > 1:
         raise RobotError(
-            f'{source}: {len(roots)} links have no parent ({", ".join(roots)}); only the base may'
+            f'{len(roots)} links have no parent ({", ".join(roots)}); only the base may'
         )
     depth = dict.fromkeys(roots, 0)
     for link in links:
         path: dict[str, None] = {}
         while link not in depth:
             if link in path:
-                raise RobotError(f"{source}: link '{link}' is part of a closed loop of joints")
+                raise RobotError(f"link '{link}' is part of a closed loop of joints")
             path[link] = None
             link = carriers[link].parent
         for below, name in enumerate(reversed(path), start=depth[link] + 1):
@@ -223,193 +224,176 @@ def _check_tree(source: str, links: dict[str, Inertial | None], joints: Iterable
     deepest = max(depth, key=depth.__getitem__)
     if depth[deepest] > MAX_CHAIN:
         raise RobotError(
-            f"{source}: link '{deepest}' is {depth[deepest]} joints from the base; {MAX_CHAIN} "
-            'are the most'
+            f"link '{deepest}' is {depth[deepest]} joints from the base; {MAX_CHAIN} are the most"
         )
 
 
-class _Reader:
-    """Reads elements of one document; remembers its name and what it had to assume."""
+def _name(element: ElementTree.Element, taken: Iterable[str]) -> str:
+    name = element.get('name')
+    if not name:
+        raise RobotError(f'a <{element.tag}> has no name')
+    if name in taken:
+        raise RobotError(f"two {element.tag}s are named '{name}'")
+    return name
 
-    def __init__(self, source: str) -> None:
-        self.source = source
-        self.notes: list[str] = []
 
-    def name(self, element: ElementTree.Element, taken: Iterable[str]) -> str:
-        name = element.get('name')
-        if not name:
-            raise RobotError(f'{self.source}: a <{element.tag}> has no name')
-        if name in taken:
-            raise RobotError(f"{self.source}: two {element.tag}s are named '{name}'")
-        return name
-
-    def inertial(self, link: ElementTree.Element, name: str) -> Inertial | None:
-        element = link.find('inertial')
-        if element is None:
-            return None
-        where = f"link '{name}'"
-        mass, inertia = element.find('mass'), element.find('inertia')
-        if mass is None or inertia is None:
-            missing = 'mass' if mass is None else 'inertia'
-            raise RobotError(f'{self.source}: the <inertial> of {where} has no <{missing}>')
-        xyz, rpy = self.origin(element, where)
-        inertial = Inertial(
-            mass=self.number(mass, 'value', where),
-            xyz=xyz,
-            rpy=rpy,
-            inertia=(
-                self.number(inertia, 'ixx', where),
-                self.number(inertia, 'ixy', where, 0.0),
-                self.number(inertia, 'ixz', where, 0.0),
-                self.number(inertia, 'iyy', where),
-                self.number(inertia, 'iyz', where, 0.0),
-                self.number(inertia, 'izz', where),
-            ),
+def _inertial(link: ElementTree.Element, name: str) -> Inertial | None:
+    element = link.find('inertial')
+    if element is None:
+        return None
+    where = f"link '{name}'"
+    mass, inertia = element.find('mass'), element.find('inertia')
+    if mass is None or inertia is None:
+        missing = 'mass' if mass is None else 'inertia'
+        raise RobotError(f'the <inertial> of {where} has no <{missing}>')
+    xyz, rpy = _origin(element, where)
+    inertial = Inertial(
+        mass=_number(mass, 'value', where),
+        xyz=xyz,
+        rpy=rpy,
+        inertia=(
+            _number(inertia, 'ixx', where),
+            _number(inertia, 'ixy', where, 0.0),
+            _number(inertia, 'ixz', where, 0.0),
+            _number(inertia, 'iyy', where),
+            _number(inertia, 'iyz', where, 0.0),
+            _number(inertia, 'izz', where),
+        ),
+    )
+    if inertial.mass < 0.0:
+        raise RobotError(
+            f'{where} has a negative mass, {inertial.mass:g} kg; what comes '
+            'from an identification is a body with --physical'
         )
-        if inertial.mass < 0.0:
-            raise RobotError(
-                f'{self.source}: {where} has a negative mass, {inertial.mass:g} kg; what comes '
-                'from an identification is a body with --physical'
-            )
-        doubt = inertial.doubt()
-        if doubt:
-            self.notes.append(f'{where}: {doubt}')
-        return inertial
+    return inertial
 
-    def joint(self, element: ElementTree.Element, name: str) -> Joint:
-        where = f"joint '{name}'"
-        kind = element.get('type', '')
-        if kind not in KNOWN:
-            raise RobotError(
-                f"{self.source}: {where} has the type '{kind}'; types are {', '.join(KNOWN)}"
-            )
-        if kind in ('floating', 'planar'):
-            raise RobotError(
-                f'{self.source}: {where} is {kind}, but the base of an arm is fixed: make it '
-                f"type='fixed', or take the arm's own description"
-            )
-        xyz, rpy = self.origin(element, where)
-        lower, upper, velocity, effort = self.limits(element, kind, where)
-        dynamics = element.find('dynamics')
-        damping, friction, armature = (
-            0.0 if dynamics is None else self.number(dynamics, key, where, 0.0)
-            for key in ('damping', 'friction', 'armature')
+
+def _joint(element: ElementTree.Element, name: str, notes: list[str]) -> Joint:
+    where = f"joint '{name}'"
+    kind = element.get('type', '')
+    if kind not in KNOWN:
+        raise RobotError(f"{where} has the type '{kind}'; types are {', '.join(KNOWN)}")
+    if kind in ('floating', 'planar'):
+        raise RobotError(
+            f'{where} is {kind}, but the base of an arm is fixed: make it '
+            f"type='fixed', or take the arm's own description"
         )
-        return Joint(
-            name=name,
-            kind=kind,
-            parent=self.link(element, 'parent', where),
-            child=self.link(element, 'child', where),
-            xyz=xyz,
-            rpy=rpy,
-            axis=self.axis(element, where),
-            lower=lower,
-            upper=upper,
-            velocity=velocity,
-            effort=effort,
-            damping=damping,
-            friction=friction,
-            armature=armature,
-            mimic=self.mimic(element, where),
-        )
+    xyz, rpy = _origin(element, where)
+    lower, upper, velocity, effort = _limits(element, kind, where, notes)
+    mimic, followed = None, element.find('mimic')
+    if followed is not None:
+        multiplier = _number(followed, 'multiplier', where, 1.0)
+        offset = _number(followed, 'offset', where, 0.0)
+        mimic = Mimic(followed.get('joint', ''), multiplier, offset)
+    dynamics = element.find('dynamics')
+    damping, friction, armature = (
+        0.0 if dynamics is None else _number(dynamics, key, where, 0.0)
+        for key in ('damping', 'friction', 'armature')
+    )
+    return Joint(
+        name=name,
+        kind=kind,
+        parent=_link(element, 'parent', where),
+        child=_link(element, 'child', where),
+        xyz=xyz,
+        rpy=rpy,
+        axis=_axis(element, where),
+        lower=lower,
+        upper=upper,
+        velocity=velocity,
+        effort=effort,
+        damping=damping,
+        friction=friction,
+        armature=armature,
+        mimic=mimic,
+    )
 
-    def limits(
-        self, element: ElementTree.Element, kind: str, where: str
-    ) -> tuple[float, float, float, float]:
-        limit = element.find('limit')
-        if kind not in MOVABLE:
-            return -math.inf, math.inf, math.inf, math.inf
-        if limit is None:
-            if kind != 'continuous':
-                self.notes.append(f'{where}: no <limit>; taken as unlimited')
-            return -math.inf, math.inf, math.inf, math.inf
-        rates = []
-        for name in ('velocity', 'effort'):
-            rate = abs(self.number(limit, name, where, math.inf, endless=True))
-            if rate == 0.0:  # noqa: RUF069 - as described
-                self.notes.append(f'{where}: {name} limit 0; taken as not given')
-                rate = math.inf
-            rates.append(rate)
-        if kind == 'continuous':
-            return -math.inf, math.inf, rates[0], rates[1]
-        lower = self.number(limit, 'lower', where, 0.0, endless=True)
-        upper = self.number(limit, 'upper', where, 0.0, endless=True)
-        if lower > upper:
-            raise RobotError(
-                f'{self.source}: {where} has its lower limit {lower:g} above the upper {upper:g}'
-            )
-        if lower == upper:
-            self.notes.append(f'{where}: no range of motion in <limit>; taken as unlimited')
-            lower, upper = -math.inf, math.inf
-        return lower, upper, rates[0], rates[1]
 
-    def mimic(self, element: ElementTree.Element, where: str) -> Mimic | None:
-        mimic = element.find('mimic')
-        if mimic is None:
-            return None
-        return Mimic(
-            joint=mimic.get('joint', ''),
-            multiplier=self.number(mimic, 'multiplier', where, 1.0),
-            offset=self.number(mimic, 'offset', where, 0.0),
-        )
+def _limits(
+    element: ElementTree.Element, kind: str, where: str, notes: list[str]
+) -> tuple[float, float, float, float]:
+    limit = element.find('limit')
+    if kind not in MOVABLE or limit is None:
+        if kind in ('revolute', 'prismatic'):
+            notes.append(f'{where}: no <limit>; taken as unlimited')
+        return -math.inf, math.inf, math.inf, math.inf
+    rates = []
+    for name in ('velocity', 'effort'):
+        rate = abs(_number(limit, name, where, math.inf, endless=True))
+        if rate == 0.0:  # noqa: RUF069 - as described
+            notes.append(f'{where}: {name} limit 0; taken as not given')
+            rate = math.inf
+        rates.append(rate)
+    if kind == 'continuous':
+        return -math.inf, math.inf, rates[0], rates[1]
+    lower = _number(limit, 'lower', where, 0.0, endless=True)
+    upper = _number(limit, 'upper', where, 0.0, endless=True)
+    if lower > upper:
+        raise RobotError(f'{where} has its lower limit {lower:g} above the upper {upper:g}')
+    if lower == upper:
+        notes.append(f'{where}: no range of motion in <limit>; taken as unlimited')
+        lower, upper = -math.inf, math.inf
+    return lower, upper, rates[0], rates[1]
 
-    def link(self, element: ElementTree.Element, role: str, where: str) -> str:
-        reference = element.find(role)
-        link = None if reference is None else reference.get('link')
-        if not link:
-            raise RobotError(f'{self.source}: {where} has no {role} link')
-        return link
 
-    def axis(self, element: ElementTree.Element, where: str) -> Vector:
-        axis = element.find('axis')
-        x, y, z = (1.0, 0.0, 0.0) if axis is None else self.vector(axis, 'xyz', where)
-        length = math.hypot(x, y, z)
-        if length < SHORTEST_AXIS:
-            if element.get('type') in MOVABLE:
-                raise RobotError(f'{self.source}: the axis of {where} has no direction')
-            return (1.0, 0.0, 0.0)
-        return (x / length, y / length, z / length)
+def _link(element: ElementTree.Element, role: str, where: str) -> str:
+    reference = element.find(role)
+    link = None if reference is None else reference.get('link')
+    if not link:
+        raise RobotError(f'{where} has no {role} link')
+    return link
 
-    def origin(self, element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
-        origin = element.find('origin')
-        if origin is None:
-            return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        return self.vector(origin, 'xyz', where), self.vector(origin, 'rpy', where)
 
-    def vector(self, element: ElementTree.Element, name: str, where: str) -> Vector:
-        """Return three numbers that arithmetic bears, zero where there are none."""
-        text = element.get(name, '0 0 0')
-        said = f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is"
-        try:
-            x, y, z = (float(number) for number in text.split())
-        except ValueError:
-            x = y = z = math.nan
-        if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-            raise RobotError(f'{said} not three finite numbers')
-        if max(abs(x), abs(y), abs(z)) > LARGEST:
-            raise RobotError(f'{said} beyond {LARGEST:g}')
-        return x, y, z
+def _axis(element: ElementTree.Element, where: str) -> Vector:
+    axis = element.find('axis')
+    x, y, z = (1.0, 0.0, 0.0) if axis is None else _vector(axis, 'xyz', where)
+    length = math.hypot(x, y, z)
+    if length < SHORTEST_AXIS:
+        if element.get('type') in MOVABLE:
+            raise RobotError(f'the axis of {where} has no direction')
+        return (1.0, 0.0, 0.0)
+    return (x / length, y / length, z / length)
 
-    def number(
-        self,
-        element: ElementTree.Element,
-        name: str,
-        where: str,
-        default: float | None = None,
-        *,
-        endless: bool = False,
-    ) -> float:
-        """Return a number that arithmetic bears; only limits may be infinite."""
-        text = element.get(name, '' if default is None else repr(default))
-        said = f"{self.source}: {where}: {name}='{text}' of <{element.tag}> is"
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
-        if math.isnan(number):
-            raise RobotError(f'{said} no number')
-        if not endless and abs(number) > LARGEST:
-            raise RobotError(
-                f'{said} {"not finite" if math.isinf(number) else f"beyond {LARGEST:g}"}'
-            )
-        return number
+
+def _origin(element: ElementTree.Element, where: str) -> tuple[Vector, Vector]:
+    origin = element.find('origin')
+    if origin is None:
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    return _vector(origin, 'xyz', where), _vector(origin, 'rpy', where)
+
+
+def _vector(element: ElementTree.Element, name: str, where: str) -> Vector:
+    """Return three numbers that arithmetic bears, zero where there are none."""
+    text = element.get(name, '0 0 0')
+    said = f"{where}: {name}='{text}' of <{element.tag}> is"
+    try:
+        x, y, z = (float(number) for number in text.split())
+    except ValueError:
+        x = y = z = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise RobotError(f'{said} not three finite numbers')
+    if max(abs(x), abs(y), abs(z)) > LARGEST:
+        raise RobotError(f'{said} beyond {LARGEST:g}')
+    return x, y, z
+
+
+def _number(
+    element: ElementTree.Element,
+    name: str,
+    where: str,
+    default: float | None = None,
+    *,
+    endless: bool = False,
+) -> float:
+    """Return a number that arithmetic bears; only limits may be infinite."""
+    text = element.get(name, '' if default is None else repr(default))
+    said = f"{where}: {name}='{text}' of <{element.tag}> is"
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if math.isnan(number):
+        raise RobotError(f'{said} no number')
+    if not endless and abs(number) > LARGEST:
+        raise RobotError(f'{said} {"not finite" if math.isinf(number) else f"beyond {LARGEST:g}"}')
+    return number

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 from xml.etree import ElementTree
 
 from armid_ros.errors import RobotError
+from armid_ros.motion import FloatArray
 from armid_ros.robots.description import parse_xml
 from armid_ros.robots.meshes import convex_bodies, find_mesh
 from armid_ros.robots.robot import Robot
@@ -17,6 +18,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+#: Without bodies, the last link is drawn to this many times the distance of its centre of mass.
+_BEYOND = 2.0
 _Meshes = dict[tuple[Path, tuple[float, ...]], tuple[coal.CollisionGeometry, ...]]
 #: Attributes of each kind of shape, and the default of those that have one.
 _SIZES = {
@@ -94,7 +97,7 @@ def shapes_of(
         for index, frame in enumerate(robot.model.frames)
         if frame.type == pin.FrameType.BODY
     }
-    links = parse_xml(robot.urdf, robot.name).findall('link')
+    links = parse_xml(robot.urdf).findall('link')
     for done, link in enumerate(links):
         if progress is not None:
             progress(done / len(links))
@@ -154,6 +157,24 @@ def collision_geometry(
             place = shape.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))
             geometry.addGeometryObject(pin.GeometryObject(name, joint, shape.frame, place, body))
     return geometry, notes
+
+
+def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
+    """
+    Return lines that begin at joints: index of the joint in the model, and the end in its frame.
+
+    A line ends at a joint that the body carries; that of a last body beyond its centre of mass.
+    Index 0 is the base.
+
+    """
+    lines = []
+    for joint in range(model.njoints):
+        carried = [k for k in range(1, model.njoints) if int(model.parents[k]) == joint]
+        ends = [np.array(model.jointPlacements[k].translation) for k in carried]
+        if joint and not ends:
+            ends = [_BEYOND * np.array(model.inertias[joint].lever)]
+        lines += [(joint, end) for end in ends]
+    return lines
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:

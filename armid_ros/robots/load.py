@@ -17,9 +17,8 @@ from armid_ros.errors import meant, RobotError
 from armid_ros.files import read_text, reading
 from armid_ros.motion import FloatArray
 from armid_ros.robots.description import Description, Joint, parse_description, parse_xml, Vector
-from armid_ros.robots.gravity import parse_gravity
 from armid_ros.robots.mjcf import is_mjcf, urdf_of_mjcf
-from armid_ros.robots.robot import Robot
+from armid_ros.robots.robot import parse_gravity, Robot
 from armid_ros.robots.selection import driven_joints, several_arms, standing_position
 from armid_ros.robots.shipped import shipped_path, shipped_robots
 from armid_ros.robots.xacro_expansion import expand_xacro
@@ -139,9 +138,9 @@ def robot_from_urdf(
 
     """
     with reading(source, RobotError):
-        description = parse_description(parse_xml(text, source), source)
-        driven = driven_joints(description, joints, source)
-        model, locked = _kinematic_model(description, driven, source, {})
+        description = parse_description(parse_xml(text))
+        driven = driven_joints(description, joints)
+        model, locked = _kinematic_model(description, driven, {})
     model.gravity = pin.Motion(parse_gravity(gravity), np.zeros(3))
     by_name = {joint.name: joint for joint in driven}
     driven = tuple(by_name[name] for name in list(model.names)[1:])
@@ -161,7 +160,12 @@ def robot_from_urdf(
         urdf_damping=np.array([joint.damping for joint in driven]),
         urdf_friction=np.array([joint.friction for joint in driven]),
         urdf_armature=np.array([joint.armature for joint in driven]),
-        notes=description.notes + locked + several_arms(description, driven),
+        notes=(
+            *description.inertia_doubts(),
+            *description.notes,
+            *locked,
+            *several_arms(description, driven),
+        ),
         path=path,
     )
     if not np.isfinite(robot.rigid_parameters).all():
@@ -204,15 +208,12 @@ def described_at(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """
     description = robot.description
     driven = [description.by_name[joint] for joint in robot.joints]
-    model, _ = _kinematic_model(description, driven, robot.name, positions)
+    model, _ = _kinematic_model(description, driven, positions)
     return replace(robot, model=model).with_gravity(robot.gravity)
 
 
 def _kinematic_model(
-    description: Description,
-    driven: Sequence[Joint],
-    source: str,
-    known: Mapping[str, float],
+    description: Description, driven: Sequence[Joint], known: Mapping[str, float]
 ) -> tuple[pin.Model, tuple[str, ...]]:
     """Build the model of the driven joints; also say where the others are locked."""
     moving = {joint.name for joint in driven}
@@ -224,7 +225,7 @@ def _kinematic_model(
     try:
         model = pin.buildModelFromXML(_kinematic_urdf(description, positions))
     except (RuntimeError, ValueError) as error:
-        raise RobotError(f'{source}: {" ".join(str(error).split())}') from error
+        raise RobotError(' '.join(str(error).split())) from error
     notes = tuple(
         f"joint '{name}': not driven, locked at {position:g} {description.by_name[name].unit}"
         for name, position in positions.items()
@@ -233,13 +234,7 @@ def _kinematic_model(
 
 
 def _kinematic_urdf(description: Description, positions: Mapping[str, float]) -> str:
-    """
-    Write the description as Pinocchio is to see it, some joints locked at given positions.
-
-    Continuous joints become revolute ones, so that nq == nv; limits, meshes, friction and
-    whatever else a URDF may hold stay out: the model has none, or they are read elsewhere.
-
-    """
+    """Write what Pinocchio needs, joints at positions locked, continuous ones as revolute."""
     root = ElementTree.Element('robot', name=description.name)
     for name, inertial in description.links.items():
         link = ElementTree.SubElement(root, 'link', name=name)

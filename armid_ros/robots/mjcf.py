@@ -104,12 +104,8 @@ class _Writer:
     def __init__(self, mujoco: ModuleType, model: Any, path: Path, notes: list[str]) -> None:
         self.mujoco, self.model, self.path, self.notes = mujoco, model, path, notes
         self.root = ElementTree.Element('robot', name=model.names.split(b'\0')[0].decode())
-        kinds = mujoco.mjtObj
-        self.bodies = _names(model.nbody, 'body', lambda k: self._name(kinds.mjOBJ_BODY, k))
-        self.joints = _names(model.njnt, 'joint', lambda k: self._name(kinds.mjOBJ_JOINT, k))
-
-    def _name(self, kind: Any, number: int) -> str:
-        return str(self.mujoco.mj_id2name(self.model, kind, number) or '')
+        self.bodies = _names('body', [model.body(k).name for k in range(model.nbody)])
+        self.joints = _names('joint', [model.joint(k).name for k in range(model.njnt)])
 
     def urdf(self) -> ElementTree.Element:
         """Return the URDF of all bodies that do not float."""
@@ -302,9 +298,8 @@ class _Writer:
             self.notes.append(f'not read: {found}')
 
 
-def _names(count: int, kind: str, name: Any) -> list[str]:
+def _names(kind: str, given: list[str]) -> list[str]:
     """Return names, of those that have none the kind and number."""
-    given = [name(number) for number in range(count)]
     return [one or _unused(f'{kind}_{number}', given) for number, one in enumerate(given)]
 
 

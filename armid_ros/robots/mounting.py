@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 import math
 from pathlib import Path
 
@@ -16,27 +15,16 @@ from armid_ros.robots.robot import Robot
 SUFFIX = '.mounting.yaml'
 
 
-@dataclass(frozen=True)
-class Mounting:
+def read_mounting(robot: Robot) -> tuple[float | None, Path] | None:
     """
-    Where a robot stands.
+    Read NAME.mounting.yaml beside the description of a robot; None where there is none.
 
-    Attributes
-    ----------
+    Returns
+    -------
     floor : float or None
         Height of the floor above the origin of the base [m]; None: there is none within reach.
     path : Path
         The file that says so.
-
-    """
-
-    floor: float | None
-    path: Path
-
-
-def read_mounting(robot: Robot) -> Mounting | None:
-    """
-    Read NAME.mounting.yaml beside the description of a robot; None where there is none.
 
     Raises
     ------
@@ -54,7 +42,7 @@ def read_mounting(robot: Robot) -> Mounting | None:
         content = load_yaml(read_text(path, RobotError))
     floor = content.get('floor') if isinstance(content, dict) else None
     if floor == 'none':
-        return Mounting(None, path)
+        return None, path
     if isinstance(floor, bool) or not isinstance(floor, int | float) or not math.isfinite(floor):
         raise RobotError(f'{path}: has to say floor: HEIGHT [m], or floor: none')
-    return Mounting(float(floor), path)
+    return float(floor), path

@@ -12,11 +12,11 @@ from pathlib import Path
 from armid_ros.errors import RobotError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots.description import Description, parse_description, parse_xml
-from armid_ros.robots.joint_geometry import JointGeometry
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+GRAVITIES = {'earth': (0.0, 0.0, -9.81), 'moon': (0.0, 0.0, -1.62)}
 PARAMETERS_PER_BODY = 10
 
 #: A mass below this is the rounding of zero [kg], and so is a first moment below this [kg m]. Each
@@ -134,7 +134,7 @@ class Robot:
     @cached_property
     def description(self) -> Description:
         """Links and joints of the URDF, driven or not."""
-        return parse_description(parse_xml(self.urdf, self.name), self.name)
+        return parse_description(parse_xml(self.urdf))
 
     @cached_property
     def geometry(self) -> tuple[JointGeometry, ...]:
@@ -191,10 +191,7 @@ class Robot:
 
     def position_range(self) -> tuple[FloatArray, FloatArray]:
         """Return the position limits, shape (n,); `UNLIMITED_HALF_RANGE` where there is none."""
-        return (
-            np.where(np.isfinite(self.lower), self.lower, -UNLIMITED_HALF_RANGE),
-            np.where(np.isfinite(self.upper), self.upper, UNLIMITED_HALF_RANGE),
-        )
+        return position_range(self.lower, self.upper)
 
     def index(self, joint: str) -> int:
         """Return the position of a driven joint; RobotError lists those that exist."""
@@ -208,11 +205,8 @@ class Robot:
 
     def with_gravity(self, vector: Sequence[float] | FloatArray) -> Robot:
         """Return the robot in another gravity, shape (3,) [m/s^2] in the base frame."""
-        gravity = np.asarray(vector, dtype=np.float64)
-        if gravity.shape != (3,) or not np.all(np.isfinite(gravity)):
-            raise RobotError(f'gravity has to be three finite numbers [m/s^2], not {vector!r}')
         model = self.model.copy()
-        model.gravity = pin.Motion(gravity, np.zeros(3))
+        model.gravity = pin.Motion(parse_gravity(vector), np.zeros(3))
         return replace(self, model=model)
 
     def with_inertias(self, parameters: npt.ArrayLike) -> Robot:
@@ -242,6 +236,97 @@ class Robot:
         for body, values in enumerate(pi.reshape(self.n_joints, PARAMETERS_PER_BODY)):
             model.inertias[body + 1] = _inertia(f"{place}: link '{self.links[body]}'", values)
         return replace(self, model=model)
+
+
+@dataclass(frozen=True, eq=False)
+class JointGeometry:
+    """
+    A joint of one degree of freedom.
+
+    Attributes
+    ----------
+    parent : int
+        Number of the joint that moves the link it is on; -1 for the base.
+    movers : tuple of int
+        The joints that move its link, from the base on.
+    slide, turn : ndarray, shape (3,)
+        What it does to its link per unit, in the link's frame: translation and rotation.
+    origin, sliding : ndarray, shape (3,)
+        Where it is on the link before at zero [m], and where it slides per unit.
+    turning : ndarray, shape (3, 3, 3)
+        Rotation of the link on the link before: this times (1, sin q, 1 - cos q).
+
+    """
+
+    parent: int
+    movers: tuple[int, ...]
+    slide: FloatArray
+    turn: FloatArray
+    origin: FloatArray
+    sliding: FloatArray
+    turning: FloatArray
+
+    @classmethod
+    def of(cls, model: pin.Model, number: int) -> JointGeometry:
+        """Look up a joint of a model."""
+        joint, placement = model.joints[number + 1], model.jointPlacements[number + 1]
+        data = joint.createData()
+        joint.calc(data, np.zeros(joint.nq))
+        motion = np.asarray(data.S).ravel()
+        cross = pin.skew(motion[3:])
+        rotation = np.array(placement.rotation)
+        return cls(
+            int(model.parents[number + 1]) - 1,
+            tuple(int(above) - 1 for above in model.supports[number + 1] if above > 0),
+            motion[:3],
+            motion[3:],
+            np.array(placement.translation),
+            rotation @ motion[:3],
+            np.stack([rotation, rotation @ cross, rotation @ cross @ cross], axis=2),
+        )
+
+
+def position_range(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position limits, those of an unlimited joint `UNLIMITED_HALF_RANGE` either way."""
+    return (
+        np.where(np.isfinite(lower), lower, -UNLIMITED_HALF_RANGE),
+        np.where(np.isfinite(upper), upper, UNLIMITED_HALF_RANGE),
+    )
+
+
+def parse_gravity(value: str | Sequence[float] | FloatArray) -> FloatArray:
+    """
+    Return the gravity vector that a name, a string 'x,y,z' or three numbers stand for.
+
+    Parameters
+    ----------
+    value : str or array_like, shape (3,)
+        'earth', 'moon', 'x,y,z' or the vector itself [m/s^2], in the robot's base frame.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Acceleration of gravity [m/s^2], read-only.
+
+    Raises
+    ------
+    RobotError
+        If it is neither a known name nor three finite numbers.
+
+    """
+    if isinstance(value, str) and value.strip().lower() in GRAVITIES:
+        return read_only(GRAVITIES[value.strip().lower()])
+    try:
+        numbers = value.split(',') if isinstance(value, str) else value
+        vector = np.array([float(number) for number in numbers])
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        raise RobotError(
+            f'gravity {value!r} is neither {" nor ".join(GRAVITIES)} nor three numbers x,y,z '
+            f'[m/s^2], such as 0,0,-9.81'
+        )
+    return read_only(vector)
 
 
 def _inertia(place: str, values: FloatArray) -> pin.Inertia:

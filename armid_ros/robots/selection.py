@@ -47,9 +47,7 @@ class HeldJoint:
     carries: tuple[str, ...]
 
 
-def driven_joints(
-    description: Description, names: Sequence[str] | None, source: str
-) -> tuple[Joint, ...]:
+def driven_joints(description: Description, names: Sequence[str] | None) -> tuple[Joint, ...]:
     """
     Return the driven joints: those named, or all but the gripper's.
 
@@ -64,20 +62,20 @@ def driven_joints(
         message lists the joints that could be named.
 
     """
-    chosen = _by_default(description) if names is None else _by_name(description, names, source)
+    chosen = _by_default(description) if names is None else _by_name(description, names)
     followers = {joint.mimic.joint: joint for joint in description.joints if joint.mimic}
     for joint in chosen:
         if joint.name in followers:
             raise RobotError(
-                f"{source}: joint '{followers[joint.name].name}' mimics the driven joint "
+                f"joint '{followers[joint.name].name}' mimics the driven joint "
                 f"'{joint.name}'; coupled mechanisms are not supported: leave '{joint.name}' out "
                 f"of the driven joints, or make '{followers[joint.name].name}' fixed"
             )
     if not chosen:
-        raise RobotError(f'{source}: no joint can be driven; a robot needs one at least')
+        raise RobotError('no joint can be driven; a robot needs one at least')
     if len(chosen) > MAX_DRIVEN:
         raise RobotError(
-            f'{source}: {len(chosen)} joints are driven; {MAX_DRIVEN} are the most that can be '
+            f'{len(chosen)} joints are driven; {MAX_DRIVEN} are the most that can be '
             'identified together: name those of one arm with --joints'
         )
     return chosen
@@ -93,13 +91,7 @@ def several_arms(description: Description, driven: Sequence[Joint]) -> tuple[str
 
 
 def _arms(description: Description, joints: Sequence[str]) -> list[list[str]]:
-    """
-    Return the arms among driven joints, each from its first joint to its tip.
-
-    A limb is a chain of driven joints up to a tip, after the last fork. Limbs of fewer than
-    `SHORTEST_ARM` joints are no arms, nor are joints that carry several arms.
-
-    """
+    """Return the arms among driven joints: chains from the last fork to a tip, not too short."""
     carriers = {name: _carriers(description, [description.by_name[name]]) for name in joints}
     kept = list(joints)
     while kept:
@@ -127,16 +119,6 @@ def driven_in_words(robot: Robot) -> tuple[str, ...]:
     more = f' and {len(locked) - _NAMED} more' if len(locked) > _NAMED else ''
     named = ', '.join(locked[:_NAMED])
     return (f'not driven, and locked: {named}{more}; --joints A,B,... chooses others', *arms)
-
-
-def inertia_doubts(robot: Robot) -> tuple[str, ...]:
-    """Return one line for every link whose described inertia no mass distribution has."""
-    doubts = {
-        link: inertial.doubt()
-        for link, inertial in robot.description.links.items()
-        if inertial is not None
-    }
-    return tuple(f"link '{link}': {doubt}" for link, doubt in doubts.items() if doubt)
 
 
 def joints_beside_arms(robot: Robot) -> tuple[str, ...]:
@@ -196,24 +178,22 @@ def standing_position(description: Description, joint: Joint, known: Mapping[str
     return multiplier * position + offset
 
 
-def _by_name(description: Description, names: Sequence[str], source: str) -> tuple[Joint, ...]:
+def _by_name(description: Description, names: Sequence[str]) -> tuple[Joint, ...]:
     known, named = description.by_name, set[str]()
     free = ', '.join(joint.name for joint in description.movable() if not joint.mimic)
     for name in names:
         if name not in known:
             raise RobotError(
-                f"{source}: no joint is named '{name}'; joints to drive: {free}"
-                f'{meant(name, known)}'
+                f"no joint is named '{name}'; joints to drive: {free}{meant(name, known)}"
             )
         if not known[name].movable:
-            raise RobotError(f"{source}: joint '{name}' is fixed; joints to drive: {free}")
+            raise RobotError(f"joint '{name}' is fixed; joints to drive: {free}")
         if known[name].mimic:
             raise RobotError(
-                f"{source}: joint '{name}' mimics another one and cannot be driven; "
-                f'joints to drive: {free}'
+                f"joint '{name}' mimics another one and cannot be driven; joints to drive: {free}"
             )
         if name in named:
-            raise RobotError(f"{source}: joint '{name}' is named twice among the driven joints")
+            raise RobotError(f"joint '{name}' is named twice among the driven joints")
         named.add(name)
     return tuple(joint for joint in description.joints if joint.name in named)
 

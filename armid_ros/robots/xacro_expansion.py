@@ -22,7 +22,6 @@ import sys
 from typing import Any
 
 from armid_ros.errors import RobotError
-from armid_ros.files.regular import TEXT_LIMIT
 
 #: Processor time that an expansion may take [s]; the largest descriptions take one or two.
 TIME_LIMIT = 20.0
@@ -57,7 +56,6 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
         'packages': dict(packages),
         'seconds': TIME_LIMIT,
         'memory': MEMORY_LIMIT,
-        'characters': TEXT_LIMIT,
     }
     command = [sys.executable, '-P', str(Path(__file__).with_name('xacro_process.py'))]
     try:

@@ -29,8 +29,7 @@ from armid_ros.model.kinematics import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
-from armid_ros.robots.geometry import LinkShape, shapes_of
-from armid_ros.robots.sticks import sticks
+from armid_ros.robots.geometry import LinkShape, shapes_of, sticks
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -121,7 +121,7 @@ def test_a_trajectory_begins_and_ends_at_rest_where_the_arm_stands(tmp_path, sta
     assert motion.t[0] == 0.0
     np.testing.assert_allclose(motion.q[[0, -1]], [pose, pose], atol=1e-9)
     np.testing.assert_allclose(motion.dq[[0, -1]], 0.0, atol=1e-9)
-    limits = Limits.of(robot, speed=speed, position_margin=0.0, torque_fraction=1.0)
+    limits = Limits.of(robot, speed=speed, reserve=False)
     assert check_limits(limits, motion, ArmModel(robot).torque(motion)) == ()
     assert ClearanceModel.of(collision_model(robot)).smallest(motion.q).min() >= 0.0099
     excitation = load_excitation(tmp_path / 'plan' / 'excitation.yaml')

@@ -26,7 +26,7 @@ def gate(two_link):
     excitation = Excitation(path, 1, 0.5)
     planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0)
     run = plan_run(excitation, planner, excitation.at([0.0]).q[0], 100.0)
-    return MotionGate.of(run, planner, 100.0)
+    return MotionGate.of(run, planner)
 
 
 @pytest.mark.parametrize('share', [1.0, 1e-6])
@@ -51,4 +51,4 @@ def test_a_run_is_held_to_acceleration_limits_that_are_given(gate, two_link):
     arm = ArmModel(two_link)
     planner = TransferPlanner(arm, transfer_limits(two_link), None, 0.0, given)
     with pytest.raises(TrajectoryError, match=f'{two_link.joints[1]}.*acceleration'):
-        MotionGate.of(gate.run, planner, 100.0)
+        MotionGate.of(gate.run, planner)

@@ -52,7 +52,7 @@ def test_gradient_of_each_criterion_and_of_each_kind_of_effect(
     settings = DesignSettings(period=5.0, harmonics=2, criterion=criterion)
     arm = with_effects(tree, *EFFECTS[effects])
     problem = DesignProblem.of(arm, settings, np.random.default_rng(3))
-    assert_gradient(Objective.of(problem), problem)
+    assert_gradient(Objective(problem), problem)
 
 
 @pytest.mark.parametrize(
@@ -68,13 +68,13 @@ def test_gradient_of_each_target(humanoid, with_effects, target, effects):
     problem = DesignProblem.of(
         with_effects(humanoid, *effects), settings, np.random.default_rng(3)
     )
-    assert_gradient(Objective.of(problem), problem)
+    assert_gradient(Objective(problem), problem)
 
 
 def test_gradient_of_a_subset(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2, focus=('coulomb_friction',))
     problem = DesignProblem.of(two_link_arm, settings, np.random.default_rng(3))
-    assert_gradient(Objective.of(problem), problem)
+    assert_gradient(Objective(problem), problem)
 
 
 def test_gradient_against_a_rival(two_link, with_effects):
@@ -82,7 +82,7 @@ def test_gradient_against_a_rival(two_link, with_effects):
     arm = ArmModel(two_link).with_effect(make_effect('viscous_friction', two_link), [0.5, 0.2])
     rival = with_effects(two_link, 'coulomb_friction', 'torque_offset')
     problem = DesignProblem.of(arm, settings, np.random.default_rng(3), rival)
-    assert_gradient(Objective.of(problem), problem)
+    assert_gradient(Objective(problem), problem)
 
 
 def test_gradient_with_prior_information(two_link_arm):
@@ -90,7 +90,7 @@ def test_gradient_with_prior_information(two_link_arm):
     rng = np.random.default_rng(3)
     problem = DesignProblem.of(two_link_arm, settings, rng)
     known = problem.information(random_motion(two_link_arm.robot, rng, 50)).matrix
-    assert_gradient(Objective.of(problem, known), problem)
+    assert_gradient(Objective(problem, known), problem)
 
 
 def assert_gradient(objective, problem):
@@ -119,7 +119,7 @@ def test_gradient_of_the_constraints(humanoid, humanoid_collision, with_effects,
     arm = replace(arm, values=tuple(v + 0.3 for v in arm.values))
     rng = np.random.default_rng(5)
     problem = DesignProblem.of(arm, settings, rng)
-    constraints = Constraints.of(
+    constraints = Constraints(
         problem,
         ClearanceModel.of(humanoid_collision),
         margin=0.01,
@@ -139,7 +139,7 @@ def test_soft_maximum_is_never_below_the_maximum(two_link_arm):
     settings = DesignSettings(period=5.0, harmonics=2)
     rng = np.random.default_rng(6)
     problem = DesignProblem.of(two_link_arm, settings, rng)
-    constraints = Constraints.of(
+    constraints = Constraints(
         problem, None, margin=0.0, reserve=0.0, sharpness=60.0, more_times=np.empty(0)
     )
     for factor in (0.5, 1.0, 2.0):

@@ -48,7 +48,7 @@ def planned(path):
     found = design(arm, settings, np.random.default_rng(0), collision=scene.bodies)
     clearance = ClearanceModel.of(scene.bodies)
     planner = TransferPlanner(arm, transfer_limits(robot), clearance, scene.clearance)
-    start, _ = planner.free_start()
+    start = planner.free_start()
     return robot, plan_run(found.excitation, planner, start, 100.0)
 
 

@@ -147,7 +147,7 @@ XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
 
 def read_xacro(path):
     """Expand in this process, which is what the process of the package does."""
-    answer = expanded({'path': str(path), 'arguments': {}, 'characters': 10**7})
+    answer = expanded({'path': str(path), 'arguments': {}})
     if 'text' not in answer:
         raise RobotError(f'{path}: {answer["error"]}')
     try:

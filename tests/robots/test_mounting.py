@@ -23,7 +23,7 @@ def beside(tmp_path):
 
 @pytest.mark.parametrize(('text', 'floor'), [('floor: -0.75', -0.75), ('floor: none', None)])
 def test_a_height_or_none_is_read(beside, text, floor):
-    assert beside(text).floor == floor
+    assert beside(text)[0] == floor
 
 
 def test_without_a_file_nothing_is_known(beside):

@@ -168,40 +168,44 @@ def obstacles_alone(collision: CollisionModel, obstacles: Sequence[Obstacle]) ->
     return with_obstacles(replace(collision, geometry=geometry), obstacles)
 
 
-def parse_obstacles(path: Path, entries: Any) -> tuple[Obstacle, ...]:
+def parse_obstacles(entries: Any, folder: Path) -> tuple[Obstacle, ...]:
     """
     Return the obstacles of a list of mappings with the attributes of `Obstacle`.
+
+    Parameters
+    ----------
+    entries : list of dict
+        Of a document.
+    folder : Path
+        Where its meshes are looked for.
 
     Raises
     ------
     TrajectoryError
-        If an entry is not an obstacle; names the file that it was read from.
+        If an entry is not an obstacle.
 
     """
     if not isinstance(entries, list):
         raise TrajectoryError('has to be a list of obstacles, or a planning scene')
-    return tuple(_obstacle(path, number, entry) for number, entry in enumerate(entries, 1))
-
-
-def _obstacle(path: Path, number: int, entry: Any) -> Obstacle:
+    found: list[Obstacle] = []
     known = tuple(Obstacle.__dataclass_fields__)
-    if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
-        raise TrajectoryError(
-            f'{path}: obstacle {number} needs name and kind, and may have {", ".join(known[2:])}'
-        )
-    values: dict[str, Any] = {
-        key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()
-    }
-    if isinstance(values.get('size'), (int, float)):
-        values['size'] = (values['size'],)
-    if 'mesh' in values:
-        values['mesh'] = path.parent / str(values['mesh'])
-    try:
-        return Obstacle(**values)
-    except TrajectoryError as error:
-        raise TrajectoryError(f'{path}: {error}') from error
-    except (TypeError, ValueError) as error:
-        raise TrajectoryError(f'{path}: obstacle {number}: {error}') from error
+    for number, entry in enumerate(entries, 1):
+        if not isinstance(entry, dict) or not {'name', 'kind'} <= entry.keys() <= set(known):
+            raise TrajectoryError(
+                f'obstacle {number} needs name and kind, and may have {", ".join(known[2:])}'
+            )
+        values: dict[str, Any] = {
+            key: tuple(v) if isinstance(v, list) else v for key, v in entry.items()
+        }
+        if isinstance(values.get('size'), (int, float)):
+            values['size'] = (values['size'],)
+        if 'mesh' in values:
+            values['mesh'] = folder / str(values['mesh'])
+        try:
+            found.append(Obstacle(**values))
+        except (TypeError, ValueError) as error:
+            raise TrajectoryError(f'obstacle {number}: {error}') from error
+    return tuple(found)
 
 
 def body_name(collision: CollisionModel, number: int) -> str:

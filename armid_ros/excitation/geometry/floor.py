@@ -94,7 +94,8 @@ def find_floor(
         return Floor(None, up, 'environment')
     mounting = read_mounting(robot)
     if mounting is not None:
-        return Floor(mounting.floor, up, mounting.path.name)
+        height, path = mounting
+        return Floor(height, up, path.name)
     reason = _why_not_standing(collision, up)
     if reason:
         raise TrajectoryError(

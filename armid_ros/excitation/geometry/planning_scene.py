@@ -62,7 +62,7 @@ def load_environment(path: str | Path, robot: Robot | None = None) -> tuple[Obst
         document = load_yaml(re.split(r'^---$', text.removeprefix('---\n'), flags=re.M)[0])
         if isinstance(document, dict) and _SCENE & document.keys():
             return _scene_obstacles(document, robot)
-        return parse_obstacles(path, document)
+        return parse_obstacles(document, path.parent)
 
 
 def _scene_obstacles(document: Mapping[str, Any], robot: Robot | None) -> tuple[Obstacle, ...]:

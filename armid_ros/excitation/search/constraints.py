@@ -13,7 +13,6 @@ gives away is at most log(samples) / sharpness.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from armid_ros.arm import TorqueSlope
 from armid_ros.excitation.fourier import fourier_basis
@@ -42,12 +41,11 @@ _DENSE, _STATES = 5, 3
 Part = tuple[FloatArray, Callable[[], FloatArray]]
 
 
-@dataclass(frozen=True)
 class Constraints:
     """
     Position, velocity, acceleration, torque and clearance as functions of the coefficients.
 
-    Attributes
+    Parameters
     ----------
     problem : DesignProblem
         Gives limits and prior model.
@@ -59,27 +57,13 @@ class Constraints:
         Share of every limit that is kept free for what happens between the samples.
     sharpness : float
         Of the soft maximum.
-    dense : tuple of ndarray, each of shape (M, 1 + 2 H)
-        q, dq and ddq per coefficient, where position, velocity and acceleration are looked at.
-    t : ndarray, shape (N,)
-        Times at which torque and clearance are looked at [s].
-    basis : tuple of ndarray, each of shape (N, 1 + 2 H)
-        q, dq and ddq per coefficient at these times.
+    more_times : ndarray
+        Times at which torque and clearance are looked at besides evenly spaced ones [s].
 
     """
 
-    problem: DesignProblem
-    clearance: ClearanceModel | None
-    margin: float
-    reserve: float
-    sharpness: float
-    dense: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
-    t: FloatArray = field(repr=False)
-    basis: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         problem: DesignProblem,
         clearance: ClearanceModel | None,
         *,
@@ -87,23 +71,16 @@ class Constraints:
         reserve: float,
         sharpness: float,
         more_times: FloatArray,
-    ) -> Constraints:
-        """Prepare for evenly spaced times, and more of them for torque and clearance."""
-        settings = problem.settings
-        period, harmonics = settings.period, settings.harmonics
-        dense: FloatArray = np.linspace(0.0, period, _DENSE * settings.samples, endpoint=False)
-        states: FloatArray = np.linspace(0.0, period, _STATES * settings.samples, endpoint=False)
-        times = np.unique(np.concatenate([states, more_times]))
-        return cls(
-            problem,
-            clearance,
-            margin,
-            reserve,
-            sharpness,
-            fourier_basis(dense, period, harmonics),
-            times,
-            fourier_basis(times, period, harmonics),
-        )
+    ) -> None:
+        self.problem, self.clearance, self.margin = problem, clearance, margin
+        self.reserve, self.sharpness = reserve, sharpness
+        period, harmonics = problem.settings.period, problem.settings.harmonics
+        samples = problem.settings.samples
+        dense: FloatArray = np.linspace(0.0, period, _DENSE * samples, endpoint=False)
+        states: FloatArray = np.linspace(0.0, period, _STATES * samples, endpoint=False)
+        self.dense = fourier_basis(dense, period, harmonics)
+        self.t = np.unique(np.concatenate([states, more_times]))
+        self.basis = fourier_basis(self.t, period, harmonics)
 
     def value(self, x: FloatArray) -> Part:
         """
@@ -152,14 +129,7 @@ class Constraints:
     ) -> Part:
         """Constrain quantities that depend on the coefficients of their own joint only."""
         values = basis @ x.T
-        limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
-        signed = np.empty((len(limited), len(values)))
-        totals = np.empty(len(limited))
-        for row, j in enumerate(limited):
-            over, under = values[:, j] - upper[j], lower[j] - values[:, j]
-            excess = np.concatenate([over, under]) / unit[j] + self.reserve
-            totals[row], weights = self._soft_maximum(excess)
-            signed[row] = (weights[: len(values)] - weights[len(values) :]) / unit[j]
+        limited, totals, signed = self._between(values, lower, upper, unit)
 
         def gradients() -> FloatArray:
             result = np.zeros((len(limited), values.shape[1], basis.shape[1]))
@@ -171,16 +141,13 @@ class Constraints:
     def _torque(self, motion: Motion) -> Part:
         arm, limits = self.problem.arm, self.problem.limits
         torque = arm.joint_torque(motion)
-        limited = np.flatnonzero(np.isfinite(limits.torque))
+        one = np.ones(len(limits.joints))
+        most = np.where(np.isfinite(limits.torque), one, np.inf)
+        limited, totals, signed = self._between(torque / limits.torque, -most, most, one)
         of_torque = np.zeros((len(limited), *torque.shape))
-        totals = np.empty(len(limited))
-        count = len(motion)
-        for row, j in enumerate(limited):
-            relative = torque[:, j] / limits.torque[j]
-            totals[row], weights = self._soft_maximum(
-                np.concatenate([relative, -relative]) - 1.0 + self.reserve
-            )
-            of_torque[row, :, j] = (weights[:count] - weights[count:]) / limits.torque[j]
+        of_torque[np.arange(len(limited)), :, limited] = (
+            signed / limits.torque[limited, np.newaxis]
+        )
 
         def gradients() -> FloatArray:
             slope = TorqueSlope.of(arm, motion)
@@ -215,6 +182,20 @@ class Constraints:
             return result
 
         return totals, gradients
+
+    def _between(
+        self, values: FloatArray, lower: FloatArray, upper: FloatArray, unit: FloatArray
+    ) -> tuple[npt.NDArray[np.intp], FloatArray, FloatArray]:
+        """Return which joints are limited, their soft maxima, and the slopes by the values."""
+        limited = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
+        signed = np.empty((len(limited), len(values)))
+        totals = np.empty(len(limited))
+        for row, j in enumerate(limited):
+            over, under = values[:, j] - upper[j], lower[j] - values[:, j]
+            excess = np.concatenate([over, under]) / unit[j] + self.reserve
+            totals[row], weights = self._soft_maximum(excess)
+            signed[row] = (weights[: len(values)] - weights[len(values) :]) / unit[j]
+        return limited, totals, signed
 
     def _soft_maximum(self, excess: FloatArray) -> tuple[float, FloatArray]:
         largest = excess.max()

@@ -196,12 +196,7 @@ def _log_norm(values: FloatArray, norm: float) -> tuple[float, FloatArray]:
 
 
 def _least_squares(block: FloatArray, reach: FloatArray) -> FloatArray:
-    """
-    Solve the normal equations, also where a motion does not tell all columns apart.
-
-    An arm of one joint that moves with one frequency has fewer independent columns than others.
-
-    """
+    """Solve the normal equations, also where a motion does not tell all columns apart."""
     size = np.sqrt(np.maximum(np.diag(block), 0.0))
     unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
     values, vectors = np.linalg.eigh(block * np.outer(unit, unit))

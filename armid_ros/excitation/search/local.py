@@ -15,19 +15,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 import time
-from typing import Generic, TypeVar
 
 from armid_ros.excitation.feasibility import trajectory_faults
 from armid_ros.excitation.fourier import FourierTrajectory
 from armid_ros.excitation.geometry.clearance import ClearanceModel
-from armid_ros.excitation.limits import Limits
+from armid_ros.excitation.limits import Violation
 from armid_ros.excitation.problem import DesignProblem
-from armid_ros.excitation.random_trajectory import position_range, random_feasible
-from armid_ros.excitation.search.constraints import Constraints
+from armid_ros.excitation.random_trajectory import random_feasible
+from armid_ros.excitation.search.constraints import Constraints, Part
 from armid_ros.excitation.search.objective import Objective
 from armid_ros.motion import FloatArray
+from armid_ros.robots.robot import position_range
 import numpy as np
 import scipy.optimize
 
@@ -64,8 +65,6 @@ _SHRINK, _SHRINKS = 0.99, 12
 
 #: Stands in for an infinite cost, which a line search cannot work with.
 _NO_COST = 1e3
-
-_Result = TypeVar('_Result')
 
 
 class _OutOfTime(Exception):
@@ -141,7 +140,9 @@ class Search:
 
     def offer(self, trajectory: FourierTrajectory) -> float:
         """Take a feasible trajectory into account, and return its cost."""
-        cost = self.problem.cost(trajectory, self.prior)
+        problem, prior = self.problem, self.prior
+        matrix = problem.recorded(trajectory, problem.settings.n_periods).matrix
+        cost = problem.criterion.cost(matrix if prior is None else matrix + prior)
         if cost < self.cost or self.trajectory is None:
             self.trajectory, self.cost = trajectory, cost
         self.step()
@@ -174,7 +175,12 @@ class Search:
 
     def _improve(self, starts: list[FourierTrajectory]) -> None:
         """Go on in rounds from several trajectories; the worse half ends after every `_ROUNDS`."""
-        objective, watched = Objective.of(self.problem, self.prior), self._watched()
+        objective, watched = Objective(self.problem, self.prior), self.clearance
+        if watched is not None:  # without the pairs of bodies that stay apart in all of many poses
+            limits = self.problem.limits
+            lower, upper = position_range(limits.lower, limits.upper)
+            poses = self.rng.uniform(lower, upper, (_POSES, len(lower)))
+            watched = watched.watched(poses, self.problem.settings.clearance + _WATCHED)
         branches = [_Branch(self, objective, watched, start) for start in starts]
         while branches:
             for branch in branches:
@@ -182,14 +188,6 @@ class Search:
                     branch.advance()
             branches = sorted(branches, key=lambda branch: branch.cost)[: -(-len(branches) // 2)]
             branches = [branch for branch in branches if branch.left > 0]
-
-    def _watched(self) -> ClearanceModel | None:
-        """Leave out the pairs of bodies that stay apart in all of many poses."""
-        if self.clearance is None:
-            return None
-        lower, upper = position_range(self.problem.limits)
-        poses = self.rng.uniform(lower, upper, (_POSES, len(lower)))
-        return self.clearance.watched(poses, self.problem.settings.clearance + _WATCHED)
 
 
 @dataclass
@@ -203,10 +201,19 @@ class _Branch:
     cost: float = np.inf
 
     def __post_init__(self) -> None:
-        problem = self.search.problem
-        self.left = problem.settings.iterations
-        self.scale = _coefficient_scale(problem)
-        self.lower, self.upper = _coefficient_range(problem.limits, self.scale)
+        """Bound the coefficients, in units of what alone reaches a limit."""
+        limits, settings = self.search.problem.limits, self.search.problem.settings
+        low, high = position_range(limits.lower, limits.upper)
+        half = 0.5 * (high - low)[:, np.newaxis]
+        k = 2.0 * np.pi / settings.period * np.arange(1, settings.harmonics + 1)
+        rates = np.minimum(limits.velocity[:, np.newaxis], limits.acceleration[:, np.newaxis] / k)
+        amplitude = np.minimum(half * k, rates) / np.sqrt(settings.harmonics)
+        self.scale = np.column_stack([half, amplitude, amplitude])
+        # the amplitude of a harmonic is at most 4 / pi times the largest value of the curve
+        self.upper = np.full_like(self.scale, 4.0 / np.pi * np.sqrt(settings.harmonics))
+        self.lower = -self.upper
+        self.lower[:, 0], self.upper[:, 0] = low / self.scale[:, 0], high / self.scale[:, 0]
+        self.left = settings.iterations
         self.times, self.box, self.sharpness = np.empty(0), _BOX, _SHARPNESS[0]
 
     def advance(self) -> None:
@@ -215,7 +222,7 @@ class _Branch:
             return
         problem, clearance = self.search.problem, self.search.clearance
         settings = problem.settings
-        constraints = Constraints.of(
+        constraints = Constraints(
             problem,
             self.watched,
             margin=settings.clearance + _SLACK,
@@ -242,8 +249,18 @@ class _Branch:
         """Return where SLSQP ends, shape (n, 1 + 2 H) in units of the scale, and its steps."""
         count, scale = 0, self.scale
         x = self.trajectory.coefficients / scale
-        cost = _Last(lambda z: self.objective.value(z.reshape(scale.shape) * scale))
-        limits = _Last(lambda z: constraints.value(z.reshape(scale.shape) * scale))
+
+        @lru_cache(maxsize=1)
+        def cost(z: bytes) -> tuple[float, Callable[[], FloatArray]]:
+            return self.objective.value(np.frombuffer(z).reshape(scale.shape) * scale)
+
+        @lru_cache(maxsize=1)
+        def limits(z: bytes) -> Part:
+            return constraints.value(np.frombuffer(z).reshape(scale.shape) * scale)
+
+        def finite_cost(z: FloatArray) -> float:
+            value = cost(z.tobytes())[0]
+            return value if np.isfinite(value) else _NO_COST
 
         def counted(z: FloatArray) -> None:
             nonlocal count
@@ -251,9 +268,9 @@ class _Branch:
             self.search.step()
 
         result = scipy.optimize.minimize(
-            lambda z: cost(z)[0] if np.isfinite(cost(z)[0]) else _NO_COST,
+            finite_cost,
             x.ravel(),
-            jac=lambda z: (cost(z)[1]() * scale).ravel(),
+            jac=lambda z: (cost(z.tobytes())[1]() * scale).ravel(),
             method='SLSQP',
             bounds=scipy.optimize.Bounds(
                 np.maximum(self.lower, x - self.box).ravel(),
@@ -262,8 +279,8 @@ class _Branch:
             constraints=[
                 {
                     'type': 'ineq',
-                    'fun': lambda z: -limits(z)[0],
-                    'jac': lambda z: -(limits(z)[1]() * scale).reshape(-1, scale.size),
+                    'fun': lambda z: -limits(z.tobytes())[0],
+                    'jac': lambda z: -(limits(z.tobytes())[1]() * scale).reshape(-1, scale.size),
                 }
             ],
             options={'maxiter': iterations, 'ftol': 1e-5},
@@ -296,47 +313,8 @@ def _made_feasible(
         )
         if not faults:
             return trajectory
-        own = {v.joint for v in faults.violations if v.limit != 'torque'}
-        everywhere = len(own) < len(faults.violations) + len(faults.approaches)
+        own = {v.joint for v in faults if isinstance(v, Violation) and v.limit != 'torque'}
+        everywhere = len(own) < len(faults)
         factor = [_SHRINK if everywhere or j in own else 1.0 for j in trajectory.joints]
         trajectory = trajectory.scaled(np.array(factor))
     return None
-
-
-def _coefficient_scale(problem: DesignProblem) -> FloatArray:
-    """Size of every coefficient that alone reaches a limit, shape (n, 1 + 2 H)."""
-    limits, settings = problem.limits, problem.settings
-    lower, upper = position_range(limits)
-    half = 0.5 * (upper - lower)[:, np.newaxis]
-    k = 2.0 * np.pi / settings.period * np.arange(1, settings.harmonics + 1)
-    largest = np.minimum(limits.velocity[:, np.newaxis], limits.acceleration[:, np.newaxis] / k)
-    amplitude = np.minimum(half * k, largest) / np.sqrt(settings.harmonics)
-    return np.column_stack([half, amplitude, amplitude])
-
-
-def _coefficient_range(limits: Limits, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """
-    Bound the scaled coefficients by what no feasible trajectory can exceed.
-
-    The amplitude of a harmonic is at most 4 / pi times the largest value of the curve.
-
-    """
-    harmonics = (scale.shape[1] - 1) // 2
-    upper = np.full_like(scale, 4.0 / np.pi * np.sqrt(harmonics))
-    lower = -upper
-    low, high = position_range(limits)
-    lower[:, 0], upper[:, 0] = low / scale[:, 0], high / scale[:, 0]
-    return lower, upper
-
-
-class _Last(Generic[_Result]):
-    """A function that remembers the last point and what came out there."""
-
-    def __init__(self, function: Callable[[FloatArray], _Result]) -> None:
-        self._function = function
-        self._known: tuple[bytes, _Result] | None = None
-
-    def __call__(self, z: FloatArray) -> _Result:
-        if self._known is None or self._known[0] != z.tobytes():
-            self._known = z.tobytes(), self._function(z)
-        return self._known[1]

@@ -11,8 +11,7 @@ all samples at once, those that depend on the motion's past by differences of ev
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 
 from armid_ros.effects.direction import BlurredMotion
 from armid_ros.excitation.fourier import fourier_basis, FourierTrajectory, MARGIN
@@ -20,7 +19,6 @@ from armid_ros.excitation.problem import DesignProblem, marked
 from armid_ros.model import regressor
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
-import numpy.typing as npt
 
 #: The direction of motion is blurred below this share of a joint's velocity limit.
 _BLUR = 0.05
@@ -32,41 +30,28 @@ _STEP = 1e-7
 _TOGETHER = 8
 
 
-@dataclass(frozen=True)
 class Objective:
     """
     Cost of a trajectory as a function of its coefficients X = (q0, a, b), shape (n, 1 + 2 H).
 
-    Attributes
+    Parameters
     ----------
     problem : DesignProblem
         What is wanted.
-    prior : ndarray, shape (r, r), or None
+    prior : ndarray, shape (r, r), optional
         Information that is there already.
-    t : ndarray, shape (N,)
-        Sample times [s].
-    basis : tuple of ndarray, each of shape (N, 1 + 2 H)
-        q, dq and ddq per coefficient.
-    width : ndarray, shape (n,)
-        Velocity below which the direction of motion is blurred [rad/s or m/s].
 
     """
 
-    problem: DesignProblem
-    prior: FloatArray | None
-    t: FloatArray
-    basis: tuple[FloatArray, FloatArray, FloatArray] = field(repr=False)
-    width: FloatArray
-
-    @classmethod
-    def of(cls, problem: DesignProblem, prior: FloatArray | None = None) -> Objective:
-        """Prepare for the samples of the settings."""
-        settings = problem.settings
-        t: FloatArray = np.linspace(0.0, settings.period, settings.samples, endpoint=False)
+    def __init__(self, problem: DesignProblem, prior: FloatArray | None = None) -> None:
+        self.problem, self.prior, settings = problem, prior, problem.settings
+        self.t: FloatArray = np.linspace(0.0, settings.period, settings.samples, endpoint=False)
+        self.basis = fourier_basis(self.t, settings.period, settings.harmonics)
         velocity = problem.limits.velocity
-        width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
-        basis = fourier_basis(t, settings.period, settings.harmonics)
-        return cls(problem, prior, t, basis, width)
+        self.width = _BLUR * np.where(np.isfinite(velocity), velocity, 1.0)
+        past = marked(problem.arm, lambda effect: not effect.instantaneous)
+        # where each standard parameter is among the columns: those of the past are last
+        self._order = np.argsort(np.argsort(past, kind='stable'))
 
     def value(self, x: FloatArray) -> tuple[float, Callable[[], FloatArray]]:
         """
@@ -154,12 +139,6 @@ class Objective:
         path = FourierTrajectory.of(problem.limits.joints, problem.settings.period, x)
         motion = path.with_margins(len(self.t))
         return [problem.arm.columns_of(effect, motion)[MARGIN:-MARGIN] for effect in effects]
-
-    @cached_property
-    def _order(self) -> npt.NDArray[np.intp]:
-        """Where each standard parameter is among the columns: those of the past are last."""
-        past = marked(self.problem.arm, lambda effect: not effect.instantaneous)
-        return np.argsort(np.argsort(past, kind='stable'))
 
 
 def _weighted(blocks: Sequence[FloatArray], weights: FloatArray) -> FloatArray:

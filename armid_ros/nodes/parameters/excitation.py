@@ -345,13 +345,8 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
             f'{", ".join(robot.joints)}'
         )
     excitation = excitation.for_joints(robot.joints)
-    limits = Limits.of(
-        robot,
-        speed=1.0,
-        torque_fraction=1.0,
-        position_margin=0.0,
-        acceleration=planner.given_acceleration,
-    )
+    given = planner.given_acceleration
+    limits = Limits.of(robot, speed=1.0, reserve=False, acceleration=given)
     rules = (planner.clearance, planner.margin)
     faults = trajectory_faults(planner.arm, limits, excitation.trajectory, *rules)
     faults = faults or excitation_faults(planner.arm, limits, excitation)
