@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-A bag as one source of messages: a directory of files with or without metadata, or a bare file.
-
-Files may be MCAP or SQLite, several of them, and compressed by rosbag2 as a whole or message by
-message.
-
-"""
+"""A bag as one source of messages: a directory of files with or without metadata, or a file."""
 
 from __future__ import annotations
 
@@ -57,7 +51,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
         return bag.topics()
 
 
-class Bag:
+class Bag(Source):
     """All files of a bag, as one source; a context manager."""
 
     def __init__(self, path: str | Path, settings: ReadSettings = DEFAULT) -> None:

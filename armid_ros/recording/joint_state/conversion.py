@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Messages that hold a JointState, in the CDR of sensor_msgs/JointState.
-
-Those of a schema with other fields, or of a type with a JointState inside, as
-franka_msgs/FrankaRobotState, are read by the schema that the bag has of them.
-
-"""
+"""Messages of any schema that hold a JointState, in the CDR of sensor_msgs/JointState."""
 
 from __future__ import annotations
 
@@ -57,7 +51,6 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
 def _converter(where: str, topic: Topic) -> Convert | None:
     """Return what makes an object with the fields of a JointState; None where CDR is one."""
     described = topic.message_type
-    path = [] if described.name == JOINT_STATE else [_inside(described)]
     if topic.encoding != 'cdr':
         raise RecordingError(
             f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
@@ -73,7 +66,10 @@ def _converter(where: str, topic: Topic) -> Convert | None:
             f'{where}: its schema of {JOINT_STATE} has {", ".join(sorted(fields))}, and no '
             f'{", ".join(sorted(lacking))}; record the type of sensor_msgs'
         )
-    return lambda data: _part(store.deserialize_cdr(data, described.name), path)
+    if described.name == JOINT_STATE:
+        return lambda data: store.deserialize_cdr(data, JOINT_STATE)
+    inside = _inside(described)
+    return lambda data: getattr(store.deserialize_cdr(data, described.name), inside)
 
 
 def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
@@ -93,12 +89,6 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
         except Exception:  # the decoder counts it as malformed
             messages.append(bytes(4))
     return MessageBlock.joined(messages, block.log_time, block.publish_time)
-
-
-def _part(message: Any, path: list[str]) -> Any:
-    for name in path:
-        message = getattr(message, name)
-    return message
 
 
 def _inside(described: MessageType) -> str:

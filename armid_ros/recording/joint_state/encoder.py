@@ -12,8 +12,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
-from armid_ros.recording.message_types import JOINT_STATE, STRING, string_cdr
-from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.message_types import JOINT_STATE
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
@@ -166,8 +165,7 @@ def write_recording(
     with whole_bag(path, compression=compression, chunk_size=chunk_size) as writer:
         if robot_description is not None:
             first = int(stamps[0]) if len(stamps) else start_ns
-            writer.add_topic('/robot_description', STRING, qos=[LATCHED])
-            writer.write('/robot_description', string_cdr(robot_description), first)
+            writer.write_description(robot_description, first)
         write_joint_states(writer, topic, joints, stamps, measured.q, measured.dq, measured.tau)
 
 
