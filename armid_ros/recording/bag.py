@@ -248,9 +248,6 @@ def _files_of(path: Path) -> BagMetadata:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
             f'bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-
-    def by_number(file: Path) -> tuple[tuple[int, str], ...]:
-        pieces = re.split(r'(\d+)', file.name)  # BAG_2.mcap is before BAG_10.mcap
-        return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
-
-    return BagMetadata(tuple(sorted(found, key=by_number)))
+    # BAG_2.mcap is before BAG_10.mcap
+    found.sort(key=lambda file: re.sub(r'\d+', lambda number: number[0].zfill(20), file.name))
+    return BagMetadata(tuple(found))

@@ -18,6 +18,7 @@ from typing import Any
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
+from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.turns import unwrapped
@@ -25,7 +26,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
-_QUANTITIES = ('position', 'velocity', 'effort')
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
@@ -272,7 +272,7 @@ def _finite(
     """Return the finite samples, the quantities that are absent, and what is not finite."""
     absent: list[str] = []
     quantities: list[FloatArray | None] = []
-    for name, values in zip(_QUANTITIES, series.values, strict=True):
+    for name, values in zip(QUANTITIES, series.values, strict=True):
         if values is None:
             lacking = list(joints)
         else:
@@ -286,7 +286,7 @@ def _finite(
     if quantities[0] is None:
         raise RecordingError(f'{where} has no {absent[0]}')
     bad, culprits = np.zeros(len(series), np.bool_), []
-    for name, values in zip(_QUANTITIES, quantities, strict=True):
+    for name, values in zip(QUANTITIES, quantities, strict=True):
         wrong = None if values is None else ~(np.abs(values) < LARGEST)
         if wrong is not None and wrong.any():
             bad |= wrong.any(axis=1)

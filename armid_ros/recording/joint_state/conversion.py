@@ -11,13 +11,12 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import JOINT_STATE, MessageType, store_for
+from armid_ros.recording.message_types import JOINT_STATE, MessageType, QUANTITIES, store_for
 from armid_ros.recording.source import MessageBlock, Topic
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 _INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
-_FIELDS = ('position', 'velocity', 'effort')
 Convert = Callable[[bytes], Any]
 
 
@@ -83,7 +82,7 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
             header = types['std_msgs/msg/Header'](
                 types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
             )
-            values = [np.array(getattr(found, name, []), np.float64) for name in _FIELDS]
+            values = [np.array(getattr(found, name, []), np.float64) for name in QUANTITIES]
             state = types[JOINT_STATE](header, list(found.name), *values)
             messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
         except Exception:  # the decoder counts it as malformed

@@ -26,12 +26,7 @@ from armid_ros.recording.mcap.content import (
     tiled,
     walk,
 )
-from armid_ros.recording.mcap.records import (
-    add_definition,
-    Chunk,
-    FileMap,
-    map_file,
-)
+from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
@@ -51,7 +46,14 @@ class McapSource(Source):
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
         """Open an MCAP file."""
         super().__init__(path, settings)
-        self._found = map_file(_map(path), path, check=settings.check_crc)
+        with open_regular(path, RecordingError) as stream:
+            if not stream.seek(0, 2):
+                raise RecordingError(f'{path}: the file is empty')
+            try:
+                data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+            except OSError as error:
+                raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
+        self._found = map_file(data, path, check=settings.check_crc)
         self._damage = self._found.damage
         self._counts: dict[int, int] | None = None
 
@@ -235,14 +237,3 @@ class McapSource(Source):
         )
         qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
         return Topic(channel.topic, described, qos, count, channel.message_encoding)
-
-
-def _map(path: Path) -> bytes | mmap.mmap:
-    """Return the bytes of a file without reading them."""
-    with open_regular(path, RecordingError) as stream:
-        if not stream.seek(0, 2):
-            raise RecordingError(f'{path}: the file is empty')
-        try:
-            return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-        except OSError as error:
-            raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
