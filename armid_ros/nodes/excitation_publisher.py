@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 import math
 import time
 from typing import Any
@@ -38,7 +38,6 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from std_msgs.msg import String
 
 #: How often a subscriber is looked for, and whether the arm is still heard of [s].
@@ -118,8 +117,7 @@ class ExcitationPublisherNode(ArmidNode):
         self.offer('~/start', self.start)
         self.offer('~/rehearse', self.rehearse)
         self.offer('~/stop', self.stop)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
+        self._timer = self.look_every(_LOOK_PERIOD, self.look)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters; those of a simulation have defaults of their own."""
@@ -437,10 +435,4 @@ class ExcitationPublisherNode(ArmidNode):
         self.get_logger().error(text)
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(ExcitationPublisherNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, ExcitationPublisherNode)

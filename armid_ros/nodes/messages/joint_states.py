@@ -167,12 +167,6 @@ class JointStateReader:
             self._epoch = sec
         return float(sec - self._epoch) + 1e-9 * nanosec
 
-    @property
-    def _wanted(self) -> tuple[str, ...]:
-        """Joints of the last message, in their order."""
-        joints = self._joints
-        return joints if self._merger is None else tuple(joints[k] for k in self._some)
-
     def _ordered(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
         if len(field) != len(names):
             hint = '; identification needs measured torque' if name == 'effort' else ''
@@ -185,7 +179,8 @@ class JointStateReader:
         values = self._ordered(names, field, name)
         # one sum instead of isfinite; joints left out may well be NaN
         if not math.isfinite(np.add.reduce(values)) and not np.all(np.isfinite(values)):
-            joint = self._wanted[int(np.argmin(np.isfinite(values)))]
+            bad = int(np.argmin(np.isfinite(values)))
+            joint = self._joints[bad if self._merger is None else self._some[bad]]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values
 

@@ -55,11 +55,11 @@ PUBLISHER_PARAMETERS = (
         read_only=False,
     ),
     NodeParameter(
-        'duration', 44.0, 'Length of the run, from rest to rest.', 's', lower=1.0, upper=3600.0
+        'duration', 44.0, 'Length of the run, from rest to rest.', 's', limits=(1.0, 3600.0)
     ),
-    NodeParameter('n_periods', 2, 'Number of identical periods.', lower=1, upper=100),
-    NodeParameter('run_in', 2.0, 'Length of run-in and run-out.', 's', lower=0.1, upper=60.0),
-    NodeParameter('harmonics', 5, 'Number of harmonics per joint.', lower=1, upper=30),
+    NodeParameter('n_periods', 2, 'Number of identical periods.', limits=(1, 100)),
+    NodeParameter('run_in', 2.0, 'Length of run-in and run-out.', 's', limits=(0.1, 60.0)),
+    NodeParameter('harmonics', 5, 'Number of harmonics per joint.', limits=(1, 30)),
     NodeParameter(
         'speed',
         'slow',
@@ -68,11 +68,9 @@ PUBLISHER_PARAMETERS = (
         choices=tuple(SPEED_CLASSES),
     ),
     NodeParameter(
-        'effects',
-        list(USUAL_EFFECTS),
-        'Effects that are to be seen, beside the rigid body.',
+        'effects', list(USUAL_EFFECTS), 'Effects that are to be seen, beside the rigid body.'
     ),
-    NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', lower=0.0, upper=1.0),
+    NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', limits=(0.0, 1.0)),
     NodeParameter(
         'floor',
         '',
@@ -86,19 +84,13 @@ PUBLISHER_PARAMETERS = (
         'echo prints it; empty: nothing.',
     ),
     NodeParameter(
-        'design_time',
-        20.0,
-        'Limit of processor time of the search.',
-        's',
-        lower=1.0,
-        upper=86400.0,
+        'design_time', 20.0, 'Limit of processor time of the search.', 's', limits=(1.0, 86400.0)
     ),
     NodeParameter(
         'seed',
         0,
         'Random seed of the search; the same gives the same trajectory.',
-        lower=0,
-        upper=2**62,
+        limits=(0, 2**62),
     ),
     NodeParameter(
         'interface',
@@ -120,8 +112,7 @@ PUBLISHER_PARAMETERS = (
         'How far a joint may be from the end for the goal to be reached; 0: what the controller '
         'has. On the way the controller gets tracking_tolerance.',
         'rad or m',
-        lower=0.0,
-        upper=10.0,
+        limits=(0.0, 10.0),
         read_only=False,
     ),
     NodeParameter(
@@ -129,34 +120,30 @@ PUBLISHER_PARAMETERS = (
         0.0,
         'How much later than planned the end may be reached; 0: what the controller has.',
         's',
-        lower=0.0,
-        upper=60.0,
+        limits=(0.0, 60.0),
         read_only=False,
     ),
-    NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
+    NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', limits=(1.0, 1000.0)),
     NodeParameter(
         'approach',
         3.0,
         'Shortest time to get to the first point; more where distance and limits ask for it.',
         's',
-        lower=0.1,
-        upper=60.0,
+        limits=(0.1, 60.0),
         read_only=False,
     ),
     NodeParameter(
         'speed_scaling',
         1.0,
         'Share of its speed at which ~/start runs the excitation.',
-        lower=0.1,
-        upper=1.0,
+        limits=(0.1, 1.0),
         read_only=False,
     ),
     NodeParameter(
         'rehearsal_speed',
         0.2,
         'Share of its speed at which ~/rehearse runs it.',
-        lower=0.05,
-        upper=1.0,
+        limits=(0.05, 1.0),
         read_only=False,
     ),
     NodeParameter(
@@ -171,8 +158,7 @@ PUBLISHER_PARAMETERS = (
         'Time in which the arm is brought to rest; longer where its limits require it. Without '
         'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
         's',
-        lower=0.1,
-        upper=10.0,
+        limits=(0.1, 10.0),
         read_only=False,
     ),
     SIMULATION,
@@ -187,8 +173,7 @@ PUBLISHER_PARAMETERS = (
         0.2,
         'The arm is stopped when a joint is further from where it should be.',
         'rad or m',
-        lower=0.001,
-        upper=10.0,
+        limits=(0.001, 10.0),
         read_only=False,
     ),
     NodeParameter(
@@ -197,8 +182,7 @@ PUBLISHER_PARAMETERS = (
         'The arm is stopped when the effort of a joint is, three times in a row, larger by this '
         'factor than what is foreseen for the run and than 10 % of its limit; 0: never, the '
         'default in a simulation.',
-        lower=0.0,
-        upper=1000.0,
+        limits=(0.0, 1000.0),
         read_only=False,
     ),
     NodeParameter(
@@ -207,8 +191,7 @@ PUBLISHER_PARAMETERS = (
         'The arm is stopped, and not started, without a joint state for so long; 5 s by default '
         'in a simulation.',
         's',
-        lower=0.01,
-        upper=10.0,
+        limits=(0.01, 10.0),
         read_only=False,
     ),
     NodeParameter(
@@ -216,8 +199,7 @@ PUBLISHER_PARAMETERS = (
         10.0,
         'How long to wait for a subscriber and joint states; then only ~/start begins.',
         's',
-        lower=0.0,
-        upper=3600.0,
+        limits=(0.0, 3600.0),
     ),
 )
 
