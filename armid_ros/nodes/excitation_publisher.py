@@ -28,7 +28,7 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.excitation import (
     checked,
     make_excitation,
-    make_surroundings,
+    make_planner,
     PUBLISHER_PARAMETERS,
     SIMULATION,
 )
@@ -88,13 +88,12 @@ class ExcitationPublisherNode(ArmidNode):
         super().__init__('excitation_publisher', **kwargs)
         self._rate = float(self.value('rate'))
         if planner is None:
-            surroundings = make_surroundings(self.value)
-            planner = surroundings.planner
-            if surroundings.unchecked:
-                self.get_logger().warning(f'not checked: {"; ".join(surroundings.unchecked)}')
+            planner, unchecked = make_planner(self.value)
+            if unchecked:
+                self.get_logger().warning(f'not checked: {"; ".join(unchecked)}')
             if excitation is None:
                 self.get_logger().info('making the excitation')
-                excitation = make_excitation(self.value, self._rate, surroundings)
+                excitation = make_excitation(self.value, self._rate, planner)
         if excitation is None:
             raise TrajectoryError('a planner needs an excitation to plan the way to')
         self._planner = planner

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
@@ -26,7 +24,7 @@ from armid_ros.excitation import (
     with_joint_limits,
 )
 from armid_ros.nodes.parameters.table import NodeParameter, Values
-from armid_ros.robots import CollisionModel, load_arms, load_robot
+from armid_ros.robots import load_arms, load_robot
 import numpy as np
 
 SIMULATION = NodeParameter(
@@ -204,28 +202,7 @@ PUBLISHER_PARAMETERS = (
 )
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """
-    The arm, and what it must not hit.
-
-    Attributes
-    ----------
-    bodies : CollisionModel
-        Its bodies, and what stands around it, the floor among it.
-    planner : TransferPlanner
-        Plans the way to an excitation.
-    unchecked : tuple of str
-        What cannot be checked.
-
-    """
-
-    bodies: CollisionModel
-    planner: TransferPlanner
-    unchecked: tuple[str, ...]
-
-
-def make_surroundings(value: Values) -> Surroundings:
+def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
     Load the robot that parameters describe, and what stands around it.
 
@@ -233,6 +210,13 @@ def make_surroundings(value: Values) -> Surroundings:
     ----------
     value : callable
         Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
+
+    Returns
+    -------
+    planner : TransferPlanner
+        Plans the way to an excitation; knows the arm, and what it must not hit.
+    unchecked : tuple of str
+        What cannot be checked.
 
     Raises
     ------
@@ -248,18 +232,16 @@ def make_surroundings(value: Values) -> Surroundings:
     robot, acceleration = with_joint_limits(robot, value('joint_limits'), given)
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
-    bodies = scene.bodies
     limits = transfer_limits(arm.robot, value('speed'), acceleration)
-    planner = TransferPlanner(
-        arm, limits, ClearanceModel.of(bodies), scene.clearance, acceleration
-    )
+    clearance = ClearanceModel.of(scene.bodies)
+    planner = TransferPlanner(arm, limits, clearance, scene.clearance, acceleration)
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
-    return Surroundings(bodies, planner, unchecked)
+    return planner, unchecked
 
 
-def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
+def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Excitation:
     """
     Load or design the excitation that parameters describe.
 
@@ -269,8 +251,8 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
     rate : float
         Samples per second at which it will be sent [Hz].
-    surroundings : Surroundings
-        The arm, and what it must not hit.
+    planner : TransferPlanner
+        Knows the arm, and what it must not hit.
 
     Raises
     ------
@@ -279,8 +261,8 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
 
     """
     if value('file'):
-        return checked(load_excitation(value('file')), surroundings.planner, value('file'))
-    arm = surroundings.planner.arm
+        return checked(load_excitation(value('file')), planner, value('file'))
+    arm = planner.arm
     own = {effect.name for effect in arm.effects}
     for name in filter(None, value('effects')):
         if name not in own:
@@ -292,13 +274,13 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
-        acceleration=surroundings.planner.acceleration,
+        acceleration=planner.acceleration,
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),
     )
     rng = np.random.default_rng(value('seed'))
-    return design(arm, settings, rng, collision=surroundings.bodies).excitation
+    return design(arm, settings, rng, collision=planner.clearance.collision).excitation
 
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:

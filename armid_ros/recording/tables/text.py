@@ -13,8 +13,7 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.tables.content import read_content
-from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.tables.table import read_content, Table, TableColumn
 import numpy as np
 import numpy.typing as npt
 
