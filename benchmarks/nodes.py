@@ -64,13 +64,13 @@ def short_run(robot, period, n_periods):
 @contextmanager
 def process(context, node, *parameters):
     """Run a node as a process until the block ends."""
-    options = [part for p in parameters for part in ('-p', p)]
     environment = {
         **os.environ,
         'ROS_DOMAIN_ID': str(context.get_domain_id()),
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
     }
-    command = [sys.executable, '-m', f'armid_ros.nodes.{node}', '--ros-args', *options]
+    command = [sys.executable, '-c', f'from armid_ros.cli.node import main; main({node!r})']
+    command += ['--ros-args', *(part for p in parameters for part in ('-p', p))]
     running = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
     try:
         yield running

@@ -65,6 +65,6 @@ def _row(parameter: NodeParameter) -> tuple[str, ...]:
 def _range(parameter: NodeParameter) -> str:
     if parameter.choices:
         return ', '.join(f'`{choice}`' for choice in parameter.choices)
-    if parameter.lower is None or parameter.upper is None:
+    if parameter.limits is None:
         return ''
-    return f'{parameter.lower:g} to {parameter.upper:g}'
+    return f'{parameter.limits[0]:g} to {parameter.limits[1]:g}'

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Diagnosis of an arm while it moves.
-
-A `SampleWindow` keeps what came, `LiveDiagnosis` decides when to ask and which model of the
-arm holds, `Assistant` answers in a process of its own. Nothing here knows ROS.
-
-"""
+"""Diagnosis of an arm while it moves, without ROS."""
 
 from armid_ros.live.assistant import Assistant, InProcess
 from armid_ros.live.belief import Belief, LiveDiagnosis, LiveSettings

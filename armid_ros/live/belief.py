@@ -4,7 +4,6 @@
 When to ask what is wrong with a moving arm, and what to believe of the answers.
 
 A name counts when questions in a row agree on it, for a window may hold the moment of the change.
-What counts is proposed; a person accepts or rejects it.
 
 """
 

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from functools import partial
 import time
 from typing import Any
 
@@ -41,20 +42,8 @@ _BURST = 1000
 _FAREWELL = 1.0
 
 
-class JumpGuard:
-    """
-    Compares the first waypoint of trajectories with where an arm is.
-
-    Parameters
-    ----------
-    node : Node
-        Gets a subscription to joint_states.
-    tolerance : float
-        How far the arm may be from a first waypoint at time 0 [rad or m].
-    timeout : float
-        Age at which a joint state says nothing any more [s].
-
-    """
+class _JumpGuard:
+    """Compares the first waypoint of trajectories with where an arm is, by joint_states."""
 
     def __init__(self, node: Node, tolerance: float, timeout: float) -> None:
         self.tolerance, self.timeout = tolerance, timeout
@@ -89,12 +78,10 @@ class JumpGuard:
         lost = pose.staleness(time.monotonic(), self.timeout)
         if lost:
             return f'trajectory: {self._states.topic_name}: {lost}; it is not known where it is'
-        if reference.dq is not None:
-            top = np.abs(reference.dq).max(axis=0)
-        elif len(reference.t) > 1:
-            top = np.abs(np.diff(reference.q, axis=0) / np.diff(reference.t)[:, None]).max(axis=0)
-        else:
-            top = np.zeros(len(reference.joints))
+        speeds = reference.dq
+        if speeds is None:
+            speeds = np.diff(reference.q, axis=0) / np.diff(reference.t)[:, np.newaxis]
+        top = np.abs(speeds).max(axis=0, initial=0.0)
         # velocity limits; where none are known, the top speeds of the trajectory
         known = [self._limits.get(joint, np.inf) for joint in reference.joints]
         fastest = np.where(np.isfinite(known), known, top)
@@ -136,19 +123,17 @@ class BagPlayerNode(ArmidNode):
             'rate',
             1.0,
             'Bag time per real time; of no effect in lock step.',
-            lower=0.001,
-            upper=1000.0,
+            limits=(0.001, 1000.0),
             read_only=False,
         ),
         NodeParameter('loop', False, 'Begin again at the end.', read_only=False),
-        NodeParameter('start_offset', 0.0, 'Bag time to leave out.', 's', lower=0.0, upper=1e9),
+        NodeParameter('start_offset', 0.0, 'Bag time to leave out.', 's', limits=(0.0, 1e9)),
         NodeParameter(
             'clock_rate',
             0.0,
             'How often bag time is published on /clock; 0 for not at all.',
             'Hz',
-            lower=0.0,
-            upper=10000.0,
+            limits=(0.0, 10000.0),
             read_only=False,
         ),
         NodeParameter(
@@ -157,8 +142,7 @@ class BagPlayerNode(ArmidNode):
             'How long to wait for every topic to have a subscriber, and to hear of the arm that '
             'is to follow a trajectory.',
             's',
-            lower=0.0,
-            upper=3600.0,
+            limits=(0.0, 3600.0),
             read_only=False,
         ),
         NodeParameter(
@@ -166,8 +150,7 @@ class BagPlayerNode(ArmidNode):
             0.01,
             'How far a joint may be from the first point of a trajectory.',
             'rad or m',
-            lower=0.0001,
-            upper=1.0,
+            limits=(0.0001, 1.0),
             read_only=False,
         ),
         NodeParameter(
@@ -175,8 +158,7 @@ class BagPlayerNode(ArmidNode):
             0.5,
             'Age at which a joint state says nothing any more.',
             's',
-            lower=0.01,
-            upper=60.0,
+            limits=(0.01, 60.0),
             read_only=False,
         ),
     )
@@ -313,7 +295,7 @@ class BagPlayerNode(ArmidNode):
             raise RecordingError(f'{self._bag.path}: nothing to play')
         return publishers
 
-    def _make_guard(self) -> JumpGuard | None:
+    def _make_guard(self) -> _JumpGuard | None:
         """Listen to the arm where there is a trajectory to play."""
         types = {t.name: t.type_name for t in self._bag.topics() if t.name in self._topics}
         self._trajectories = {n for n, kind in types.items() if kind == JOINT_TRAJECTORY}
@@ -322,7 +304,7 @@ class BagPlayerNode(ArmidNode):
         self._has_states = any(self.resolve_topic_name(n) == self._states for n in types)
         if not self._trajectories:
             return None
-        return JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
+        return _JumpGuard(self, self.value('start_tolerance'), self.value('state_timeout'))
 
     def _objection(self, message: RawMessage) -> str:
         """Say why a message must not be published; empty when it may."""
@@ -373,10 +355,4 @@ class BagPlayerNode(ArmidNode):
         self._clock_due = self._position + self._clock_period
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(BagPlayerNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, BagPlayerNode)

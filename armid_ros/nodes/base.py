@@ -45,6 +45,14 @@ COMMON = (
 )
 
 
+def key_values(values: Mapping[str, object]) -> list[KeyValue]:
+    """Return numbers and words as a status of /diagnostics shows them."""
+    return [
+        KeyValue(key=key, value=f'{value:.9g}' if isinstance(value, float) else str(value))
+        for key, value in values.items()
+    ]
+
+
 class ArmidNode(Node):
     """
     A node with parameters from a table, that says on /diagnostics what it does and what it missed.
@@ -96,9 +104,9 @@ class ArmidNode(Node):
         guarded = self._surviving(callback, getattr(callback, '__name__', 'timer'))
         return super().create_timer(timer_period_sec, guarded, *args, **more)
 
-    def look_every(self, seconds: float, callback: Callable[[], None]) -> None:
+    def look_every(self, seconds: float, callback: Callable[[], None]) -> Timer:
         """Call something in real time, whatever /clock says."""
-        self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        return self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def pace(self, parameter: str, callback: Callable[[], None]) -> None:
         """Call something as often as a parameter says [Hz], also once it is set anew."""
@@ -292,9 +300,7 @@ class ArmidNode(Node):
         status.level = self.level(troubled)
         status.message = trouble or (self.complaints.latest if troubled else self.activity)
         rejected = {f'rejected {kind}': n for kind, n in self.complaints.counts.items()}
-        for key, value in {**values, **rejected}.items():
-            text = f'{value:.9g}' if isinstance(value, float) else str(value)
-            status.values.append(KeyValue(key=key, value=text))
+        status.values = key_values({**values, **rejected})
         message = DiagnosticArray(status=[status, *self.further_statuses()])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
@@ -314,4 +320,4 @@ class ArmidNode(Node):
             self.complaints.say('parameter', str(error))
 
     def _surviving(self, callback: Callable[..., Any], what: str) -> Callable[..., Any]:
-        return surviving(callback, what, lambda: self.complaints, lambda: self.context.ok())
+        return surviving(callback, what, self)

@@ -70,12 +70,7 @@ class Complaints:
         self.fresh = False
 
 
-def surviving(
-    callback: Callable[..., Any],
-    what: str,
-    complaints: Callable[[], Complaints],
-    running: Callable[[], bool],
-) -> Callable[..., Any]:
+def surviving(callback: Callable[..., Any], what: str, node: Any) -> Callable[..., Any]:
     """
     Return a callback that complains where another one would raise.
 
@@ -85,10 +80,8 @@ def surviving(
         Of a subscription or a timer.
     what : str
         What calls it, such as a topic.
-    complaints : callable
-        Returns where to complain.
-    running : callable
-        Returns whether ROS runs; while it shuts down exceptions are its way to say so.
+    node : ArmidNode
+        Takes the complaints; while ROS shuts down exceptions are its way to say so.
 
     """
 
@@ -99,11 +92,11 @@ def surviving(
         except FATAL:
             raise
         except ArmidError as error:
-            complaints().say(what, f'{what}: {error}')
+            node.complaints.say(what, f'{what}: {error}')
         except Exception as error:
-            if not running():
+            if not node.context.ok():
                 raise
-            complaints().defect(what, error)
+            node.complaints.defect(what, error)
         return None
 
     return survive

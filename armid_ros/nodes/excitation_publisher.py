@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 import math
 import time
 from typing import Any
@@ -28,7 +28,7 @@ from armid_ros.nodes.base import ArmidNode
 from armid_ros.nodes.parameters.excitation import (
     checked,
     make_excitation,
-    make_surroundings,
+    make_planner,
     PUBLISHER_PARAMETERS,
     SIMULATION,
 )
@@ -38,7 +38,6 @@ from armid_ros.nodes.running.process import run
 from armid_ros.nodes.trajectory.messages import write_trajectory
 from armid_ros.nodes.trajectory.senders import TrajectorySenders
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from std_msgs.msg import String
 
 #: How often a subscriber is looked for, and whether the arm is still heard of [s].
@@ -89,13 +88,12 @@ class ExcitationPublisherNode(ArmidNode):
         super().__init__('excitation_publisher', **kwargs)
         self._rate = float(self.value('rate'))
         if planner is None:
-            surroundings = make_surroundings(self.value)
-            planner = surroundings.planner
-            if surroundings.unchecked:
-                self.get_logger().warning(f'not checked: {"; ".join(surroundings.unchecked)}')
+            planner, unchecked = make_planner(self.value)
+            if unchecked:
+                self.get_logger().warning(f'not checked: {"; ".join(unchecked)}')
             if excitation is None:
                 self.get_logger().info('making the excitation')
-                excitation = make_excitation(self.value, self._rate, surroundings)
+                excitation = make_excitation(self.value, self._rate, planner)
         if excitation is None:
             raise TrajectoryError('a planner needs an excitation to plan the way to')
         self._planner = planner
@@ -118,8 +116,7 @@ class ExcitationPublisherNode(ArmidNode):
         self.offer('~/start', self.start)
         self.offer('~/rehearse', self.rehearse)
         self.offer('~/stop', self.stop)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(_LOOK_PERIOD, self.look, clock=steady)
+        self._timer = self.look_every(_LOOK_PERIOD, self.look)
 
     def parameters(self) -> Sequence[NodeParameter]:
         """Return the parameters; those of a simulation have defaults of their own."""
@@ -437,10 +434,4 @@ class ExcitationPublisherNode(ArmidNode):
         self.get_logger().error(text)
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(ExcitationPublisherNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, ExcitationPublisherNode)

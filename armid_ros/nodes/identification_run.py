@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 import json
 from pathlib import Path
 import subprocess
@@ -74,7 +75,7 @@ class IdentificationRunNode(ArmidNode):
             'identification',
             'Folder, in which identification and diagnosis get one each.',
         ),
-        NodeParameter('runs', 2, 'Number of runs of the excitation.', lower=1, upper=20),
+        NodeParameter('runs', 2, 'Number of runs of the excitation.', limits=(1, 20)),
         NodeParameter(
             'rehearse', False, 'Run it slowly first, and go on only if that is as foreseen.'
         ),
@@ -87,8 +88,7 @@ class IdentificationRunNode(ArmidNode):
             'How long to wait for the other nodes, of which one may have to design an excitation '
             'first, and for a controller and joint states.',
             's',
-            lower=1.0,
-            upper=3600.0,
+            limits=(1.0, 3600.0),
         ),
     )
 
@@ -310,10 +310,4 @@ class IdentificationRunNode(ArmidNode):
                 self._state = {**values, 'message': status.message}
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(IdentificationRunNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, IdentificationRunNode)

@@ -17,6 +17,7 @@ from armid_ros.nodes.messages.classes import message_class
 from armid_ros.nodes.parameters.table import names, NodeParameter, ParameterError
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription, SAMPLES
 from armid_ros.nodes.running.process import run
+from armid_ros.recording.tables import per_joint
 from armid_ros.robots import robot_from_urdf
 import numpy as np
 from rclpy.time import Time
@@ -142,16 +143,15 @@ class JointStateMergerNode(ArmidNode):
     def _adopt(self, joints: Sequence[str]) -> None:
         if tuple(joints) == self.joints:
             return
-        gains, others = self.value('gains'), names(self, 'effort_joints')
-        for name, values in (('gains', gains), ('effort_joints', others)):
-            if len(values) not in ((1, len(joints)) if name == 'gains' else (0, len(joints))):
-                raise ParameterError(
-                    f"parameter '{name}' has {len(values)} for {len(joints)} joints: "
-                    f'{", ".join(joints)}'
-                )
+        others = names(self, 'effort_joints')
+        if len(others) not in (0, len(joints)):
+            raise ParameterError(
+                f"parameter 'effort_joints' has {len(others)} for {len(joints)} joints: "
+                f'{", ".join(joints)}'
+            )
+        self._gains = per_joint(self.value('gains'), joints, "parameter 'gains'")
         self.joints = tuple(joints)
         self._effort_names = others or self.joints
-        self._gains = np.broadcast_to(np.array(gains, dtype=float), (len(joints),))
         self._merger = JointMerger(2 * len(joints))  # positions, and after them torques
 
     def _on_positions(self, with_effort: bool, message: JointState) -> None:
@@ -236,10 +236,4 @@ class JointStateMergerNode(ArmidNode):
         return stamp.sec * 10**9 + stamp.nanosec or self.get_clock().now().nanoseconds
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(JointStateMergerNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, JointStateMergerNode)

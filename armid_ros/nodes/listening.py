@@ -13,6 +13,7 @@ from armid_ros.nodes.messages.timeliness import Freshness, StampDifference
 from armid_ros.nodes.qos import LATCHED, MatchedSubscription
 from armid_ros.recording.message_types import header_stamp
 from armid_ros.robots import Robot
+from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -86,6 +87,10 @@ class ListeningNode(ArmidNode):
         if self.robot is None:
             return 'waiting for robot_description'
         return '' if self.received else 'no joint states so far'
+
+    def level(self, troubled: bool) -> bytes:
+        """Return STALE when joint states have stopped."""
+        return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
 
     def look(self) -> None:
         """Look at who publishes joint states, and say at once when they stop or come again."""

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from armid_msgs.msg import Diagnosis
@@ -15,6 +16,7 @@ from armid_ros.errors import ArmidError, IdentificationError
 from armid_ros.files.own import refuse_replacing
 from armid_ros.live import Answer, Assistant, LiveDiagnosis, StreamWatch
 from armid_ros.live.assistant import Done, Helper, Plan, Save
+from armid_ros.nodes.base import key_values
 from armid_ros.nodes.listening import ListeningNode
 from armid_ros.nodes.messages.joint_states import disturbance, JointSample
 from armid_ros.nodes.parameters.live import (
@@ -25,7 +27,7 @@ from armid_ros.nodes.parameters.live import (
 )
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.nodes.running.process import run
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 
 #: What each verdict is in /diagnostics: something is wrong where it names or cannot name.
@@ -187,10 +189,6 @@ class LiveDiagnosisNode(ListeningNode):
         name = f'{self.get_fully_qualified_name()[1:]}: diagnosis'
         return (_status(name, self.hardware, self.live.latest),)
 
-    def level(self, troubled: bool) -> bytes:
-        """Return STALE when joint states have stopped."""
-        return DiagnosticStatus.STALE if self.freshness.stopped else super().level(troubled)
-
     def objection(self, values: Mapping[str, Any]) -> str:
         """Refuse settings that do not fit each other."""
         try:
@@ -312,7 +310,7 @@ def _status(name: str, robot: str, answer: Answer | None) -> DiagnosticStatus:
         for parameter, value, std in _rows(finding):
             what = ' '.join(filter(None, (finding.name, parameter.joint, parameter.name)))
             numbers |= {f'{what} [{parameter.unit}]': value, f'{what} std': std}
-    status.values = [KeyValue(key=k, value=f'{float(x):.9g}') for k, x in numbers.items()]
+    status.values = key_values(numbers)
     return status
 
 
@@ -327,10 +325,4 @@ def _in_words(live: LiveDiagnosis) -> str:
     )
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(LiveDiagnosisNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, LiveDiagnosisNode)

@@ -128,11 +128,50 @@ def run_lockstep(
         learner = None if identifier is None else stage.add(OnlineIdentifierNode, identifier)
         topics = list(_TOPICS if learner is None else _TOPICS + _LEARNED)
         recorder = stage.add(RecorderNode, bag=str(bag), topics=topics)
-        run = _Run(stage, arm, rate, recorder, learner)
-        run.begin(excitation, approach)
-        watch = _Watch(run.duration, on_progress)
+        plant = stage.add(
+            SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
+        )
+        # The simulated arm looks at the limits, and nothing in a simulation can be hit.
+        planner = TransferPlanner(ArmModel(arm.plant.robot), None, None, 0.0)
+        publisher = stage.add(
+            ExcitationPublisherNode, excitation, planner, start=False, approach=approach
+        )
+        listeners = [recorder, publisher, *([] if learner is None else [learner])]
+        topic = plant.resolve_topic_name('joint_states')
+
+        def connected() -> bool:
+            recorder.look()
+            plant.publish_clock()
+            return (
+                not recorder.missing
+                and (learner is None or _matched(learner))
+                and plant.readers >= len(listeners)
+                and publisher.readers >= 1
+                and all(node.get_clock().now().nanoseconds for node in listeners)
+            )
+
+        def step() -> int:
+            stamp = plant.step()
+            stage.spin_until(
+                lambda: (
+                    recorder.last_stamps.get(topic) == stamp
+                    and (learner is None or learner.last_stamp_ns == stamp)
+                ),
+                topic,
+            )
+            if plant.complaints.counts:
+                raise ArmidError(plant.complaints.latest)
+            return stamp
+
+        stage.spin_until(connected, 'discovery')
+        for _ in range(max(math.ceil(_SEEN * rate), AGREEING) + 1):
+            begun = step()
+            stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
+        publisher.start()
+        stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
+        watch = _Watch(publisher.duration + (begun - EPOCH_NS) * 1e-9 + _REST, on_progress)
         while watch.t < watch.duration:
-            watch.see(run.step())
+            watch.see(step())
         return watch.progress()
 
 
@@ -235,70 +274,6 @@ class Stage:
                     'blocked?'
                 )
             self._executor.spin_once(timeout_sec=0.1)
-
-
-class _Run:
-    """An excitation of an arm; duration is the time from the first stamp to its end [s]."""
-
-    def __init__(
-        self,
-        stage: Stage,
-        arm: SimulatedArm,
-        rate: float,
-        recorder: RecorderNode,
-        learner: OnlineIdentifierNode | None,
-    ) -> None:
-        self._stage, self._recorder, self._learner = stage, recorder, learner
-        self._robot = arm.plant.robot
-        self._plant = stage.add(
-            SimulatedArmNode, arm, EPOCH_NS, rate=rate, real_time_factor=0.0, use_sim_time=False
-        )
-        self.duration = 0.0
-
-    def begin(self, excitation: Excitation, approach: float) -> None:
-        """Wait until everybody hears everybody, and start the excitation."""
-        stage, plant = self._stage, self._plant
-        # The simulated arm looks at the limits, and nothing in a simulation can be hit.
-        planner = TransferPlanner(ArmModel(self._robot), None, None, 0.0)
-        publisher = stage.add(
-            ExcitationPublisherNode, excitation, planner, start=False, approach=approach
-        )
-        stage.spin_until(lambda: self._connected(publisher), 'discovery')
-        for _ in range(max(math.ceil(_SEEN * plant.value('rate')), AGREEING) + 1):
-            begun = self.step()
-            stage.spin_until(lambda begun=begun: publisher.last_stamp_ns == begun, 'joint_states')
-        publisher.start()
-        stage.spin_until(lambda: plant.moving or plant.complaints.counts, 'joint_trajectory')
-        self.duration = publisher.duration + (begun - EPOCH_NS) * 1e-9 + _REST
-
-    def _connected(self, publisher: ExcitationPublisherNode) -> bool:
-        """Whether everybody hears everybody, and the clock."""
-        recorder, learner = self._recorder, self._learner
-        listeners = [recorder, publisher, *([] if learner is None else [learner])]
-        recorder.look()
-        self._plant.publish_clock()
-        return (
-            not recorder.missing
-            and (learner is None or _matched(learner))
-            and self._plant.readers >= len(listeners)
-            and publisher.readers >= 1
-            and all(node.get_clock().now().nanoseconds for node in listeners)
-        )
-
-    def step(self) -> int:
-        """Move the arm on until its joint state is everywhere; return the stamp [ns]."""
-        plant, learner = self._plant, self._learner
-        stamp, topic = plant.step(), plant.resolve_topic_name('joint_states')
-        stamps = self._recorder.last_stamps
-        self._stage.spin_until(
-            lambda: (
-                stamps.get(topic) == stamp and (learner is None or learner.last_stamp_ns == stamp)
-            ),
-            topic,
-        )
-        if plant.complaints.counts:
-            raise ArmidError(plant.complaints.latest)
-        return stamp
 
 
 class _Watch:

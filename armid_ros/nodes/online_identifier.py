@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 import sys
 import time
@@ -16,12 +17,9 @@ from armid_msgs.msg import ParameterEstimate
 from armid_ros.arm.model_file import read_model
 from armid_ros.effects import Effect
 from armid_ros.errors import ArmidError, IdentificationError
+from armid_ros.estimate import Estimate
 from armid_ros.files.own import refuse_replacing
-from armid_ros.identification.online.change import Change
-from armid_ros.identification.online.identifier import (
-    OnlineIdentifier,
-    OnlineSettings,
-)
+from armid_ros.identification.online.identifier import OnlineIdentifier, OnlineSettings
 from armid_ros.identification.online.learning_progress import LearningProgress, too_little_motion
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.listening import ListeningNode
@@ -32,11 +30,7 @@ from armid_ros.nodes.messages.estimates import (
     parameter_status,
     save_identification,
 )
-from armid_ros.nodes.messages.joint_states import (
-    disturbance,
-    DISTURBANCES,
-    JointSample,
-)
+from armid_ros.nodes.messages.joint_states import disturbance, DISTURBANCES, JointSample
 from armid_ros.nodes.parameters.identifier import (
     IDENTIFIER_PARAMETERS,
     make_identifier,
@@ -45,6 +39,7 @@ from armid_ros.nodes.parameters.identifier import (
 from armid_ros.nodes.parameters.table import NodeParameter
 from armid_ros.nodes.qos import LATCHED, STREAM
 from armid_ros.nodes.running.process import run
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rclpy.publisher import Publisher
@@ -77,8 +72,7 @@ class OnlineIdentifierNode(ListeningNode):
             10.0,
             'Publishing rate of ~/estimate.',
             'Hz',
-            lower=0.1,
-            upper=1000.0,
+            limits=(0.1, 1000.0),
             read_only=False,
         ),
         NodeParameter(
@@ -146,11 +140,7 @@ class OnlineIdentifierNode(ListeningNode):
         if identifier is None or identifier.samples in (0, self._published):
             return
         self._published = identifier.samples
-        message = estimate_message(
-            identifier.estimate(), identifier.samples, identifier.condition_number
-        )
-        message.header.stamp = self._last_sample_stamp
-        self._estimates.publish(message)
+        self._publish(self._estimates, identifier.estimate(), self._last_sample_stamp)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Say how the identification goes."""
@@ -216,11 +206,9 @@ class OnlineIdentifierNode(ListeningNode):
 
     def level(self, troubled: bool) -> bytes:
         """Return STALE when joint states have stopped, ERROR when nothing can be learned."""
-        if self.freshness.stopped:
-            return DiagnosticStatus.STALE
-        if self.identifier is not None and self.identifier.error:
-            return DiagnosticStatus.ERROR
-        return super().level(troubled)
+        failed = self.identifier is not None and bool(self.identifier.error)
+        stopped = self.freshness.stopped
+        return DiagnosticStatus.ERROR if failed and not stopped else super().level(troubled)
 
     def _say_what_was_left_out(self, identifier: OnlineIdentifier) -> None:
         counted = Counter(identifier.rejected) + Counter(identifier.restarts)
@@ -255,12 +243,8 @@ class OnlineIdentifierNode(ListeningNode):
         self._begin(make_identifier(self.value, urdf))
 
     def _on_model(self, message: String) -> None:
-        """
-        Estimate the effects of a model from its values on, if it has others.
-
-        Effects of the parameters stay, as a model without friction is no reason to forget it.
-
-        """
+        """Estimate the effects of a model from its values on, if it has others."""
+        # Effects of the parameters stay, as a model without friction is no reason to forget it.
         before = self._require()
         arm = read_model(message.data, before.arm.robot, 'model')
         kept = [e for e in self._own_effects if not any(_covers(m, e) for m in arm.effects)]
@@ -285,18 +269,16 @@ class OnlineIdentifierNode(ListeningNode):
             self._publish_effort(self._predictions, learned.predicted)
             self._publish_effort(self._residuals, learned.residual)
         for change in identifier.changes[self._told :]:
-            self._tell(change)
+            self._told += 1
+            self._progress.reset()  # what is learned anew has ten seconds, too
+            self.get_logger().warning(str(change))
+            self._publish(self._changes, change.size, self.reader.stamp(change.t).to_msg())
 
-    def _tell(self, change: Change) -> None:
-        """Publish a change."""
-        self._told += 1
-        self._progress.reset()  # what is learned anew has ten seconds, too
-        self.get_logger().warning(str(change))
-        message = estimate_message(
-            change.size, self._require().samples, self._require().condition_number
-        )
-        message.header.stamp = self.reader.stamp(change.t).to_msg()
-        self._changes.publish(message)
+    def _publish(self, publisher: Publisher, estimate: Estimate, stamp: Time) -> None:
+        identifier = self._require()
+        message = estimate_message(estimate, identifier.samples, identifier.condition_number)
+        message.header.stamp = stamp
+        publisher.publish(message)
 
     def _publish_effort(self, publisher: Publisher, effort: FloatArray) -> None:
         if publisher.get_subscription_count():
@@ -339,10 +321,4 @@ def _covers(one: Effect, other: Effect) -> bool:
     return one.name == other.name and set(one.joints) >= set(other.joints)
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(OnlineIdentifierNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, OnlineIdentifierNode)

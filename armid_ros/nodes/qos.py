@@ -26,7 +26,7 @@ DEPTH = 1000
 SAMPLES = QoSProfile(depth=DEPTH)
 
 
-def matching(publishers: Sequence[TopicEndpointInfo], depth: int = DEPTH) -> QoSProfile:
+def matching(publishers: Sequence[TopicEndpointInfo], depth: int) -> QoSProfile:
     """
     Return the strictest profile that all publishers of a topic satisfy, as rosbag2 does.
 
@@ -51,11 +51,11 @@ def recorded(publishers: Sequence[TopicEndpointInfo]) -> tuple[Qos, ...]:
     )
 
 
-def offered(profiles: Sequence[Qos], depth: int = DEPTH) -> QoSProfile:
+def offered(profiles: Sequence[Qos]) -> QoSProfile:
     """Return the profile to publish a recorded topic with: the least that all recorded offer."""
     best_effort = any(p.reliability is QosReliability.BEST_EFFORT for p in profiles)
     latched = {p.durability for p in profiles} == {QosDurability.TRANSIENT_LOCAL}
-    return _profile(depth, not best_effort, latched)
+    return _profile(DEPTH, not best_effort, latched)
 
 
 def _profile(depth: int, reliable: bool, latched: bool) -> QoSProfile:

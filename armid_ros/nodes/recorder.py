@@ -73,8 +73,7 @@ class RecorderNode(ArmidNode):
             50.0,
             'Free space on the disk below which the bag is completed and the node ends.',
             'MB',
-            lower=0.0,
-            upper=1e6,
+            limits=(0.0, 1e6),
             read_only=False,
         ),
         NodeParameter(
@@ -82,8 +81,7 @@ class RecorderNode(ArmidNode):
             0.1,
             'Age at which a chunk is written out.',
             's',
-            lower=0.01,
-            upper=60.0,
+            limits=(0.01, 60.0),
             read_only=False,
         ),
     )
@@ -314,10 +312,4 @@ class RecorderNode(ArmidNode):
         return RecordingEnded(f'{reason}; recording ends: {kept}')
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(RecorderNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, RecorderNode)

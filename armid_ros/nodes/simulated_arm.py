@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from armid_ros.arm import ArmModel
@@ -30,7 +31,6 @@ from armid_ros.simulation import Reference, SimulatedArm
 from armid_ros.simulation.run import whole_steps
 from armid_ros.simulation.simulated_arm import LinkSample
 from builtin_interfaces.msg import Time as TimeMessage
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -52,39 +52,26 @@ LONGEST_NS = 60 * 10**9
 _SHORTEST_PERIOD = 0.0005
 
 
-class ElasticTopics:
-    """
-    Publishers of link/joint_states, reference/joint_states and an imu topic for every link.
+def _samples(node: Node, kind: type, topic: str) -> Publisher:
+    """Return a publisher of what is measured, whose quality of service a user may choose."""
+    options = QoSOverridingOptions.with_default_policies()
+    return node.create_publisher(kind, topic.lstrip('/'), SAMPLES, qos_overriding_options=options)
 
-    Parameters
-    ----------
-    node : Node
-        Whose topics they are.
-    arm : SimulatedArm
-        The arm, with springs.
 
-    """
+class _ElasticTopics:
+    """Publishers of link/joint_states, reference/joint_states and an imu topic for every link."""
 
     def __init__(self, node: Node, arm: SimulatedArm) -> None:
-        def publisher(kind: type, topic: str) -> tuple:  # type: ignore[type-arg]
-            return node.create_publisher(
-                kind,
-                topic.lstrip('/'),
-                SAMPLES,
-                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-            )
-
-        self._link = publisher(JointState, LINK), JointState(name=list(arm.joints))
-        self._reference = publisher(JointState, REFERENCE), JointState(name=list(arm.joints))
+        self._link = _samples(node, JointState, LINK), JointState(name=list(arm.joints))
+        self._reference = _samples(node, JointState, REFERENCE), JointState(name=list(arm.joints))
         self._imus = []
         for link in arm.plant.robot.links:
             message = Imu()
             message.header.frame_id = link
             message.orientation_covariance[0] = message.angular_velocity_covariance[0] = -1.0
-            self._imus.append((publisher(Imu, imu_topic(link)), message))
+            self._imus.append((_samples(node, Imu, imu_topic(link)), message))
 
     def publish(self, sample: LinkSample, stamp: TimeMessage) -> None:
-        """Publish a sample."""
         for (publisher, message), q, dq in (
             (self._link, sample.q, sample.dq),
             (self._reference, sample.asked_q, sample.asked_dq),
@@ -122,8 +109,7 @@ class SimulatedArmNode(ArmidNode):
             1000.0,
             'Publishing rate of joint_states.',
             'Hz',
-            lower=0.1,
-            upper=100000.0,
+            limits=(0.1, 100000.0),
             read_only=False,
         ),
         NodeParameter(
@@ -131,8 +117,7 @@ class SimulatedArmNode(ArmidNode):
             1.0,
             'Simulated time per real time, if the computer can; who cannot follow loses '
             'messages. 0: moves only when told.',
-            lower=0.0,
-            upper=1000.0,
+            limits=(0.0, 1000.0),
             read_only=False,
         ),
         NodeParameter(
@@ -140,8 +125,7 @@ class SimulatedArmNode(ArmidNode):
             100.0,
             'Of /clock where it is published, at most that of joint_states; in simulated time.',
             'Hz',
-            lower=0.1,
-            upper=100000.0,
+            limits=(0.1, 100000.0),
             read_only=False,
         ),
     )
@@ -177,16 +161,11 @@ class SimulatedArmNode(ArmidNode):
         self._pending: tuple[int, Reference] | None = None
         self.real_time = RealTime(lambda: self._arm.state.t, self.step)
         self._owed = 0.0
-        self._states = self.create_publisher(
-            JointState,
-            'joint_states',
-            SAMPLES,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
-        )
+        self._states = _samples(self, JointState, 'joint_states')
         self._message = JointState(name=list(self._arm.joints))
         self._sides = None
         if self._arm.plant.springs is not None:
-            self._sides = ElasticTopics(self, self._arm)
+            self._sides = _ElasticTopics(self, self._arm)
         self._clock_publisher: Publisher | None = None
         self._timer: Timer | None = None
         self._keep_pace()
@@ -216,8 +195,7 @@ class SimulatedArmNode(ArmidNode):
             self._timer = self.create_timer(1.0 / rate, self.follow)
         elif self._factor:
             period = max(1.0 / (rate * self._factor), _SHORTEST_PERIOD)
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._timer = self.create_timer(period, self.catch_up, clock=steady)
+            self._timer = self.look_every(period, self.catch_up)
 
     @property
     def stamp_ns(self) -> int:
@@ -308,9 +286,8 @@ class SimulatedArmNode(ArmidNode):
 
     def objection(self, values: Mapping[str, Any]) -> str:
         """Refuse effects that the arm cannot have, and noise and rates that do not fit it."""
-        n_joints = self._arm.plant.robot.n_joints
         try:
-            sensors_of(lambda name: values.get(name, self.value(name)), n_joints)
+            sensors_of(lambda name: values.get(name, self.value(name)), self._arm.joints)
             self._steps_at(values.get('rate', self.value('rate')))
             if 'effects' in values:
                 self._arm.successor(self._with_effects(values['effects']))
@@ -325,7 +302,7 @@ class SimulatedArmNode(ArmidNode):
         if names & {'rate', 'real_time_factor', 'clock_rate'}:
             self.real_time.given_up = 0.0
             self._keep_pace()
-        described = sensors_of(self.value, self._arm.plant.robot.n_joints)
+        described = sensors_of(self.value, self._arm.joints)
         known = {name: getattr(described, name) for name in names & SENSOR_PARAMETERS}
         self._arm.sensors = replace(self._arm.sensors, **known)
 
@@ -378,10 +355,4 @@ class SimulatedArmNode(ArmidNode):
         self.complaints.say('trajectory', f'{error}; it is refused, and the arm {goes_on}')
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(SimulatedArmNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, SimulatedArmNode)

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-A bag as one source of messages: a directory of files with or without metadata, or a bare file.
-
-Files may be MCAP or SQLite, several of them, and compressed by rosbag2 as a whole or message by
-message.
-
-"""
+"""A bag as one source of messages: a directory of files with or without metadata, or a file."""
 
 from __future__ import annotations
 
@@ -57,7 +51,7 @@ def topics(path: str | Path, settings: ReadSettings = DEFAULT) -> tuple[Topic, .
         return bag.topics()
 
 
-class Bag:
+class Bag(Source):
     """All files of a bag, as one source; a context manager."""
 
     def __init__(self, path: str | Path, settings: ReadSettings = DEFAULT) -> None:
@@ -254,9 +248,6 @@ def _files_of(path: Path) -> BagMetadata:
             f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
             f'bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
-
-    def by_number(file: Path) -> tuple[tuple[int, str], ...]:
-        pieces = re.split(r'(\d+)', file.name)  # BAG_2.mcap is before BAG_10.mcap
-        return tuple((int(p), '') if p.isdecimal() else (-1, p) for p in pieces)
-
-    return BagMetadata(tuple(sorted(found, key=by_number)))
+    # BAG_2.mcap is before BAG_10.mcap
+    found.sort(key=lambda file: re.sub(r'\d+', lambda number: number[0].zfill(20), file.name))
+    return BagMetadata(tuple(found))

@@ -13,14 +13,12 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import ElasticRun, FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import write_joint_states
-from armid_ros.recording.message_types import BYTE_ORDERS, STRING, string_cdr
-from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.message_types import BYTE_ORDERS
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter, whole_bag
 from armid_ros.robots import Robot
 import numpy as np
-import numpy.typing as npt
 
 if TYPE_CHECKING:
     from armid_ros.simulation.accelerometers import LinkAccelerometers
@@ -49,8 +47,7 @@ def write_runs(
     """
     joints = robot.joints
     with whole_bag(path) as writer:
-        writer.add_topic('/robot_description', STRING, qos=[LATCHED])
-        writer.write('/robot_description', string_cdr(robot.urdf), _PAUSE_NS)
+        writer.write_description(robot.urdf, _PAUSE_NS)
         start = _PAUSE_NS
         for run in runs:
             motor, link = run.motor, run.link
@@ -62,41 +59,21 @@ def write_runs(
             write_joint_states(writer, REFERENCE, joints, stamps, asked, run.reference)
             felt = sensors.readings(link) if run.felt is None else run.felt
             for name, values in zip(robot.links, felt, strict=True):
-                write_accelerations(writer, imu_topic(name), name, stamps, values)
+                _write_accelerations(writer, imu_topic(name), name, stamps, values)
             start = int(stamps[-1]) + _PAUSE_NS
 
 
-def write_accelerations(
-    writer: BagWriter,
-    topic: str,
-    frame_id: str,
-    stamps_ns: npt.ArrayLike,
-    acceleration: npt.ArrayLike,
+def _write_accelerations(
+    writer: BagWriter, topic: str, frame_id: str, stamps: IntArray, acceleration: FloatArray
 ) -> None:
-    """
-    Write accelerometer readings to a topic of a bag, logged at their stamps.
-
-    Orientation and angular velocity are marked as not measured, by a covariance of -1.
-
-    Parameters
-    ----------
-    writer : BagWriter
-        The bag.
-    topic, frame_id : str
-        Where they go, and the frame they are in.
-    stamps_ns : array_like, shape (N,)
-        Stamps of the headers [ns].
-    acceleration : array_like, shape (N, 3)
-        Specific force [m/s^2]; that of a body at rest points up.
-
-    """
-    stamps = np.asarray(stamps_ns, np.int64)
+    """Write specific forces, shape (N, 3) [m/s^2], to a topic of a bag, logged at stamps [ns]."""
     layout = _layout(len(frame_id.encode()) + 1, '<')
     rows = np.zeros(len(stamps), layout)
     rows['encapsulation'] = (0, 1, 0, 0)
     rows['sec'], rows['nanosec'] = np.divmod(stamps, 10**9)
     rows['length'] = len(frame_id.encode()) + 1
     rows['frame'] = frame_id.encode()
+    # what is not measured has a covariance of -1
     rows['numbers'][:, _ORIENTATION_COVARIANCE] = -1.0
     rows['numbers'][:, _RATE_COVARIANCE] = -1.0
     rows['numbers'][:, _ACCELERATION] = acceleration

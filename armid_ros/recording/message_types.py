@@ -27,6 +27,8 @@ from rosbags.typesys.store import Typestore
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 JOINT_TRAJECTORY = 'trajectory_msgs/msg/JointTrajectory'
 STRING = 'std_msgs/msg/String'
+#: Arrays of a JointState.
+QUANTITIES = ('position', 'velocity', 'effort')
 #: Byte order of CDR, by what it begins with.
 BYTE_ORDERS = {b'\x00\x00': '>', b'\x00\x01': '<'}
 _BIG, _LITTLE = struct.Struct('>iI').unpack_from, struct.Struct('<iI').unpack_from

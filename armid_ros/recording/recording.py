@@ -26,8 +26,6 @@ _LABELS = {
     'dq': 'velocity [rad/s or m/s]',
     'tau': 'torque [N m or N]',
 }
-#: A step of this many nominal periods of the other machine is a hole that nothing bridges.
-_HOLE = 5.0
 #: Samples in common that are any use.
 _LEAST = 4
 
@@ -102,12 +100,6 @@ class PartnerMotion:
     def __post_init__(self) -> None:
         """Freeze the positions."""
         object.__setattr__(self, 'q', read_only(self.q))
-
-    def select(
-        self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
-    ) -> PartnerMotion:
-        """Return it at some of the samples."""
-        return replace(self, q=self.q[samples])
 
 
 @dataclass(frozen=True)
@@ -381,13 +373,14 @@ class Recording:
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
         """Return the recording at some of its samples, on the same time base."""
+        partner = self.partner
         return replace(
             self,
             t=self.t[samples],
             q=self.q[samples],
             dq=None if self.dq is None else self.dq[samples],
             tau=None if self.tau is None else self.tau[samples],
-            partner=None if self.partner is None else self.partner.select(samples),
+            partner=partner and replace(partner, q=partner.q[samples]),
         )
 
 
@@ -423,7 +416,7 @@ def recorded_together(
     inside = (t >= other.t[0]) & (t <= other.t[-1])
     steps = np.diff(other.t)
     after = np.clip(np.searchsorted(other.t, t), 1, len(steps))
-    inside &= steps[after - 1] <= _HOLE * other.period
+    inside &= steps[after - 1] <= GAP_PERIODS * other.period
     if np.count_nonzero(inside) < _LEAST:
         raise RecordingError(
             f'{recording.source}: {recording.topic} and {other.topic} have no time in common; '

@@ -11,10 +11,9 @@ from itertools import islice
 from pathlib import Path
 
 from armid_ros.errors import RecordingError
-from armid_ros.files import open_regular
 from armid_ros.recording.message_types import message_type, MessageType
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Topic, UNREADABLE
+from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic, UNREADABLE
 import numpy as np
 from rosbags.convert.converter import is_same_wireformat, migrate_bytes
 from rosbags.interfaces import Connection
@@ -26,28 +25,12 @@ from rosbags.typesys.base import TypesysError
 _BLOCK_MESSAGES = 4096
 
 
-class Ros1Source:
+class Ros1Source(Source):
     """One .bag file; topics whose types ROS 2 has not are listed, without messages."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """
-        Open a file.
-
-        Parameters
-        ----------
-        path : Path
-            The file.
-        settings : ReadSettings
-            Not needed: its chunks have no checksums, and one is in memory at a time.
-
-        Raises
-        ------
-        RecordingError
-            It is no bag of ROS 1.
-
-        """
-        open_regular(path, RecordingError).close()  # a FIFO would be waited for
-        self._damage = Damage()
+        """Open a bag of ROS 1, whose chunks have no checksums; one is in memory at a time."""
+        super().__init__(path, settings)
         self._old = get_typestore(Stores.ROS1_NOETIC)
         self._new = get_typestore(Stores.ROS2_JAZZY)
         self._converter = cache(self._make_converter)
@@ -61,17 +44,10 @@ class Ros1Source:
                 with suppress(TypesysError):
                     self._old.register(get_types_from_msg(one.msgdef.data, one.msgtype))
 
-    @property
-    def damage(self) -> str:
-        """Return what is wrong with the file, as far as it was read; empty for a whole one."""
-        return str(self._damage)
-
     def close(self) -> None:
-        """Let go of the file."""
         self._reader.close()
 
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics, in order of appearance."""
         found: dict[str, Topic] = {}
         for one in self._reader.connections:
             known = self._is_known(one)
@@ -82,7 +58,6 @@ class Ros1Source:
         return tuple(found.values())
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic, in the order they are stored."""
         wanted = [one for one in self._reader.connections if one.topic == topic]
         stream = self._read(wanted)
         while messages := list(islice(stream, _BLOCK_MESSAGES)):
@@ -90,7 +65,6 @@ class Ros1Source:
             yield MessageBlock.joined([message.cdr for message in messages], times, times)
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order they were logged."""
         return self._read(self._reader.connections)
 
     def _read(self, connections: list[Connection]) -> Iterator[RawMessage]:

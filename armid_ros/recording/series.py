@@ -3,24 +3,22 @@
 """
 From decoded messages to samples on one time base.
 
-Messages that name the same joints are a series. A series is put in order: messages without a
-stamp dropped, the longest run kept where the clock was set back, late messages sorted in, repeated
-stamps dropped. When joints are spread over several series (one driver an arm half, say), the
-series with the most samples gives the time base; the others contribute their values at equal
-stamps exactly and are interpolated linearly between stamps, but not over their gaps.
+Messages that name the same joints are a series. Of several series the one with the most samples
+gives the time base; the others are interpolated linearly, but not over their gaps.
 
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.decoder import JointSamples
+from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.recording import Clock, GAP_PERIODS, gaps, ReadReport, Recording
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.turns import unwrapped
@@ -28,7 +26,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
-_QUANTITIES = ('position', 'velocity', 'effort')
 # A backward step of the clock of more than this is a restart (a simulation reset, a bag played in
 # a loop), not a late message.
 RESTART_NS = 10**9
@@ -62,25 +59,6 @@ def gather(pieces: Sequence[JointSamples]) -> list[JointSamples]:
             whole = whole.select(np.argsort(number, kind='stable'))
         gathered.append(whole)
     return gathered
-
-
-def choose_clock(gathered: Sequence[JointSamples]) -> tuple[Clock, str]:
-    """
-    Decide whose time to use.
-
-    Returns
-    -------
-    clock : {'header', 'receive'}
-        Whose.
-    note : str
-        Why not the header's; empty for the header's.
-
-    """
-    for states in gathered:
-        problem = clock_problem(states.stamps, states.values[0], states.receive)
-        if problem:
-            return 'receive', f'header stamps {problem}'
-    return 'header', ''
 
 
 def clock_problem(
@@ -134,43 +112,6 @@ def ordered(series: JointSamples, clock: Clock, counts: Counter[str]) -> JointSa
         counts['restarted'] += len(series) - (run.stop - run.start)
         series = series.select(run)
     return _sorted(series, counts)
-
-
-def not_finite(
-    joints: Sequence[str], values: Iterable[tuple[str, FloatArray | None]], count: int
-) -> tuple[npt.NDArray[np.bool_], tuple[str, ...]]:
-    """
-    Find values that are not finite, or beyond all quantities (1e15).
-
-    Parameters
-    ----------
-    joints : sequence of str
-        n names.
-    values : iterable of (str, ndarray, shape (N, n), or None)
-        Quantities with their names; None for one that was not measured.
-    count : int
-        Number of samples N.
-
-    Returns
-    -------
-    bad : ndarray, shape (N,)
-        True where some value is not finite.
-    said : tuple of str
-        How many there are of each quantity and joint: 'effort of elbow in 10'.
-
-    """
-    bad = np.zeros(count, np.bool_)
-    said = []
-    for name, array in values:
-        if array is None:
-            continue
-        wrong = ~(np.abs(array) < LARGEST)
-        if wrong.any():
-            bad |= wrong.any(axis=1)
-            for joint, number in zip(joints, wrong.sum(axis=0).tolist(), strict=True):
-                if number:
-                    said.append(f'{name} of {joint} in {number}')
-    return bad, tuple(said)
 
 
 def merged(
@@ -276,13 +217,9 @@ def longest_run(stamps: IntArray) -> slice | None:
 
 
 def _runs_again(stamps: IntArray, back: int) -> bool:
-    """
-    Whether the clock runs a second time through what it had been through before a step back.
-
-    Messages that were late fill a hole; together with those before them they are as many as the
-    time holds. A clock that was set back gives twice as many.
-
-    """
+    """Whether the clock runs a second time through what it had been through before a step back."""
+    # Messages that were late fill a hole; together with those before them they are as many as the
+    # time holds. A clock that was set back gives twice as many.
     first, last = stamps[back + 1], stamps[back]
     steps = np.diff(stamps)
     period = float(np.median(steps[steps > 0]))
@@ -333,16 +270,36 @@ def _finite(
     where: str, joints: tuple[str, ...], series: JointSamples, counts: Counter[str]
 ) -> tuple[JointSamples, tuple[str, ...], tuple[str, ...]]:
     """Return the finite samples, the quantities that are absent, and what is not finite."""
-    quantities, absent = _measured_quantities(where, series)
-    bad, culprits = not_finite(joints, zip(_QUANTITIES, quantities, strict=True), len(series))
+    absent: list[str] = []
+    quantities: list[FloatArray | None] = []
+    for name, values in zip(QUANTITIES, series.values, strict=True):
+        if values is None:
+            lacking = list(joints)
+        else:
+            # NaN in the first sample of a joint is a matter of its column, and rare.
+            suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
+            lacking = [joints[j] for j in suspect if np.isnan(values[:, j]).all()]
+        if lacking:
+            everyone = len(lacking) == len(joints)
+            absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
+        quantities.append(None if lacking else values)
+    if quantities[0] is None:
+        raise RecordingError(f'{where} has no {absent[0]}')
+    bad, culprits = np.zeros(len(series), np.bool_), []
+    for name, values in zip(QUANTITIES, quantities, strict=True):
+        wrong = None if values is None else ~(np.abs(values) < LARGEST)
+        if wrong is not None and wrong.any():
+            bad |= wrong.any(axis=1)
+            numbers = zip(joints, wrong.sum(axis=0).tolist(), strict=True)
+            culprits += [f'{name} of {joint} in {number}' for joint, number in numbers if number]
     dropped = int(bad.sum())
     if dropped > MAX_NOT_FINITE * len(series):
         raise RecordingError(
             f'{where}: {dropped} of {len(series)} samples are not finite ({"; ".join(culprits)})'
         )
     counts['nan'] += dropped
-    samples = JointSamples(joints, series.stamps, quantities)
-    return (samples.select(~bad) if dropped else samples), absent, culprits
+    samples = JointSamples(joints, series.stamps, tuple(quantities))
+    return (samples.select(~bad) if dropped else samples), tuple(absent), tuple(culprits)
 
 
 def assemble(
@@ -379,7 +336,9 @@ def assemble(
     """
     gathered = gather(pieces)
     pieces.clear()
-    clock, note = choose_clock(gathered)
+    problems = (clock_problem(one.stamps, one.values[0], one.receive) for one in gathered)
+    note = next((f'header stamps {problem}' for problem in problems if problem), '')
+    clock: Clock = 'receive' if note else 'header'
     for states in gathered if clock == 'receive' else ():
         if states.receive is None:
             raise RecordingError(f'{where}: {note}; name another with --time, or give --rate')
@@ -422,25 +381,3 @@ def assemble(
         report=report,
         **about,
     )
-
-
-def _measured_quantities(
-    where: str, series: JointSamples
-) -> tuple[tuple[FloatArray | None, ...], tuple[str, ...]]:
-    """Tell quantities that were measured from those never filled in."""
-    absent: list[str] = []
-    kept: list[FloatArray | None] = []
-    for name, values in zip(_QUANTITIES, series.values, strict=True):
-        if values is None:
-            lacking = list(series.joints)
-        else:
-            # NaN in the first sample of a joint is a matter of its column, and rare.
-            suspect = np.flatnonzero(np.isnan(values[:1]).any(axis=0))
-            lacking = [series.joints[j] for j in suspect if np.isnan(values[:, j]).all()]
-        if lacking:
-            everyone = len(lacking) == len(series.joints)
-            absent.append(name if everyone else f'{name} of {", ".join(lacking)}')
-        kept.append(None if lacking else values)
-    if kept[0] is None:
-        raise RecordingError(f'{where} has no {absent[0]}')
-    return tuple(kept), tuple(absent)

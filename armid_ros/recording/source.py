@@ -1,21 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-What every storage of messages offers: its topics, and their messages as raw CDR.
-
-Messages come in two ways: in blocks of many for array code, in the order of storage, and one by
-one in the order of time, for playing them.
-
-"""
+"""What every storage of messages offers: its topics, and their messages as raw CDR."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import mmap
-from typing import NamedTuple, Protocol
+from pathlib import Path
+from typing import NamedTuple
 
+from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
 from armid_ros.recording.message_types import MessageType
+from armid_ros.recording.settings import DEFAULT, ReadSettings
 import numpy as np
 import numpy.typing as npt
 from rosbags.interfaces import Qos
@@ -129,27 +128,47 @@ class Damage:
         self._problems[problem] = None
 
 
-class Source(Protocol):
-    """
-    A storage of messages: one file, or the files of one bag.
+class Source(ABC):
+    """A storage of messages: one file, or the files of one bag."""
 
-    ``damage`` says what is wrong with it, as far as was read; it is empty for a whole storage.
+    def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
+        """
+        Open a storage, for reading only.
 
-    """
+        Parameters
+        ----------
+        path : Path
+            Its file.
+        settings : ReadSettings
+            What to check, and how much memory to take.
+
+        Raises
+        ------
+        RecordingError
+            It cannot be read, or is none of the kind.
+
+        """
+        open_regular(path, RecordingError).close()  # a FIFO would be waited for
+        self._path, self._settings, self._damage = path, settings, Damage()
 
     @property
     def damage(self) -> str:
-        """Return what is wrong with the storage; empty for a whole one."""
+        """Return what is wrong with it, as far as it was read; empty for a whole one."""
+        return str(self._damage)
 
+    @abstractmethod
     def topics(self) -> tuple[Topic, ...]:
         """Return the topics, in order of appearance."""
 
+    @abstractmethod
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
         """Yield the messages of a topic, in the order they are stored."""
 
+    @abstractmethod
     def messages(self) -> Iterator[RawMessage]:
         """Yield all messages in the order they were logged."""
 
+    @abstractmethod
     def close(self) -> None:
         """Let go of the files."""
 

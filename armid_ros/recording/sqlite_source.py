@@ -17,11 +17,11 @@ import sqlite3
 from typing import Any
 
 from armid_ros.errors import RecordingError
-from armid_ros.files import is_file, open_regular
+from armid_ros.files import is_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import Damage, MessageBlock, RawMessage, Topic
+from armid_ros.recording.source import MessageBlock, RawMessage, Source, Topic
 import numpy as np
 
 _BLOCK_MESSAGES = 4096
@@ -33,30 +33,12 @@ _WHOLE = "typeof(timestamp) = 'integer' AND timestamp >= 0 AND typeof(data) = 'b
 _ERRORS = (sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError)
 
 
-class SqliteSource:
+class SqliteSource(Source):
     """One SQLite file."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """
-        Open a file, for reading only.
-
-        Parameters
-        ----------
-        path : Path
-            The file.
-        settings : ReadSettings
-            What to check, and how much memory to take.
-
-        Raises
-        ------
-        RecordingError
-            It cannot be read, or is no rosbag2 file.
-
-        """
-        self._path = path
-        self._damage = Damage()
-        self._checks = settings.check_crc
-        open_regular(path, RecordingError).close()
+        """Open a file of rosbag2."""
+        super().__init__(path, settings)
         # A file left behind by a crash has a journal beside it that SQLite must play back;
         # 'immutable' would ignore it, and works where the folder cannot be written to.
         journal = any(is_file(path.with_name(path.name + end)) for end in _JOURNALS)
@@ -68,24 +50,17 @@ class SqliteSource:
         except sqlite3.Error as error:
             raise RecordingError(f'{path}: cannot be opened by SQLite: {error}') from error
         try:
-            self._columns = self._opened(settings)
+            self._columns = self._opened()
         except (*_ERRORS, RecordingError) as error:
             self._database.close()
             if isinstance(error, RecordingError):
                 raise
             raise RecordingError(f'{path}: not an SQLite file of rosbag2: {error}') from error
 
-    @property
-    def damage(self) -> str:
-        """Return what is wrong with the file, as far as it was read; empty for a whole one."""
-        return str(self._damage)
-
     def close(self) -> None:
-        """Let go of the file."""
         self._database.close()
 
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics, in order of appearance."""
         optional = [
             name if name in self._columns['topics'] else "''"
             for name in ('offered_qos_profiles', 'type_description_hash')
@@ -96,7 +71,13 @@ class SqliteSource:
                 f'(SELECT count(*) FROM messages WHERE topic_id = topics.id AND {_WHOLE}) '
                 'FROM topics ORDER BY id'
             ).fetchall()
-            definitions = self._definitions()
+            definitions: dict[str, tuple[str, str]] = {}
+            wanted = ('topic_type', 'encoding', 'encoded_message_definition')
+            if set(wanted) <= self._columns['message_definitions']:
+                query = f'SELECT {", ".join(wanted)} FROM message_definitions'
+                for texts in self._database.execute(query):
+                    name, language, text = map(_text, texts)
+                    definitions[name] = language, text
         except _ERRORS as error:
             raise RecordingError(f'{self._path}: the database is damaged: {error}') from error
         topics = []
@@ -111,7 +92,6 @@ class SqliteSource:
         return tuple(topics)
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic, in the order they are stored."""
         query = (
             'SELECT timestamp, data FROM messages WHERE topic_id IN '
             f'(SELECT id FROM topics WHERE CAST(name AS TEXT) = ?) AND {_WHOLE} ORDER BY id'
@@ -121,7 +101,6 @@ class SqliteSource:
             yield MessageBlock.joined([data for _, data in rows], times, times)
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order they were logged."""
         query = (
             'SELECT CAST(name AS TEXT), timestamp, data FROM messages JOIN topics '
             f'ON topic_id = topics.id WHERE {_WHOLE} ORDER BY timestamp, messages.id'
@@ -130,11 +109,11 @@ class SqliteSource:
             for name, time, data in rows:
                 yield RawMessage(_text(name), time, time, data)
 
-    def _opened(self, settings: ReadSettings) -> dict[str, set[str]]:
+    def _opened(self) -> dict[str, set[str]]:
         """Return the columns of the tables, once the file is known to be one of rosbag2."""
         database = self._database
         database.text_factory = lambda text: text.decode('utf-8', 'replace')
-        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(settings.memory_limit, _LONGEST))
+        database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(self._settings.memory_limit, _LONGEST))
         with suppress(sqlite3.Error):  # not known to old versions
             database.execute('PRAGMA trusted_schema = OFF')
         # A view could compute anything, for ever.
@@ -158,7 +137,7 @@ class SqliteSource:
                     f'{self._path}: an SQLite file, but not of rosbag2: it has no table {table} '
                     f'with {", ".join(sorted(names))}'
                 )
-        if self._checks:
+        if self._settings.check_crc:
             self._check()
         return columns
 
@@ -179,14 +158,6 @@ class SqliteSource:
         ).fetchone()
         if lost:
             self._damage.add(f'{lost} rows of messages have no topic; they are left out')
-
-    def _definitions(self) -> dict[str, tuple[str, str]]:
-        """Return language and text of the definition of each type."""
-        wanted = ('topic_type', 'encoding', 'encoded_message_definition')
-        if not set(wanted) <= self._columns['message_definitions']:
-            return {}
-        rows = self._database.execute(f'SELECT {", ".join(wanted)} FROM message_definitions')
-        return {_text(name): (_text(language), _text(text)) for name, language, text in rows}
 
     def _fetch(self, query: str, parameters: tuple[str, ...]) -> Iterator[list[tuple[Any, ...]]]:
         """Yield rows by the thousand, up to where the database is damaged."""

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from armid_ros.errors import RecordingError
+from armid_ros.errors import RecordingError, TrajectoryError
 from armid_ros.files import reading
 from armid_ros.motion import FloatArray
 from armid_ros.recording.bag import Bag
 from armid_ros.recording.joint_state.encoder import Measured
-from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for, STRING, string_cdr
+from armid_ros.recording.message_types import JOINT_TRAJECTORY, store_for
 from armid_ros.recording.qos import LATCHED
 from armid_ros.recording.settings import DEFAULT, ReadSettings
 from armid_ros.recording.writer import whole_bag
@@ -114,8 +114,7 @@ def write_joint_trajectory(
     """
     with whole_bag(path) as writer:
         if robot_description is not None:
-            writer.add_topic('/robot_description', STRING, qos=[LATCHED])
-            writer.write('/robot_description', string_cdr(robot_description), _LOG_TIME)
+            writer.write_description(robot_description, _LOG_TIME)
         writer.add_topic(_TOPIC, JOINT_TRAJECTORY, qos=[LATCHED])
         writer.write(_TOPIC, joint_trajectory_cdr(motion), _LOG_TIME)
 
@@ -165,39 +164,51 @@ def read_waypoints(
             message: Any = store_for(chosen.message_type).deserialize_cdr(cdr, JOINT_TRAJECTORY)
         except SerdeError as error:
             raise RecordingError(f'the trajectory cannot be decoded: {error}') from error
-        return _waypoints(where, message, tuple(joints))
-
-
-def _waypoints(where: str, message: Any, joints: tuple[str, ...]) -> ReadWaypoints:
-    """Take a decoded message apart."""
-    names = list(message.joint_names)
-    missing = [joint for joint in joints if joint not in names]
+        found = waypoints_of(message)
+    missing = [joint for joint in joints if joint not in found.joints]
     if missing:
         raise RecordingError(
-            f'{where} does not name {", ".join(missing)}; its joints are {", ".join(names)}'
+            f'{where} does not name {", ".join(missing)}; its joints are {", ".join(found.joints)}'
         )
-    columns = [names.index(joint) for joint in joints]
-    points = message.points
-    if len(points) < 2:
-        raise RecordingError(f'{where}: a trajectory needs two points, this has {len(points)}')
-    t = np.array([p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in points])
-    if (np.diff(t) <= 0).any():
-        at = int(np.flatnonzero(np.diff(t) <= 0)[0]) + 1
+    if len(found.t) < 2:
+        raise RecordingError(f'{where}: a trajectory needs two points, this has {len(found.t)}')
+    if (np.diff(found.t) <= 0).any():
+        at = int(np.flatnonzero(np.diff(found.t) <= 0)[0]) + 1
         raise RecordingError(f'{where}: time_from_start does not increase at point {at}')
+    columns = [found.joints.index(joint) for joint in joints]
+    rates = (one if one is None else one[:, columns] for one in (found.dq, found.ddq, found.tau))
+    return ReadWaypoints(tuple(joints), found.t, found.q[:, columns], *rates)
+
+
+def waypoints_of(message: Any) -> ReadWaypoints:
+    """
+    Return the waypoints of a JointTrajectory that ROS or rosbags decoded.
+
+    Raises
+    ------
+    TrajectoryError
+        It has no points, or they do not all have the fields that the first one has.
+
+    """
+    points, joints = message.points, tuple(message.joint_names)
+    if not len(points):
+        raise TrajectoryError('trajectory: it has no points')
 
     def quantity(name: str) -> FloatArray | None:
         rows = [getattr(point, name) for point in points]
-        lengths = {len(row) for row in rows}
-        if lengths == {0}:
+        if not any(len(row) for row in rows):
             return None
-        if lengths != {len(names)}:
-            raise RecordingError(
-                f'{where}: points have {sorted(lengths)} {name} for {len(names)} joints'
+        odd = next((k for k, row in enumerate(rows) if len(row) != len(joints)), None)
+        if odd is not None:
+            raise TrajectoryError(
+                f'trajectory: point {odd} has {len(rows[odd])} {name}, but there are '
+                f'{len(joints)} joint names'
             )
-        return np.array(rows, np.float64)[:, columns]
+        return np.array(rows, np.float64)
 
+    t = np.array([p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in points])
     q = quantity('positions')
     if q is None:
-        raise RecordingError(f'{where}: the points have no positions')
+        raise TrajectoryError('trajectory: its points have no positions')
     rates = quantity('velocities'), quantity('accelerations')
     return ReadWaypoints(joints, t, q, *rates, quantity('effort'))

@@ -23,9 +23,9 @@ from typing import NamedTuple, Self
 from armid_ros.errors import ArmidError, RecordingError
 from armid_ros.recording.mcap.records import MESSAGE, RECORD_HEADER
 from armid_ros.recording.mcap.writer import Compression, McapWriter, message_record
-from armid_ros.recording.message_types import message_type, MessageType
+from armid_ros.recording.message_types import message_type, MessageType, STRING, string_cdr
 from armid_ros.recording.metadata import bag_information, dump, write_metadata
-from armid_ros.recording.qos import dump_qos, VOLATILE
+from armid_ros.recording.qos import dump_qos, LATCHED, VOLATILE
 from armid_ros.recording.source import IntArray, Source, Topic, UNREADABLE
 from armid_ros.version import __version__
 from mcap.opcode import Opcode
@@ -279,9 +279,7 @@ class BagWriter:
             The topic was not announced, or the bag is closed.
 
         """
-        channel = self._channels.get(topic)
-        if channel is None or self._closed:
-            raise self._refusal(topic)
+        channel = self._channel(topic)
         published = log_time_ns if publish_time_ns is None else publish_time_ns
         record = message_record(channel, cdr, log_time_ns, published)
         now = self._clock()
@@ -292,6 +290,11 @@ class BagWriter:
         self._size += len(record)
         if self._size >= self._chunk_size or now - self._opened >= self.chunk_age:
             self.flush()
+
+    def write_description(self, urdf: str, log_time_ns: int) -> None:
+        """Write a robot description (URDF) to /robot_description, latched."""
+        self.add_topic('/robot_description', STRING, qos=[LATCHED])
+        self.write('/robot_description', string_cdr(urdf), log_time_ns)
 
     def write_many(
         self, topic: str, messages: npt.NDArray[np.void], log_times_ns: IntArray
@@ -314,9 +317,7 @@ class BagWriter:
             The topic was not announced, or the bag is closed.
 
         """
-        channel = self._channels.get(topic)
-        if channel is None or self._closed:
-            raise self._refusal(topic)
+        channel = self._channel(topic)
         length = messages.dtype.itemsize
         record = np.dtype([('head', MESSAGE), ('cdr', np.void, length)])
         at_once = max(1, self._chunk_size // record.itemsize)
@@ -424,10 +425,16 @@ class BagWriter:
         if self._closed:
             raise RecordingError(f'{self.path}: the bag is closed')
 
-    def _refusal(self, topic: str) -> RecordingError:
-        self._check_open()
-        known = ', '.join(self._topics) or 'none'
-        return RecordingError(f"{self.path}: topic '{topic}' was not announced; there are {known}")
+    def _channel(self, topic: str) -> int:
+        """Return the channel of a topic; RecordingError where the bag takes no message of it."""
+        channel = self._channels.get(topic)
+        if channel is None or self._closed:
+            self._check_open()
+            known = ', '.join(self._topics) or 'none'
+            raise RecordingError(
+                f"{self.path}: topic '{topic}' was not announced; there are {known}"
+            )
+        return channel
 
 
 def _joined(records: list[bytes]) -> tuple[bytes, IntArray]:

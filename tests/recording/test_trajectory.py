@@ -71,7 +71,7 @@ def test_trajectories_that_are_not_valid_are_refused(motion, tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     duration = store.types['builtin_interfaces/msg/Duration']
     cases = [
-        (changed(motion, positions=np.zeros(1)), r'have \[1, 2\] positions for 2 joints'),
+        (changed(motion, positions=np.zeros(1)), 'point 7 has 1 positions, .* 2 joint'),
         (
             changed(motion, time_from_start=duration(sec=0, nanosec=0)),
             'time_from_start does not increase at point 7',

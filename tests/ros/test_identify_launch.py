@@ -131,7 +131,8 @@ def test_two_arms_at_a_time_are_identified_and_diagnosed_to_the_end(bench, tmp_p
             use_sim_time=str(lock_step),
         )
         for name, node in nodes.items():
-            command = [sys.executable, '-m', f'armid_ros.nodes.{name}', *node.arguments(folder)]
+            code = f'from armid_ros.cli.node import main; main({name!r})'
+            command = [sys.executable, '-c', code, *node.arguments(folder)]
             with (folder / f'{name}.log').open('w') as output:
                 running[arm, name] = subprocess.Popen(
                     command, env=environment, stdout=output, stderr=subprocess.STDOUT

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from armid_ros.errors import RecordingError
 from armid_ros.nodes.joint_state_merger import JointStateMergerNode
-from armid_ros.nodes.parameters.table import ParameterError
 from armid_ros.nodes.qos import LATCHED
 from armid_ros.robots import load_robot
 from control_msgs.msg import DynamicJointState, InterfaceValue
@@ -140,7 +140,7 @@ def test_what_is_missing_is_named(bench):
 
 
 def test_a_topic_without_torques_and_wrong_counts_are_refused(bench):
-    with pytest.raises(ParameterError, match=r"'gains' has 3 .* a, b"):
+    with pytest.raises(RecordingError, match=r"'gains' has 3 .* a, b"):
         merger(bench, gains=[1.0, 2.0, 3.0])
     node, _ = merger(bench, effort_topic='words')
     bench.probe.create_publisher(String, 'words', 10)

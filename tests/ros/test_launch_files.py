@@ -43,7 +43,8 @@ def changed(parameter):
     if isinstance(default, str):
         values = (*parameter.choices, *TEXTS)
     else:
-        values = (parameter.lower + k * (parameter.upper - parameter.lower) / 8 for k in range(9))
+        lower, upper = parameter.limits
+        values = (lower + k * (upper - lower) / 8 for k in range(9))
         values = (type(default)(value) for value in values)
     fits = (v for v in values if v != default and not parameter.objection(v))
     return next(fits, default)

@@ -74,11 +74,11 @@ def test_every_number_has_a_range_and_every_live_one_can_be_set_at_both_ends(
     for entry in node.parameters():
         if isinstance(entry.default, bool) or not isinstance(entry.default, int | float):
             continue
-        assert entry.lower is not None and entry.upper is not None, entry.name
+        assert entry.limits is not None, entry.name
         if entry.read_only:
             continue
         before = node.value(entry.name)
-        for value in (entry.lower, entry.upper, before):
+        for value in (*entry.limits, before):
             wanted = Parameter(entry.name, value=type(entry.default)(value))
             (result,) = node.set_parameters([wanted])
             assert result.successful or result.reason, entry.name
@@ -151,7 +151,7 @@ def test_noise_and_rate_of_the_simulated_arm_change_while_it_runs(bench):
     assert np.max(np.abs(np.subtract(node.joint_state.effort, quiet))) > 0.1
     bench.spin_until(lambda: len(states) >= 3, 'joint states')
     (result,) = node.set_parameters([Parameter('torque_noise', value=[1.0, 2.0])])
-    assert not result.successful and '2 numbers' in result.reason
+    assert not result.successful and '2 values' in result.reason
     (result,) = node.set_parameters([Parameter('rate', value=333.0)])
     assert not result.successful
 

@@ -17,8 +17,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 TABLE = (
-    NodeParameter('rate', 100.0, 'How often.', 'Hz', lower=1.0, upper=1000.0, read_only=False),
-    NodeParameter('count', 3, 'How many.', lower=1, upper=9, read_only=False),
+    NodeParameter('rate', 100.0, 'How often.', 'Hz', limits=(1.0, 1000.0), read_only=False),
+    NodeParameter('count', 3, 'How many.', limits=(1, 9), read_only=False),
     NodeParameter('kind', 'a', 'Which.', choices=('a', 'b'), read_only=False),
     NodeParameter('fixed', True, 'Whether.'),
     NodeParameter('names', ['b'], 'Who.', read_only=False),

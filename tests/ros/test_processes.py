@@ -34,6 +34,10 @@ def short_excitation():
     return Excitation(random_feasible(ArmModel(robot), limits, 4.0, 2, rng), 1, 1.0)
 
 
+def executable(node):  # as in scripts/
+    return sys.executable, '-c', f'from armid_ros.cli.node import main; main({node!r})'
+
+
 class Processes:
     """Nodes as processes on the domain of a bench."""
 
@@ -51,7 +55,7 @@ class Processes:
         return self.run(node, '--ros-args', *(part for p in parameters for part in ('-p', p)))
 
     def run(self, node, *arguments):
-        return self.run_command([sys.executable, '-m', f'armid_ros.nodes.{node}', *arguments])
+        return self.run_command([*executable(node), *arguments])
 
     def run_command(self, command):
         # SIGHUP ends a process also where the tests run under nohup, which hands that on; Python
@@ -100,8 +104,8 @@ def recorded(diagnostics):
 def test_a_node_ends_in_order_with_the_process_that_started_it(bench, processes, tmp_path, number):
     """As the nodes of a launch that gets SIGTERM, which it does not pass on."""
     bag = tmp_path / 'bag'
-    node = (sys.executable, '-m', 'armid_ros.nodes.recorder', '--ros-args')
-    node += ('-p', f'bag:={bag}', '-p', 'topics:=[text]', '-p', 'end_with_parent:=true')
+    options = f'-p bag:={bag} -p topics:=[text] -p end_with_parent:=true'
+    node = (*executable('recorder'), '--ros-args', *options.split())
     code = f'import subprocess; subprocess.run({node!r})'
     launch = processes.run_command([sys.executable, '-c', code])
     publisher = bench.matched_publisher(String, 'text', LATCHED)

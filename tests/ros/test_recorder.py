@@ -143,12 +143,6 @@ def test_in_simulated_time_nothing_is_logged_before_it_was_sent(bench, tmp_path)
     assert logged == [100 * SECOND + k * 10**6 for k in range(3)]
 
 
-def test_an_existing_directory_is_not_touched(bench, tmp_path):
-    (tmp_path / 'bag').mkdir()
-    with pytest.raises(Exception, match='exists already'):
-        bench.add(RecorderNode, bag=str(tmp_path / 'bag'))
-
-
 def test_a_wanted_topic_that_nobody_publishes_is_reported(bench, tmp_path):
     diagnostics = bench.diagnostics()
     recorder = bench.add(RecorderNode, bag=str(tmp_path / 'bag'), topics=['nothing'])

@@ -124,8 +124,6 @@ def spoil(what):
         message.joint_names[0] = 'tail'
     elif what == 'missing joint':
         message = trajectory((HOME + 0.1)[1:], joints=ROBOT.joints[1:])
-    elif what == 'wrong length':
-        message.points[0].positions = [0.0, 0.0]
     elif what == 'nan':
         message.points[0].positions[2] = float('nan')
     elif what == 'position limit':
@@ -150,7 +148,6 @@ def spoil(what):
     [
         ('unknown joint', "'tail'"),
         ('missing joint', f"'{ROBOT.joints[0]}' is missing"),
-        ('wrong length', 'has 2 positions, but there are 6 joint names'),
         ('nan', f"'{ROBOT.joints[2]}'"),
         ('position limit', f"'{ROBOT.joints[1]}' reaches"),
         ('velocity limit', 'velocity limit'),
@@ -298,8 +295,8 @@ def test_gravity_and_effects_are_parameters(bench):
         ({'robot': 'r2d2'}, 'humanoid_arm'),
         ({'gravity': 'mars'}, 'moon'),
         ({'effects': ['stickiness']}, 'the catalogue has'),
-        ({'torque_noise': [0.1, 0.2]}, 'one for each of 6 joints'),
-        ({'start': '0.1,x'}, 'write numbers'),
+        ({'torque_noise': [0.1, 0.2]}, 'torque_noise.*give one, or 6 for'),
+        ({'start': '0.1,x'}, "'start': 'x' is no number"),
         ({'rate': 300.0}, 'does not fit the step'),
         ({'model': '/nowhere/model.yaml'}, 'model.yaml'),
     ],

@@ -15,7 +15,8 @@ from armid_ros.files import write_file
 from armid_ros.files.own import refuse_replacing
 from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.identifier import OnlineIdentifier
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from armid_ros.nodes.base import key_values
+from diagnostic_msgs.msg import DiagnosticStatus
 import yaml
 
 SCHEMA = 'armid/estimate/1'
@@ -26,7 +27,7 @@ RECENT = 60.0
 
 
 def estimate_message(
-    estimate: Estimate, samples: int, condition_number: float
+    estimate: Estimate, samples: int, condition_number: float = 0.0
 ) -> ParameterEstimate:
     """Return an estimate as the message that plotters and rosbags know; the stamp is unset."""
     return ParameterEstimate(
@@ -99,7 +100,7 @@ def parameter_status(name: str, estimate: Estimate | None) -> DiagnosticStatus:
     status.message = 'nothing learned so far'
     if estimate is not None:
         status.message = 'value, lower and upper end of the 95 % interval'
-        status.values = _values(estimate)
+        status.values = key_values(_values(estimate))
     return status
 
 
@@ -118,24 +119,24 @@ def change_status(name: str, changes: Sequence[Change], now: float) -> Diagnosti
 
     """
     status = DiagnosticStatus(name=name, level=DiagnosticStatus.OK, message='no change seen')
-    status.values = [KeyValue(key='changes', value=str(len(changes)))]
+    values: dict[str, object] = {'changes': len(changes)}
     if changes:
         latest = changes[-1]
         age = now - latest.t
         if age < RECENT:
             status.level = DiagnosticStatus.WARN
         status.message = f'{latest}, {age:.0f} s ago'
-        status.values += _values(latest.size)
+        values |= _values(latest.size)
+    status.values = key_values(values)
     return status
 
 
-def _values(estimate: Estimate) -> list[KeyValue]:
-    found = []
-    for parameter, value, ends in zip(
+def _values(estimate: Estimate) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for parameter, value, (lower, upper) in zip(
         estimate.parameters, estimate.values, estimate.interval(), strict=True
     ):
         name = ' '.join(filter(None, (parameter.joint, parameter.name)))
-        for suffix, number in (('', value), (' lower', ends[0]), (' upper', ends[1])):
-            key = f'{name} [{parameter.unit}]{suffix}'
-            found.append(KeyValue(key=key, value=f'{number:.9g}'))
+        key = f'{name} [{parameter.unit}]'
+        found |= {key: value, f'{key} lower': lower, f'{key} upper': upper}
     return found

@@ -12,7 +12,8 @@ from armid_ros.errors import RecordingError
 from armid_ros.identification.samples.joint_merge import joint_places, JointMerger
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.complaints import Complaints
-from armid_ros.recording.joint_state.message import JointStateMessages, MalformedMessage
+from armid_ros.recording.joint_state.layout import MalformedMessage
+from armid_ros.recording.joint_state.message import JointStateMessages
 import numpy as np
 import numpy.typing as npt
 from rclpy.clock import Clock
@@ -167,12 +168,6 @@ class JointStateReader:
             self._epoch = sec
         return float(sec - self._epoch) + 1e-9 * nanosec
 
-    @property
-    def _wanted(self) -> tuple[str, ...]:
-        """Joints of the last message, in their order."""
-        joints = self._joints
-        return joints if self._merger is None else tuple(joints[k] for k in self._some)
-
     def _ordered(self, names: Sequence[str], field: FloatArray, name: str) -> FloatArray:
         if len(field) != len(names):
             hint = '; identification needs measured torque' if name == 'effort' else ''
@@ -185,7 +180,8 @@ class JointStateReader:
         values = self._ordered(names, field, name)
         # one sum instead of isfinite; joints left out may well be NaN
         if not math.isfinite(np.add.reduce(values)) and not np.all(np.isfinite(values)):
-            joint = self._wanted[int(np.argmin(np.isfinite(values)))]
+            bad = int(np.argmin(np.isfinite(values)))
+            joint = self._joints[bad if self._merger is None else self._some[bad]]
             raise RecordingError(f"joint states where the {name} of '{joint}' is not a number")
         return values
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 import time
 
 from rclpy.clock import ROSClock
@@ -29,14 +28,12 @@ class Freshness:
     ----------
     what : str
         What comes, such as 'joint states'.
-    now : callable, optional
-        Steady time [s].
 
     """
 
-    def __init__(self, what: str, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, what: str) -> None:
         self._what = what
-        self.now = now
+        self.now = time.monotonic
         self._heard: float | None = None
 
     def heard(self) -> None:

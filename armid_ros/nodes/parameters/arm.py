@@ -4,15 +4,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from armid_ros.arm import ArmModel
 from armid_ros.arm.model_file import load_model
 from armid_ros.effects import parse_effect
 from armid_ros.errors import RobotError
-from armid_ros.motion import FloatArray
+from armid_ros.files import reading
 from armid_ros.nodes.parameters.table import NodeParameter, Values
+from armid_ros.recording.tables import numbers, per_joint
 from armid_ros.robots import load_robot, parse_gravity
 from armid_ros.robots.two_link import TwoLinkSet
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Sensors, SimulatedArm
@@ -62,27 +63,23 @@ ARM_PARAMETERS = (
         'Differentiate positions for the velocity.',
         read_only=False,
     ),
-    NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', lower=0, upper=100000),
+    NodeParameter('torque_delay', 0, 'Steps by which torque is read late.', limits=(0, 100000)),
     NodeParameter(
         'acceleration_noise',
         0.0,
         'Standard deviation; of links on springs.',
         'm/s^2',
-        lower=0.0,
-        upper=1000.0,
+        limits=(0.0, 1000.0),
         read_only=False,
     ),
     NodeParameter(
         'loop_gain',
         1.0,
         'Share of the gains of the velocity loops that drive elastic joints.',
-        lower=0.0,
-        upper=10.0,
+        limits=(0.0, 10.0),
     ),
-    NodeParameter('seed', 0, 'Random seed of the noise.', lower=0, upper=2**62),
-    NodeParameter(
-        'time_step', 0.001, 'Time step of the integration.', 's', lower=1e-5, upper=0.01
-    ),
+    NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
+    NodeParameter('time_step', 0.001, 'Time step of the integration.', 's', limits=(1e-5, 0.01)),
 )
 
 
@@ -112,8 +109,11 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
     arm = with_effects(arm, value('effects'))
     n, dt = arm.robot.n_joints, value('time_step')
     rng = np.random.default_rng(value('seed'))
-    start = _numbers(value('start'), n, 'start') if value('start') else None
-    sensors = sensors_of(value, n)
+    with reading("parameter 'start'", RobotError):
+        start = numbers(value('start'))
+        if start and len(start) != n:
+            raise RobotError(f'{len(start)} numbers, for {n} joints')
+    sensors = sensors_of(value, arm.robot.joints)
     springs, rotorless = elastic_joints(arm)
     if rotorless:
         warn(no_rotor(rotorless))
@@ -125,15 +125,17 @@ def make_arm(value: Values, warn: Callable[[str], object]) -> SimulatedArm:
             gain=value('loop_gain'),
             dt=dt,
             sensors=sensors,
-            start=start,
+            start=start or None,
         )
     plant = Plant(arm, dt=dt)
     controllers = {'computed_torque': ComputedTorque, 'gravity_pd': GravityPD}
     controller = controllers[value('controller')](plant.arm)
-    return SimulatedArm(plant, rng=rng, controller=controller, sensors=sensors, start=start)
+    return SimulatedArm(
+        plant, rng=rng, controller=controller, sensors=sensors, start=start or None
+    )
 
 
-def sensors_of(value: Values, n_joints: int) -> Sensors:
+def sensors_of(value: Values, joints: Sequence[str]) -> Sensors:
     """
     Return the sensors that parameters describe.
 
@@ -144,7 +146,7 @@ def sensors_of(value: Values, n_joints: int) -> Sensors:
 
     """
     return Sensors(
-        **{name: _per_joint(value(name), n_joints, name) for name in _PER_JOINT},
+        **{name: per_joint(value(name), joints, f"parameter '{name}'") for name in _PER_JOINT},
         velocity_from_encoder=value('velocity_from_encoder'),
         torque_delay=value('torque_delay'),
         acceleration_noise=value('acceleration_noise'),
@@ -183,22 +185,3 @@ def described_arm(value: Values) -> tuple[ArmModel, TwoLinkSet | None]:
     else:
         arm, drives = shipped_arm(load_robot(value('robot'), gravity=gravity or 'earth'))
     return arm, drives
-
-
-def _numbers(text: str, count: int, name: str) -> FloatArray:
-    try:
-        numbers = [float(part) for part in text.split(',')]
-    except ValueError:
-        raise RobotError(f"parameter '{name}' is '{text}'; write numbers: 0.1,0.2") from None
-    if len(numbers) != count:
-        raise RobotError(f"parameter '{name}' has {len(numbers)} numbers, for {count} joints")
-    return np.array(numbers)
-
-
-def _per_joint(values: list[float], count: int, name: str) -> FloatArray:
-    if len(values) not in (1, count):
-        raise RobotError(
-            f"parameter '{name}' has {len(values)} numbers; give one, or one for each of "
-            f'{count} joints'
-        )
-    return np.broadcast_to(np.array(values, dtype=float), (count,))

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.effects import make_effect, USUAL_EFFECTS
 from armid_ros.errors import TrajectoryError
@@ -26,7 +24,7 @@ from armid_ros.excitation import (
     with_joint_limits,
 )
 from armid_ros.nodes.parameters.table import NodeParameter, Values
-from armid_ros.robots import CollisionModel, load_arms, load_robot
+from armid_ros.robots import load_arms, load_robot
 import numpy as np
 
 SIMULATION = NodeParameter(
@@ -55,11 +53,11 @@ PUBLISHER_PARAMETERS = (
         read_only=False,
     ),
     NodeParameter(
-        'duration', 44.0, 'Length of the run, from rest to rest.', 's', lower=1.0, upper=3600.0
+        'duration', 44.0, 'Length of the run, from rest to rest.', 's', limits=(1.0, 3600.0)
     ),
-    NodeParameter('n_periods', 2, 'Number of identical periods.', lower=1, upper=100),
-    NodeParameter('run_in', 2.0, 'Length of run-in and run-out.', 's', lower=0.1, upper=60.0),
-    NodeParameter('harmonics', 5, 'Number of harmonics per joint.', lower=1, upper=30),
+    NodeParameter('n_periods', 2, 'Number of identical periods.', limits=(1, 100)),
+    NodeParameter('run_in', 2.0, 'Length of run-in and run-out.', 's', limits=(0.1, 60.0)),
+    NodeParameter('harmonics', 5, 'Number of harmonics per joint.', limits=(1, 30)),
     NodeParameter(
         'speed',
         'slow',
@@ -68,11 +66,9 @@ PUBLISHER_PARAMETERS = (
         choices=tuple(SPEED_CLASSES),
     ),
     NodeParameter(
-        'effects',
-        list(USUAL_EFFECTS),
-        'Effects that are to be seen, beside the rigid body.',
+        'effects', list(USUAL_EFFECTS), 'Effects that are to be seen, beside the rigid body.'
     ),
-    NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', lower=0.0, upper=1.0),
+    NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', limits=(0.0, 1.0)),
     NodeParameter(
         'floor',
         '',
@@ -86,19 +82,13 @@ PUBLISHER_PARAMETERS = (
         'echo prints it; empty: nothing.',
     ),
     NodeParameter(
-        'design_time',
-        20.0,
-        'Limit of processor time of the search.',
-        's',
-        lower=1.0,
-        upper=86400.0,
+        'design_time', 20.0, 'Limit of processor time of the search.', 's', limits=(1.0, 86400.0)
     ),
     NodeParameter(
         'seed',
         0,
         'Random seed of the search; the same gives the same trajectory.',
-        lower=0,
-        upper=2**62,
+        limits=(0, 2**62),
     ),
     NodeParameter(
         'interface',
@@ -120,8 +110,7 @@ PUBLISHER_PARAMETERS = (
         'How far a joint may be from the end for the goal to be reached; 0: what the controller '
         'has. On the way the controller gets tracking_tolerance.',
         'rad or m',
-        lower=0.0,
-        upper=10.0,
+        limits=(0.0, 10.0),
         read_only=False,
     ),
     NodeParameter(
@@ -129,34 +118,30 @@ PUBLISHER_PARAMETERS = (
         0.0,
         'How much later than planned the end may be reached; 0: what the controller has.',
         's',
-        lower=0.0,
-        upper=60.0,
+        limits=(0.0, 60.0),
         read_only=False,
     ),
-    NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', lower=1.0, upper=1000.0),
+    NodeParameter('rate', 100.0, 'Waypoints per second.', 'Hz', limits=(1.0, 1000.0)),
     NodeParameter(
         'approach',
         3.0,
         'Shortest time to get to the first point; more where distance and limits ask for it.',
         's',
-        lower=0.1,
-        upper=60.0,
+        limits=(0.1, 60.0),
         read_only=False,
     ),
     NodeParameter(
         'speed_scaling',
         1.0,
         'Share of its speed at which ~/start runs the excitation.',
-        lower=0.1,
-        upper=1.0,
+        limits=(0.1, 1.0),
         read_only=False,
     ),
     NodeParameter(
         'rehearsal_speed',
         0.2,
         'Share of its speed at which ~/rehearse runs it.',
-        lower=0.05,
-        upper=1.0,
+        limits=(0.05, 1.0),
         read_only=False,
     ),
     NodeParameter(
@@ -171,8 +156,7 @@ PUBLISHER_PARAMETERS = (
         'Time in which the arm is brought to rest; longer where its limits require it. Without '
         'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
         's',
-        lower=0.1,
-        upper=10.0,
+        limits=(0.1, 10.0),
         read_only=False,
     ),
     SIMULATION,
@@ -187,8 +171,7 @@ PUBLISHER_PARAMETERS = (
         0.2,
         'The arm is stopped when a joint is further from where it should be.',
         'rad or m',
-        lower=0.001,
-        upper=10.0,
+        limits=(0.001, 10.0),
         read_only=False,
     ),
     NodeParameter(
@@ -197,8 +180,7 @@ PUBLISHER_PARAMETERS = (
         'The arm is stopped when the effort of a joint is, three times in a row, larger by this '
         'factor than what is foreseen for the run and than 10 % of its limit; 0: never, the '
         'default in a simulation.',
-        lower=0.0,
-        upper=1000.0,
+        limits=(0.0, 1000.0),
         read_only=False,
     ),
     NodeParameter(
@@ -207,8 +189,7 @@ PUBLISHER_PARAMETERS = (
         'The arm is stopped, and not started, without a joint state for so long; 5 s by default '
         'in a simulation.',
         's',
-        lower=0.01,
-        upper=10.0,
+        limits=(0.01, 10.0),
         read_only=False,
     ),
     NodeParameter(
@@ -216,34 +197,12 @@ PUBLISHER_PARAMETERS = (
         10.0,
         'How long to wait for a subscriber and joint states; then only ~/start begins.',
         's',
-        lower=0.0,
-        upper=3600.0,
+        limits=(0.0, 3600.0),
     ),
 )
 
 
-@dataclass(frozen=True)
-class Surroundings:
-    """
-    The arm, and what it must not hit.
-
-    Attributes
-    ----------
-    bodies : CollisionModel
-        Its bodies, and what stands around it, the floor among it.
-    planner : TransferPlanner
-        Plans the way to an excitation.
-    unchecked : tuple of str
-        What cannot be checked.
-
-    """
-
-    bodies: CollisionModel
-    planner: TransferPlanner
-    unchecked: tuple[str, ...]
-
-
-def make_surroundings(value: Values) -> Surroundings:
+def make_planner(value: Values) -> tuple[TransferPlanner, tuple[str, ...]]:
     """
     Load the robot that parameters describe, and what stands around it.
 
@@ -251,6 +210,13 @@ def make_surroundings(value: Values) -> Surroundings:
     ----------
     value : callable
         Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
+
+    Returns
+    -------
+    planner : TransferPlanner
+        Plans the way to an excitation; knows the arm, and what it must not hit.
+    unchecked : tuple of str
+        What cannot be checked.
 
     Raises
     ------
@@ -266,18 +232,16 @@ def make_surroundings(value: Values) -> Surroundings:
     robot, acceleration = with_joint_limits(robot, value('joint_limits'), given)
     arm = load_model(value('model'), robot) if value('model') else ArmModel(robot)
     scene = CollisionScene.of(robot, value('clearance'), value('floor'), value('environment'))
-    bodies = scene.bodies
     limits = transfer_limits(arm.robot, value('speed'), acceleration)
-    planner = TransferPlanner(
-        arm, limits, ClearanceModel.of(bodies), scene.clearance, acceleration
-    )
+    clearance = ClearanceModel.of(scene.bodies)
+    planner = TransferPlanner(arm, limits, clearance, scene.clearance, acceleration)
     unchecked = scene.unchecked
     if others:
         unchecked += (f'{", ".join(others)} (not driven, as they belong to no arm)',)
-    return Surroundings(bodies, planner, unchecked)
+    return planner, unchecked
 
 
-def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> Excitation:
+def make_excitation(value: Values, rate: float, planner: TransferPlanner) -> Excitation:
     """
     Load or design the excitation that parameters describe.
 
@@ -287,8 +251,8 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         Returns the value of a parameter of `PUBLISHER_PARAMETERS`.
     rate : float
         Samples per second at which it will be sent [Hz].
-    surroundings : Surroundings
-        The arm, and what it must not hit.
+    planner : TransferPlanner
+        Knows the arm, and what it must not hit.
 
     Raises
     ------
@@ -297,8 +261,8 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
 
     """
     if value('file'):
-        return checked(load_excitation(value('file')), surroundings.planner, value('file'))
-    arm = surroundings.planner.arm
+        return checked(load_excitation(value('file')), planner, value('file'))
+    arm = planner.arm
     own = {effect.name for effect in arm.effects}
     for name in filter(None, value('effects')):
         if name not in own:
@@ -310,13 +274,13 @@ def make_excitation(value: Values, rate: float, surroundings: Surroundings) -> E
         n_periods=periods,
         run_in=run_in,
         speed=value('speed'),
-        acceleration=surroundings.planner.acceleration,
+        acceleration=planner.acceleration,
         clearance=value('clearance'),
         starts=2,
         time_budget=value('design_time'),
     )
     rng = np.random.default_rng(value('seed'))
-    return design(arm, settings, rng, collision=surroundings.bodies).excitation
+    return design(arm, settings, rng, collision=planner.clearance.collision).excitation
 
 
 def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Excitation:

@@ -32,23 +32,19 @@ IDENTIFIER_PARAMETERS = (
         list(USUAL_EFFECTS),
         'Effects to estimate beside the rigid body, each as NAME[@joint+joint].',
     ),
-    NodeParameter(
-        'cutoff', 5.0, 'Low-pass on torque and regressor.', 'Hz', lower=0.01, upper=1000.0
-    ),
+    NodeParameter('cutoff', 5.0, 'Low-pass on torque and regressor.', 'Hz', limits=(0.01, 1000.0)),
     NodeParameter(
         'row_rate',
         0.0,
         'Samples used per second; 0 for 40 times the cut-off.',
         'Hz',
-        lower=0.0,
-        upper=10000.0,
+        limits=(0.0, 10000.0),
     ),
     NodeParameter(
         'forgetting',
         1.0,
         'Forgetting factor per sample used; 1 keeps all.',
-        lower=0.9,
-        upper=1.0,
+        limits=(0.9, 1.0),
         read_only=False,
     ),
     NodeParameter(
@@ -61,8 +57,7 @@ IDENTIFIER_PARAMETERS = (
         'max_gap',
         10,
         'Missing samples that are interpolated across.',
-        lower=1,
-        upper=1000,
+        limits=(1, 1000),
         read_only=False,
     ),
     NodeParameter(
@@ -73,8 +68,7 @@ IDENTIFIER_PARAMETERS = (
         360000.0,
         'Mean time between false reports of a change; 0: changes are not looked for.',
         's',
-        lower=0.0,
-        upper=1e9,
+        limits=(0.0, 1e9),
         read_only=False,
     ),
 )

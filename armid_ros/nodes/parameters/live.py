@@ -22,8 +22,7 @@ LIVE_SETTINGS = (
         20.0,
         'Motion that is looked at, at most; the window begins anew when it is set.',
         's',
-        lower=4.0,
-        upper=600.0,
+        limits=(4.0, 600.0),
         read_only=False,
     ),
     NodeParameter(
@@ -31,8 +30,7 @@ LIVE_SETTINGS = (
         8.0,
         'Motion since the arm changed that is looked at, at least.',
         's',
-        lower=2.0,
-        upper=600.0,
+        limits=(2.0, 600.0),
         read_only=False,
     ),
     NodeParameter(
@@ -40,8 +38,7 @@ LIVE_SETTINGS = (
         4.0,
         'Length of motion between two diagnoses.',
         's',
-        lower=0.5,
-        upper=3600.0,
+        limits=(0.5, 3600.0),
         read_only=False,
     ),
     NodeParameter(
@@ -49,24 +46,21 @@ LIVE_SETTINGS = (
         200.0,
         'Samples per second that are kept of the joint states.',
         'Hz',
-        lower=10.0,
-        upper=2000.0,
+        limits=(10.0, 2000.0),
         read_only=False,
     ),
     NodeParameter(
         'confirmations',
         2,
         'Diagnoses in a row that have to agree on a name before it is proposed.',
-        lower=1,
-        upper=100,
+        limits=(1, 100),
         read_only=False,
     ),
     NodeParameter(
         'material',
         0.01,
         "Share of a joint's torque (rms) below which an effect does not matter.",
-        lower=0.0,
-        upper=1.0,
+        limits=(0.0, 1.0),
         read_only=False,
     ),
 )
@@ -91,8 +85,7 @@ LIVE_PARAMETERS = (
         'is measured where neither a baseline nor the model file says it; 0: all that the model '
         'lacks is asked for, not what changes.',
         's',
-        lower=0.0,
-        upper=600.0,
+        limits=(0.0, 600.0),
     ),
     *LIVE_SETTINGS,
     NodeParameter(
@@ -101,7 +94,7 @@ LIVE_PARAMETERS = (
         'Folder that ~/save writes to: diagnosis.json, model.yaml, report.html.',
         read_only=False,
     ),
-    NodeParameter('seed', 0, 'Random seed of the diagnoses.', lower=0, upper=2**62),
+    NodeParameter('seed', 0, 'Random seed of the diagnoses.', limits=(0, 2**62)),
 )
 
 

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Node parameters as one table per node.
-
-The table makes the descriptors that `ros2 param describe` shows, the checks of what is set, and
-the page of the documentation.
-
-"""
+"""Node parameters as one table per node: descriptors, checks and documentation are made of it."""
 
 from __future__ import annotations
 
@@ -51,8 +45,8 @@ class NodeParameter:
         What it does, in one sentence.
     unit : str
         SI unit of a number.
-    lower, upper : float, or None
-        Range of a number, both or none.
+    limits : tuple of two floats, or None
+        Range of a number.
     choices : tuple of str
         What a text may be; empty for any text.
     read_only : bool
@@ -66,8 +60,7 @@ class NodeParameter:
     default: Value
     description: str
     unit: str = ''
-    lower: float | None = None
-    upper: float | None = None
+    limits: tuple[float, float] | None = None
     choices: tuple[str, ...] = ()
     read_only: bool = True
     check: Callable[[Any], object] | None = None
@@ -75,15 +68,12 @@ class NodeParameter:
     def descriptor(self) -> ParameterDescriptor:
         """Return the descriptor that ROS shows and checks."""
         descriptor = ParameterDescriptor(description=self.text(), read_only=self.read_only)
-        if self.lower is not None and self.upper is not None:
-            if isinstance(self.default, float):
-                descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=self.lower, to_value=self.upper)
-                ]
-            else:
-                descriptor.integer_range = [
-                    IntegerRange(from_value=int(self.lower), to_value=int(self.upper))
-                ]
+        if self.limits is not None and isinstance(self.default, float):
+            ends = dict(zip(('from_value', 'to_value'), self.limits, strict=True))
+            descriptor.floating_point_range = [FloatingPointRange(**ends)]
+        elif self.limits is not None:
+            ends = dict(zip(('from_value', 'to_value'), map(int, self.limits), strict=True))
+            descriptor.integer_range = [IntegerRange(**ends)]
         return descriptor
 
     def text(self) -> str:
@@ -230,10 +220,10 @@ def _explain_type(entry: NodeParameter, text: str) -> str:
 
 def _explain_value(entry: NodeParameter, text: str) -> str:
     found = re.search(r'value \((.*?)\) for parameter', text, re.DOTALL)
-    if found and entry.lower is not None and 'out of range' in text:
+    if found and entry.limits is not None and 'out of range' in text:
         unit = f' {entry.unit}' if entry.unit else ''
         return (
             f"parameter '{entry.name}' is {found[1]}, outside its range "
-            f'{entry.lower:g} to {entry.upper:g}{unit}'
+            f'{entry.limits[0]:g} to {entry.limits[1]:g}{unit}'
         )
     return text.partition('Reason: ')[2].removesuffix(f': {entry.name}') or text

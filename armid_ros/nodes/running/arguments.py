@@ -103,8 +103,8 @@ def usage(node: type[ArmidNode]) -> str:
 
 def _line(parameter: NodeParameter) -> str:
     limits = ''
-    if parameter.lower is not None and parameter.upper is not None:
-        limits = f' {parameter.lower:g} to {parameter.upper:g}.'
+    if parameter.limits is not None:
+        limits = f' {parameter.limits[0]:g} to {parameter.limits[1]:g}.'
     text = textwrap.fill(
         f'{parameter.text()}{limits}', _WIDTH, initial_indent=' ' * 6, subsequent_indent=' ' * 6
     )

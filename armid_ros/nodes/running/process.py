@@ -68,25 +68,25 @@ def steady() -> Iterator[None]:
 
 
 class _Ending:
-    """
-    What SIGINT and SIGTERM do to a process: they end it, but not in the middle of a callback.
+    """What signals do to a process: they end it, but not in the middle of a callback."""
 
-    A node that stops an arm has to be able to publish when it is told to end; the handlers of
-    rclpy would have shut down its context by then. While a node is being made there is nothing to
-    stop, and making it may take long: then they end the process at once.
-
-    """
+    # A node that stops an arm has to be able to publish when it is told to end; the handlers of
+    # rclpy would have shut down its context by then. While a node is being made there is nothing
+    # to stop, and making it may take long: then SIGINT and SIGTERM end the process at once.
 
     def __init__(self) -> None:
-        self._asked = self._at_once = self.with_parent = False
+        self._asked = self._at_once = self.with_parent = self.hung_up = False
         self._parent = os.getppid()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
+            signal.signal(signal.SIGHUP, self._on_hang_up)
 
     @property
     def due(self) -> bool:
         """Whether the process is to end, also as its parent has where it goes with that."""
-        return self._asked or (self.with_parent and os.getppid() != self._parent)
+        ended = self.with_parent and os.getppid() != self._parent
+        return self._asked or self.hung_up or ended
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
@@ -96,6 +96,9 @@ class _Ending:
             yield
         finally:
             self._at_once = False
+
+    def _on_hang_up(self, *_: object) -> None:
+        self.hung_up = True
 
     def _on_signal(self, *_: object) -> None:
         self._asked = True
@@ -125,7 +128,6 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     node: ArmidNode | None = None
     trouble: list[str] = []
     ending = _Ending()
-    hung_up = _note_hang_up()
     try:
         with ending.at_once():
             node = _made(make_node, args)
@@ -133,7 +135,7 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
         executor.add_node(node)
         ending.with_parent = node.value('end_with_parent')
         with steady():
-            while rclpy.ok() and not (node.finished or ending.due or hung_up):
+            while rclpy.ok() and not (node.finished or ending.due):
                 executor.spin_once(timeout_sec=_LOOK_PERIOD)  # events: else it hangs
     except (_EndedAtOnce, ExternalShutdownException):
         pass
@@ -143,27 +145,19 @@ def run(make_node: Callable[[], ArmidNode], args: Sequence[str] | None = None) -
     except ArmidError as error:
         trouble.append(str(error))
     finally:
-        # Ctrl-C under `ros2 launch` arrives twice; the second must not interrupt closing.
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, signal.SIG_IGN)
-        if node is not None:
-            trouble += _closed(node)
-        _leave(node)
-    if hung_up:
+        trouble += _leave(node)
+    if ending.hung_up:
         trouble.append('ended by SIGHUP, as by a terminal that is closed')
-    _exit(trouble, node)
+    if node is not None and node.failure:
+        trouble.append(node.failure)
+    if trouble:
+        with suppress(OSError):  # the terminal may be gone
+            print('; '.join(trouble), file=sys.stderr)
+        raise SystemExit(2 if node is None or node.failure else 1)
 
 
 def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> ArmidNode:
-    """
-    Begin with ROS and make a node.
-
-    Raises
-    ------
-    ParameterError
-        Where arguments cannot be read, or are none of ROS.
-
-    """
+    """Begin with ROS and make a node; ParameterError for arguments that are none of ROS."""
     own = sys.argv[1:] if args is None else args
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -177,44 +171,22 @@ def _made(make_node: Callable[[], ArmidNode], args: Sequence[str] | None) -> Arm
     return node
 
 
-def _exit(trouble: list[str], node: ArmidNode | None) -> None:
-    """End the process with one line on stderr where something went wrong."""
-    refused = node is None or bool(node.failure)
-    if node is not None and node.failure:
-        trouble.append(node.failure)
-    if trouble:
-        with suppress(OSError):  # the terminal may be gone
-            print('; '.join(trouble), file=sys.stderr)
-        raise SystemExit(2 if refused else 1)
-
-
-def _note_hang_up() -> list[int]:
-    """Return a list that fills when the process is hung up, unless that is to be ignored."""
-    came: list[int] = []
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as under nohup
-        signal.signal(signal.SIGHUP, lambda number, _: came.append(number))
-    return came
-
-
-def _closed(node: ArmidNode) -> list[str]:
-    """Let a node finish what must not be lost; return what went wrong."""
-    try:
-        node.close()
-    except ArmidError as error:
-        return [str(error)]
-    return []
-
-
-def _leave(node: ArmidNode | None) -> None:
-    """
-    Leave DDS, in limited time: what must not be lost is complete.
-
-    Fast DDS waits for what other processes hold in shared memory, and for ever where one of them
-    was killed. The watchdog is a thread in C: it says where the process hangs, and ends it.
-
-    """
+def _leave(node: ArmidNode | None) -> list[str]:
+    """Let a node finish what must not be lost, and leave DDS; return what went wrong."""
+    # Ctrl-C under `ros2 launch` arrives twice; the second must not interrupt closing.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    trouble: list[str] = []
+    if node is not None:
+        try:
+            node.close()
+        except ArmidError as error:
+            trouble.append(str(error))
+    # Fast DDS waits for what other processes hold in shared memory, and for ever where one of
+    # them was killed. The watchdog is a thread in C: it says where the process hangs, and ends it.
     faulthandler.dump_traceback_later(LEAVING, exit=True, file=sys.__stderr__)
     if node is not None:
         node.destroy_node()
     rclpy.try_shutdown()
     faulthandler.cancel_dump_traceback_later()
+    return trouble

@@ -24,8 +24,6 @@ class RealTime:
         Returns the time of the simulation [s].
     step : callable
         Takes it one sample further.
-    clock : callable
-        Returns real time [s].
 
     Attributes
     ----------
@@ -34,13 +32,8 @@ class RealTime:
 
     """
 
-    def __init__(
-        self,
-        elapsed: Callable[[], float],
-        step: Callable[[], object],
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._elapsed, self._step, self._clock = elapsed, step, clock
+    def __init__(self, elapsed: Callable[[], float], step: Callable[[], object]) -> None:
+        self._elapsed, self._step, self._clock = elapsed, step, time.monotonic
         self.given_up = 0.0
         self.begin()
 

@@ -18,7 +18,6 @@ from builtin_interfaces.msg import Duration
 from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory
 from unique_identifier_msgs.msg import UUID
@@ -39,25 +38,6 @@ _ERRORS = {
     -4: 'a joint was outside its path tolerance',
     -5: 'the goal was not reached within its tolerance',
 }
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """
-    How well a controller has to follow; 0 leaves it to the controller.
-
-    Attributes
-    ----------
-    path, goal : float
-        Of each joint on the way, and at its end [rad or m]; `ANYWHERE`: none.
-    goal_time : float
-        How long after its time the end may be reached [s].
-
-    """
-
-    path: float = 0.0
-    goal: float = 0.0
-    goal_time: float = 0.0
 
 
 @dataclass
@@ -83,9 +63,7 @@ class TrajectoryAction:
 
     """
 
-    def __init__(
-        self, node: Any, action: Any, tolerance: Any, name: str, on_end: Callable[[str], None]
-    ) -> None:
+    def __init__(self, node: Any, name: str, on_end: Callable[[str], None]) -> None:
         """
         Look for the action; nothing is sent.
 
@@ -93,19 +71,25 @@ class TrajectoryAction:
         ----------
         node : ArmidNode
             Whose executor brings the answers.
-        action, tolerance : type
-            control_msgs/action/FollowJointTrajectory and control_msgs/msg/JointTolerance.
         name : str
             Of the action, relative to the namespace of the node or not.
         on_end : callable
             Told why the goal under way ended before it was reached; empty when it was reached.
 
+        Raises
+        ------
+        ImportError
+            If the package control_msgs is not installed.
+
         """
+        from control_msgs.action import FollowJointTrajectory
+        from control_msgs.msg import JointTolerance
+
         self.name = node.resolve_topic_name(name)
         self.error = math.nan
-        self._node, self._action, self._tolerance = node, action, tolerance
-        self._on_end = on_end
-        self._client = ActionClient(node, action, self.name)
+        self._node, self._on_end = node, on_end
+        self._action, self._tolerance = FollowJointTrajectory, JointTolerance
+        self._client = ActionClient(node, FollowJointTrajectory, self.name)
         node.create_subscription(
             GoalStatusArray, f'{self.name}/_action/status', self._on_status, LATCHED
         )
@@ -134,22 +118,40 @@ class TrajectoryAction:
         """Whether a goal was sent that the controller has not ended."""
         return self._goal is not None
 
-    def send(self, trajectory: JointTrajectory, tolerances: Tolerances) -> None:
+    def send(
+        self, trajectory: JointTrajectory, path: float, end: float, late: float = 0.0
+    ) -> None:
         """
         Send a goal in the place of the one under way.
 
         A controller of ros2_control goes from the old goal to the new one; the old one is
         cancelled all the same, for others do not.
 
+        Parameters
+        ----------
+        trajectory : JointTrajectory
+            What the arm shall do.
+        path, end : float
+            Tolerance of each joint on the way, and at its end [rad or m]; 0 leaves it to the
+            controller, `ANYWHERE`: none.
+        late : float
+            How long after its time the end may be reached [s]; 0 leaves it to the controller.
+
         """
         before, self._goal = self._goal, _Goal(time.monotonic())
         goal, self.error, self._seen = self._goal, math.nan, time.monotonic()
+        message = self._action.Goal(trajectory=trajectory)
+        for joint in trajectory.joint_names:
+            message.path_tolerance.append(self._tolerance(name=joint, position=path))
+            message.goal_tolerance.append(self._tolerance(name=joint, position=end))
+        seconds, nanoseconds = divmod(round(late * 1e9), 10**9)
+        message.goal_time_tolerance = Duration(sec=seconds, nanosec=nanoseconds)
         identifier = uuid4().bytes
         self._known.add(identifier)
         future = self._client.send_goal_async(
-            self._message(trajectory, tolerances),
+            message,
             goal_uuid=UUID(uuid=list(identifier)),
-            feedback_callback=self._guarded(lambda message: self._on_feedback(goal, message)),
+            feedback_callback=self._guarded(lambda said: self._on_feedback(goal, said)),
         )
         self._ask(future, lambda handle: self._on_answer(goal, handle))
         if before is not None:
@@ -185,15 +187,6 @@ class TrajectoryAction:
     def close(self) -> None:
         """End the client."""
         self._client.destroy()
-
-    def _message(self, trajectory: JointTrajectory, tolerances: Tolerances) -> Any:
-        goal = self._action.Goal(trajectory=trajectory)
-        for joint in trajectory.joint_names:
-            goal.path_tolerance.append(self._tolerance(name=joint, position=tolerances.path))
-            goal.goal_tolerance.append(self._tolerance(name=joint, position=tolerances.goal))
-        seconds, nanoseconds = divmod(round(tolerances.goal_time * 1e9), 10**9)
-        goal.goal_time_tolerance = Duration(sec=seconds, nanosec=nanoseconds)
-        return goal
 
     def _cancel(self, goal: _Goal) -> None:
         """Cancel a goal, or as soon as it is accepted."""
@@ -268,20 +261,9 @@ class TrajectoryAction:
         future.add_done_callback(self._guarded(done))
 
     def _guarded(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        node = self._node
-        return surviving(callback, self.name, lambda: node.complaints, node.context.ok)
+        return surviving(callback, self.name, self._node)
 
 
 def beside(topic: str) -> str:
     """Return the action that a controller has beside its topic joint_trajectory."""
     return f'{topic.rpartition("/")[0]}/follow_joint_trajectory'
-
-
-def find_action(node: Node, name: str, on_end: Callable[[str], None]) -> TrajectoryAction | None:
-    """Return an action for a node; None where control_msgs is not installed."""
-    try:
-        from control_msgs.action import FollowJointTrajectory
-        from control_msgs.msg import JointTolerance
-    except ImportError:
-        return None
-    return TrajectoryAction(node, FollowJointTrajectory, JointTolerance, name, on_end)

@@ -4,14 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
-from armid_ros.errors import TrajectoryError
-from armid_ros.motion import FloatArray, Motion
+from armid_ros.motion import Motion
+from armid_ros.recording.trajectory import waypoints_of
 from armid_ros.simulation import Reference
 from builtin_interfaces.msg import Duration
-import numpy as np
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 
@@ -26,24 +22,8 @@ def read_trajectory(message: JointTrajectory) -> Reference:
         number is not finite, or time does not increase.
 
     """
-    if not message.points:
-        raise TrajectoryError('trajectory: it has no points')
-    joints = tuple(message.joint_names)
-    times = [p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in message.points]
-    fields = {
-        name: _field(message.points, name, len(joints))
-        for name in ('positions', 'velocities', 'accelerations', 'effort')
-    }
-    if fields['positions'] is None:
-        raise TrajectoryError('trajectory: its points have no positions')
-    return Reference(
-        joints,
-        np.array(times),
-        fields['positions'],
-        fields['velocities'],
-        fields['accelerations'],
-        fields['effort'],
-    )
+    found = waypoints_of(message)
+    return Reference(found.joints, found.t, found.q, found.dq, found.ddq, found.tau)
 
 
 def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
@@ -70,16 +50,3 @@ def write_trajectory(motion: Motion, lead: float) -> JointTrajectory:
             )
         )
     return message
-
-
-def _field(points: Sequence[Any], name: str, n_joints: int) -> FloatArray | None:
-    rows = [getattr(point, name) for point in points]
-    if not any(len(row) for row in rows):
-        return None
-    for number, row in enumerate(rows):
-        if len(row) != n_joints:
-            raise TrajectoryError(
-                f'trajectory: point {number} has {len(row)} {name}, but there are {n_joints} '
-                'joint names'
-            )
-    return np.array(rows, dtype=np.float64)

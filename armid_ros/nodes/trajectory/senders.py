@@ -9,13 +9,7 @@ from typing import Any
 
 from armid_ros.errors import TrajectoryError
 from armid_ros.nodes.qos import STREAM
-from armid_ros.nodes.trajectory.action import (
-    ANYWHERE,
-    beside,
-    find_action,
-    Tolerances,
-    TrajectoryAction,
-)
+from armid_ros.nodes.trajectory.action import ANYWHERE, beside, TrajectoryAction
 from rclpy.duration import Duration
 from trajectory_msgs.msg import JointTrajectory
 
@@ -116,7 +110,7 @@ class TrajectorySenders:
         self._by_action = self._has_action
         if self._by_action:
             names = ('tracking_tolerance', 'goal_tolerance', 'goal_time_tolerance')
-            self.action.send(trajectory, Tolerances(*map(self._node.value, names)))
+            self.action.send(trajectory, *map(self._node.value, names))
             return str(self.action)
         self._publisher.publish(trajectory)
         return f'{self.readers} subscribers'
@@ -124,7 +118,7 @@ class TrajectorySenders:
     def bring_to_rest(self, trajectory: JointTrajectory) -> None:
         """Send what ends a run, wherever the joints are."""
         if self._by_action:
-            self.action.send(trajectory, Tolerances(path=ANYWHERE, goal=ANYWHERE))
+            self.action.send(trajectory, ANYWHERE, ANYWHERE)
         else:
             self._publisher.publish(trajectory)
 
@@ -151,8 +145,10 @@ class TrajectorySenders:
             self.action.close()
 
     def _make_action(self) -> None:
-        self.action = find_action(self._node, self._name, self._on_end)
-        self._possible = self.action is not None
+        try:
+            self.action = TrajectoryAction(self._node, self._name, self._on_end)
+        except ImportError:
+            self._possible = False
 
     @property
     def _offered(self) -> bool:

@@ -1,12 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Messages that hold a JointState, in the CDR of sensor_msgs/JointState.
-
-Those of a schema with other fields, or of a type with a JointState inside, as
-franka_msgs/FrankaRobotState, are read by the schema that the bag has of them.
-
-"""
+"""Messages of any schema that hold a JointState, in the CDR of sensor_msgs/JointState."""
 
 from __future__ import annotations
 
@@ -17,13 +11,12 @@ from typing import Any
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.bag import Bag
-from armid_ros.recording.message_types import JOINT_STATE, MessageType, store_for
+from armid_ros.recording.message_types import JOINT_STATE, MessageType, QUANTITIES, store_for
 from armid_ros.recording.source import MessageBlock, Topic
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
 
 _INSIDE = re.compile(r'^\s*sensor_msgs/(?:msg/)?JointState\s+(\w+)', re.MULTILINE)
-_FIELDS = ('position', 'velocity', 'effort')
 Convert = Callable[[bytes], Any]
 
 
@@ -57,7 +50,6 @@ def joint_state_blocks(bag: Bag, topic: Topic) -> Iterator[MessageBlock]:
 def _converter(where: str, topic: Topic) -> Convert | None:
     """Return what makes an object with the fields of a JointState; None where CDR is one."""
     described = topic.message_type
-    path = [] if described.name == JOINT_STATE else [_inside(described)]
     if topic.encoding != 'cdr':
         raise RecordingError(
             f"{where} is serialised as '{topic.encoding}'; CDR of ROS 2 can be read: record it "
@@ -73,7 +65,10 @@ def _converter(where: str, topic: Topic) -> Convert | None:
             f'{where}: its schema of {JOINT_STATE} has {", ".join(sorted(fields))}, and no '
             f'{", ".join(sorted(lacking))}; record the type of sensor_msgs'
         )
-    return lambda data: _part(store.deserialize_cdr(data, described.name), path)
+    if described.name == JOINT_STATE:
+        return lambda data: store.deserialize_cdr(data, JOINT_STATE)
+    inside = _inside(described)
+    return lambda data: getattr(store.deserialize_cdr(data, described.name), inside)
 
 
 def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
@@ -87,18 +82,12 @@ def _converted(block: MessageBlock, convert: Convert) -> MessageBlock:
             header = types['std_msgs/msg/Header'](
                 types['builtin_interfaces/msg/Time'](stamp.sec, stamp.nanosec), ''
             )
-            values = [np.array(getattr(found, name, []), np.float64) for name in _FIELDS]
+            values = [np.array(getattr(found, name, []), np.float64) for name in QUANTITIES]
             state = types[JOINT_STATE](header, list(found.name), *values)
             messages.append(bytes(store.serialize_cdr(state, JOINT_STATE)))
         except Exception:  # the decoder counts it as malformed
             messages.append(bytes(4))
     return MessageBlock.joined(messages, block.log_time, block.publish_time)
-
-
-def _part(message: Any, path: list[str]) -> Any:
-    for name in path:
-        message = getattr(message, name)
-    return message
 
 
 def _inside(described: MessageType) -> str:

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
+from armid_ros.recording.message_types import QUANTITIES
 from armid_ros.recording.source import IntArray, MessageBlock, records_at
 import numpy as np
 import numpy.typing as npt
 
 # A topic of more layouts in one block is not one publisher's; messages are then read one by one.
 _LAYOUTS_A_BLOCK = 32
-_FIELDS = ('position', 'velocity', 'effort')
 #: What is reserved at once of a quantity, as counts of damaged files may be anything [bytes].
 _MOST_ROOM = 1 << 30
 
@@ -224,7 +224,7 @@ class _Plan:
         """Find the columns of the joints asked for."""
         if len(set(layout.names)) != len(layout.names):
             raise MalformedMessage(f'a joint is named twice: {", ".join(layout.names)}')
-        for name, count in zip(_FIELDS, layout.counts, strict=True):
+        for name, count in zip(QUANTITIES, layout.counts, strict=True):
             if count not in (0, len(layout.names)):
                 raise MalformedMessage(
                     f'{count} values of {name} for {len(layout.names)} joint names'
@@ -247,7 +247,7 @@ class _Plan:
         """Yield name, lowest and highest position of the joints that were not asked for."""
         if not (self.others and self.layout.counts[0] and len(rows)):
             return
-        positions = rows[_FIELDS[0]][:, self.columns_of_others]
+        positions = rows[QUANTITIES[0]][:, self.columns_of_others]
         lowest, highest = np.fmin.reduce(positions), np.fmax.reduce(positions)
         for k in np.flatnonzero(np.isfinite(lowest) & np.isfinite(highest)).tolist():
             yield self.others[k], float(lowest[k]), float(highest[k])
@@ -262,7 +262,7 @@ class _Plan:
         header *= 10**9
         header += rows['nanosec']
         values: list[FloatArray | None] = []
-        for name, count in zip(_FIELDS, self.layout.counts, strict=True):
+        for name, count in zip(QUANTITIES, self.layout.counts, strict=True):
             place = room.take(name, len(rows), len(self.joints)) if count else None
             if place is not None:
                 place[:] = rows[name][:, self.columns]

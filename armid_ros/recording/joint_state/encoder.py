@@ -12,8 +12,7 @@ from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
 from armid_ros.recording.joint_state.layout import JointStateLayout
 from armid_ros.recording.mcap.writer import Compression
-from armid_ros.recording.message_types import JOINT_STATE, STRING, string_cdr
-from armid_ros.recording.qos import LATCHED
+from armid_ros.recording.message_types import JOINT_STATE, QUANTITIES
 from armid_ros.recording.source import IntArray
 from armid_ros.recording.writer import BagWriter, DEFAULT_CHUNK_SIZE, whole_bag
 import numpy as np
@@ -166,8 +165,7 @@ def write_recording(
     with whole_bag(path, compression=compression, chunk_size=chunk_size) as writer:
         if robot_description is not None:
             first = int(stamps[0]) if len(stamps) else start_ns
-            writer.add_topic('/robot_description', STRING, qos=[LATCHED])
-            writer.write('/robot_description', string_cdr(robot_description), first)
+            writer.write_description(robot_description, first)
         write_joint_states(writer, topic, joints, stamps, measured.q, measured.dq, measured.tau)
 
 
@@ -194,13 +192,13 @@ def _encoded(
     template['encapsulation'] = 1
     template['frame_length'] = layout.frame_length
     template['names'] = layout.names_pattern[0]
-    for name, count in zip(('position', 'velocity', 'effort'), counts, strict=True):
+    for name, count in zip(QUANTITIES, counts, strict=True):
         template['n_' + name] = count
     for at in range(0, len(stamps), _BATCH):
         batch = slice(at, at + _BATCH)
         rows = np.repeat(template, len(stamps[batch]))
         rows['sec'], rows['nanosec'] = np.divmod(stamps[batch], 10**9)
-        for name, values in zip(('position', 'velocity', 'effort'), fields, strict=True):
+        for name, values in zip(QUANTITIES, fields, strict=True):
             if values is not None and n:
                 rows[name] = values[batch]
         yield rows.view(np.dtype((np.void, layout.end)))

@@ -18,13 +18,12 @@ from functools import cached_property
 import struct
 from typing import Any
 
-from armid_ros.recording.message_types import BYTE_ORDERS
+from armid_ros.recording.message_types import BYTE_ORDERS, QUANTITIES
 import numpy as np
 import numpy.typing as npt
 
 # Encapsulation 4, stamp 8, then the length of frame_id.
 _FRAME = 12
-_FIELDS = ('position', 'velocity', 'effort')
 
 
 class MalformedMessage(ValueError):
@@ -123,7 +122,7 @@ class JointStateLayout:
             'frame_length': (self.order + 'u4', _FRAME),
             'names': (('<u4', (words,)), self.names_offset),
         }
-        for name, count, place in zip(_FIELDS, self.counts, self.places, strict=True):
+        for name, count, place in zip(QUANTITIES, self.counts, self.places, strict=True):
             fields['n_' + name] = (self.order + 'u4', place[0])
             if count:
                 fields[name] = ((self.order + 'f8', (count,)), place[1])
@@ -169,7 +168,7 @@ class JointStateLayout:
             same[rest] = ((names[rest] & mask) == expected).all(axis=1)
         same &= rows['encapsulation'] == (1 if self.order == '<' else 0)
         same &= rows['frame_length'] == self.frame_length
-        for name, count in zip(_FIELDS, self.counts, strict=True):
+        for name, count in zip(QUANTITIES, self.counts, strict=True):
             same &= rows['n_' + name] == count
         return np.asarray(same)
 

@@ -8,11 +8,12 @@ import struct
 from typing import NamedTuple
 
 from armid_ros.motion import FloatArray
-from armid_ros.recording.joint_state.layout import JointStateLayout, MalformedMessage
+from armid_ros.recording.joint_state.layout import JointStateLayout
 import numpy as np
 
 #: Layouts that are remembered: as many as senders that share a topic as a rule.
 _REMEMBERED = 8
+_NOTHING = np.empty(0)
 
 
 class JointStateValues(NamedTuple):
@@ -98,8 +99,3 @@ class _Fields:
         )
         sec, nanosec = self._stamp(data, 4)
         return JointStateValues(sec, nanosec, self.names, position, velocity, effort)
-
-
-_NOTHING = np.empty(0)
-
-__all__ = ['JointStateMessages', 'JointStateValues', 'MalformedMessage']

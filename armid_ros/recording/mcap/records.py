@@ -170,19 +170,7 @@ def map_file(data: bytes | mmap.mmap, path: Path, *, check: bool = True) -> File
 
 
 def _walk(found: FileMap) -> tuple[list[tuple[int, int, int]], int | None, int | None, int]:
-    """
-    Note chunks, indexes and loose messages.
-
-    Returns
-    -------
-    definitions : list of (int, int, int)
-        Opcode, beginning and end of schemas, channels and statistics outside of chunks.
-    data_end, footer : int or None
-        Where those records are.
-    position : int
-        How far the records go.
-
-    """
+    """Note chunks and loose messages; return definitions, data end, footer, and how far it is."""
     data = found.data
     definitions: list[tuple[int, int, int]] = []
     data_end = footer = None

@@ -26,16 +26,11 @@ from armid_ros.recording.mcap.content import (
     tiled,
     walk,
 )
-from armid_ros.recording.mcap.records import (
-    add_definition,
-    Chunk,
-    FileMap,
-    map_file,
-)
+from armid_ros.recording.mcap.records import add_definition, Chunk, FileMap, map_file
 from armid_ros.recording.message_types import MessageType
 from armid_ros.recording.qos import parse_qos
 from armid_ros.recording.settings import DEFAULT, ReadSettings
-from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, Topic
+from armid_ros.recording.source import IntArray, MessageBlock, RawMessage, Source, Topic
 from mcap.records import Channel
 import numpy as np
 import numpy.typing as npt
@@ -45,41 +40,27 @@ _Rows = npt.NDArray[np.void]
 _OVERHEAD = 400
 
 
-class McapSource:
+class McapSource(Source):
     """One MCAP file."""
 
     def __init__(self, path: Path, settings: ReadSettings = DEFAULT) -> None:
-        """
-        Open a file.
-
-        Parameters
-        ----------
-        path : Path
-            The file.
-        settings : ReadSettings
-            What to check, and how much memory to take.
-
-        Raises
-        ------
-        RecordingError
-            It cannot be read, or is no MCAP file.
-
-        """
-        self._settings = settings
-        self._found = map_file(_map(path), path, check=settings.check_crc)
+        """Open an MCAP file."""
+        super().__init__(path, settings)
+        with open_regular(path, RecordingError) as stream:
+            if not stream.seek(0, 2):
+                raise RecordingError(f'{path}: the file is empty')
+            try:
+                data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+            except OSError as error:
+                raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error
+        self._found = map_file(data, path, check=settings.check_crc)
+        self._damage = self._found.damage
         self._counts: dict[int, int] | None = None
 
-    @property
-    def damage(self) -> str:
-        """Return what is wrong with the file, as far as it was read; empty for a whole one."""
-        return str(self._found.damage)
-
     def close(self) -> None:
-        """Let go of the file."""
         self._found = FileMap(b'')
 
     def topics(self) -> tuple[Topic, ...]:
-        """Return the topics, in order of appearance."""
         message_counts = self._survey()
         described: dict[str, Topic] = {}
         counts: dict[str, int] = {}
@@ -90,7 +71,6 @@ class McapSource:
         return tuple(described.values())
 
     def blocks(self, topic: str) -> Iterator[MessageBlock]:
-        """Yield the messages of a topic, in the order they are stored."""
         self._survey()
         found = self._found
         wanted = sorted(c.id for c in found.channels.values() if c.topic == topic)
@@ -103,7 +83,6 @@ class McapSource:
         self._compare_count(topic, wanted, count)
 
     def messages(self) -> Iterator[RawMessage]:
-        """Yield all messages in the order they were logged."""
         self._survey()
         names = {channel.id: channel.topic for channel in self._found.channels.values()}
         pending: list[tuple[int, int, RawMessage]] = []
@@ -206,12 +185,8 @@ class McapSource:
         return content, offsets, heads(content, offsets)
 
     def _indexed(self, chunk: Chunk) -> IntArray:
-        """
-        Return where the index of a chunk says that messages begin in its content.
-
-        What lies beyond the content is put at its end, where no message can begin.
-
-        """
+        """Return where the index of a chunk says that messages begin in its content."""
+        # What lies beyond the content is put at its end, where no message can begin.
         parts = [
             np.minimum(
                 np.frombuffer(self._found.data, '<u8', 2 * count, at)[1::2], chunk.size
@@ -262,14 +237,3 @@ class McapSource:
         )
         qos = parse_qos(channel.metadata.get('offered_qos_profiles'))
         return Topic(channel.topic, described, qos, count, channel.message_encoding)
-
-
-def _map(path: Path) -> bytes | mmap.mmap:
-    """Return the bytes of a file without reading them."""
-    with open_regular(path, RecordingError) as stream:
-        if not stream.seek(0, 2):
-            raise RecordingError(f'{path}: the file is empty')
-        try:
-            return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-        except OSError as error:
-            raise RecordingError(f'{path}: cannot be read: {error.strerror}') from error

@@ -242,10 +242,22 @@ class McapWriter:
         """Return what is behind the last chunk."""
         data_end = _record(DataEnd(0))
         begin = self._done.position + len(data_end)
+        start, end = self.time_range
+        statistics = Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=dict(self.counts),
+            chunk_count=self._done.chunks,
+            message_count=self.counts.total(),
+            message_start_time=start,
+            message_end_time=end,
+            metadata_count=self._done.metadata,
+            schema_count=len(self._schemas),
+        )
         groups: list[tuple[Opcode, bytes]] = [
             (Opcode.SCHEMA, _records(self._schemas)),
             (Opcode.CHANNEL, _records(self._channels)),
-            (Opcode.STATISTICS, _record(self._statistics())),
+            (Opcode.STATISTICS, _record(statistics)),
             (Opcode.CHUNK_INDEX, self._noted()),
             (Opcode.METADATA_INDEX, _records(self._metadata[: self._done.metadata])),
         ]
@@ -263,21 +275,6 @@ class McapWriter:
         """Close the file as it is; every chunk that was written can be read."""
         self._stream.close()
         self._index.close()
-
-    def _statistics(self) -> Statistics:
-        counts = self.counts
-        start, end = self.time_range
-        return Statistics(
-            attachment_count=0,
-            channel_count=len(self._channels),
-            channel_message_counts=dict(counts),
-            chunk_count=self._done.chunks,
-            message_count=counts.total(),
-            message_start_time=start,
-            message_end_time=end,
-            metadata_count=self._done.metadata,
-            schema_count=len(self._schemas),
-        )
 
     def _note(self, record: bytes) -> int:
         """Put the index of a chunk behind those of the others, and return where it ends."""

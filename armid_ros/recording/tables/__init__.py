@@ -1,19 +1,20 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets.
-
-``open_table`` reads columns, ``plan`` settles which of them are what (said or guessed, and shown),
-``measured`` makes a recording of them.
-
-"""
+"""Recordings that are not bags: CSV, NPZ, MAT, Parquet, LeRobot datasets."""
 
 from armid_ros.recording.tables.files import is_table, open_table
 from armid_ros.recording.tables.measured import measured
 from armid_ros.recording.tables.plan import plan, TablePlan
-from armid_ros.recording.tables.settings import ColumnSettings, name_in_file, numbers, renamed
+from armid_ros.recording.tables.settings import (
+    ColumnSettings,
+    in_si,
+    name_in_file,
+    numbers,
+    per_joint,
+    refuse_columns,
+    renamed,
+)
 from armid_ros.recording.tables.table import side_by_side, Table, TableColumn
-from armid_ros.recording.tables.units import in_si, refuse_columns
 
 __all__ = [
     'TableColumn',
@@ -26,6 +27,7 @@ __all__ = [
     'name_in_file',
     'numbers',
     'open_table',
+    'per_joint',
     'plan',
     'refuse_columns',
     'renamed',

@@ -13,8 +13,7 @@ import zipfile
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.settings import DEFAULT
-from armid_ros.recording.tables.content import imported, read_content
-from armid_ros.recording.tables.table import Table, table_of_arrays
+from armid_ros.recording.tables.table import imported, read_content, Table, table_of_arrays
 import numpy as np
 import numpy.typing as npt
 

@@ -3,8 +3,7 @@
 """
 Which columns belong together, named by a person ('q{}') or guessed from what they are called.
 
-Columns that are alike but for a joint's name or number form a family; a family is judged by the
-words in its name. A guess is always shown, with what else would have fitted.
+Columns that are alike but for a joint's name or number form a family, judged by its name.
 
 """
 

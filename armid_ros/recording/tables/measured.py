@@ -14,8 +14,7 @@ from armid_ros.recording.joint_state.decoder import JointSamples
 from armid_ros.recording.recording import PositionRange, Recording
 from armid_ros.recording.series import assemble, MAX_NOT_FINITE
 from armid_ros.recording.tables.plan import TablePlan
-from armid_ros.recording.tables.settings import renamed, TIME_UNITS
-from armid_ros.recording.tables.units import in_si
+from armid_ros.recording.tables.settings import in_si, renamed, TIME_UNITS
 import numpy as np
 
 #: Times later than this count from 1970 [s].

@@ -1,11 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""
-What exports of messages write into cells: names of joints, stamps in two columns, dates.
-
-``rostopic echo -p`` writes name0, name1, position0, position1; bagpy and pandas write lists.
-
-"""
+"""What exports of messages write into cells: names of joints, stamps in two columns, dates."""
 
 from __future__ import annotations
 

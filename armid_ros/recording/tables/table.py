@@ -7,11 +7,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import gzip
+from importlib import import_module
+import os
+from pathlib import Path
 import re
+from typing import Any
+import zlib
 
 from armid_ros.errors import RecordingError
+from armid_ros.files import open_regular
 from armid_ros.files.documents import LARGEST
 from armid_ros.motion import FloatArray, read_only
+from armid_ros.recording.settings import DEFAULT
 import numpy as np
 import numpy.typing as npt
 
@@ -267,3 +275,38 @@ def side_by_side(tables: Sequence[Table]) -> Table:
         next((table.rate_hz for table in tables if table.rate_hz), None),
         tuple(note for table in tables for note in table.notes),
     )
+
+
+def read_content(path: Path) -> bytes:
+    """
+    Return the content of a file.
+
+    Raises
+    ------
+    RecordingError
+        It is no regular file, takes too much memory, or is no gzip where its name says so.
+
+    """
+    limit = DEFAULT.memory_limit
+    with open_regular(path, RecordingError) as stream:
+        DEFAULT.require(os.fstat(stream.fileno()).st_size, f'{path}: the file')
+        if path.suffix != '.gz':
+            return stream.read()
+        try:
+            with gzip.GzipFile(fileobj=stream) as packed:
+                content = packed.read(limit + 1)
+        except (OSError, EOFError, zlib.error) as error:
+            raise RecordingError(f'{path}: cannot be unpacked: {error}') from error
+    DEFAULT.require(len(content), f'{path}: what is packed in it')
+    return content
+
+
+def imported(library: str, path: Path, format_name: str) -> Any:
+    """Import a library; RecordingError says how to install it."""
+    try:
+        return import_module(library)
+    except ImportError:
+        raise RecordingError(
+            f'{path}: {format_name} is read by {library.split(".")[0]}, which is not installed: '
+            "pip install 'armid_ros[convert]'"
+        ) from None

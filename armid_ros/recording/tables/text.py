@@ -13,8 +13,7 @@ import re
 
 from armid_ros.errors import RecordingError
 from armid_ros.motion import FloatArray
-from armid_ros.recording.tables.content import read_content
-from armid_ros.recording.tables.table import Table, TableColumn
+from armid_ros.recording.tables.table import read_content, Table, TableColumn
 import numpy as np
 import numpy.typing as npt
 
@@ -48,7 +47,7 @@ def read_text(path: Path) -> Table:
             f'{path}: {len(names)} names ({", ".join(names[:6])} ...) stand above {len(cells)} '
             f'values in line {first + 1}'
         )
-    widths = [_width(cell) for cell in cells]
+    widths = [len(_elements(cell)) or None for cell in cells]
     heads: list[tuple[str, str, str]] = []
     said = dict(enumerate(_split(units, separator)))
     for k, (name, width) in enumerate(zip(names, widths, strict=True)):
@@ -143,11 +142,6 @@ def _elements(cell: str) -> list[str]:
     """Return the elements of a list, as '[1, 2]', '(1, 2)' and '[1 2]'; none of other cells."""
     found = _LIST.search(cell) if cell[:1] in ('[', '(', 'a') else None
     return [part.strip('\'"') for part in _COMMAS.split(found[1]) if part] if found else []
-
-
-def _width(cell: str) -> int | None:
-    """Return how many elements a list has; None for a cell that is none."""
-    return len(_elements(cell)) or None
 
 
 def _number(cell: str, separator: str) -> float:

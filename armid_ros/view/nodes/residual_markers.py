@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 import textwrap
 from typing import Any
 
@@ -51,13 +52,12 @@ class ResidualMarkersNode(ListeningNode):
         NodeParameter(
             'frame', '', 'Frame of the markers; empty: the base link of the description.'
         ),
-        NodeParameter('rate', 20.0, 'Publishing rate of ~/markers.', 'Hz', lower=0.1, upper=100.0),
+        NodeParameter('rate', 20.0, 'Publishing rate of ~/markers.', 'Hz', limits=(0.1, 100.0)),
         NodeParameter(
             'full',
             0.2,
             'Residual against torque, of both the root mean square, from which a joint is red.',
-            lower=0.001,
-            upper=10.0,
+            limits=(0.001, 10.0),
             read_only=False,
         ),
     )
@@ -186,10 +186,4 @@ def _point(place: FloatArray) -> Point:
     return Point(x=float(place[0]), y=float(place[1]), z=float(place[2]))
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(ResidualMarkersNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, ResidualMarkersNode)

@@ -7,12 +7,12 @@ import gzip
 
 from armid_ros.errors import RecordingError
 from armid_ros.recording.settings import DEFAULT
-from armid_ros.recording.tables import content, open_table
+from armid_ros.recording.tables import open_table, table
 import pytest
 
 
 def test_what_is_packed_has_a_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(content, 'DEFAULT', replace(DEFAULT, memory_limit=1_000_000))
+    monkeypatch.setattr(table, 'DEFAULT', replace(DEFAULT, memory_limit=1_000_000))
     path = tmp_path / 'bomb.csv.gz'
     path.write_bytes(gzip.compress(b'0,' * 10_000_000))
     with pytest.raises(RecordingError, match=r'bomb.csv.gz: what is packed in it takes'):

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from armid_msgs.msg import ParameterEstimate
@@ -15,7 +16,8 @@ from armid_ros.identification.samples.joint_gate import joint_gate
 from armid_ros.identification.samples.joint_merge import joint_places
 from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.identification.ties.stiffness import Interaction
-from armid_ros.nodes.base import ArmidNode
+from armid_ros.nodes.base import ArmidNode, LOOK_PERIOD
+from armid_ros.nodes.messages.estimates import estimate_message
 from armid_ros.nodes.messages.joint_states import DISTURBANCES
 from armid_ros.nodes.messages.timeliness import Freshness
 from armid_ros.nodes.parameters.table import NodeParameter
@@ -25,11 +27,8 @@ from armid_ros.papers.exo.identification.online import InteractionSettings, Onli
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
-#: How often publishers of joint states are looked for [s].
-_LOOK_PERIOD = 0.1
 #: Messages held while an estimate is made: several seconds at 1 kHz.
 _DEPTH = 10_000
 _TOPICS = ('exo/joint_states', 'human/joint_states')
@@ -56,15 +55,14 @@ class InteractionIdentifierNode(ArmidNode):
     """
 
     table = (
-        NodeParameter('memory', 10.0, 'How much of the past counts.', 's', lower=3.0, upper=600.0),
-        NodeParameter('period', 2.0, 'Time between estimates.', 's', lower=0.1, upper=600.0),
+        NodeParameter('memory', 10.0, 'How much of the past counts.', 's', limits=(3.0, 600.0)),
+        NodeParameter('period', 2.0, 'Time between estimates.', 's', limits=(0.1, 600.0)),
         NodeParameter(
             'slack_period',
             30.0,
             'Between looks for slack, where springs without do not explain the torques.',
             's',
-            lower=1.0,
-            upper=3600.0,
+            limits=(1.0, 3600.0),
         ),
         NodeParameter(
             'inertias',
@@ -103,8 +101,7 @@ class InteractionIdentifierNode(ArmidNode):
             for k, topic in enumerate(_TOPICS)
         )
         self.offer('~/reset', self.reset)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(_LOOK_PERIOD, self.match, clock=steady)
+        self.look_every(LOOK_PERIOD, self.match)
 
     @property
     def hardware(self) -> str:
@@ -195,20 +192,11 @@ class InteractionIdentifierNode(ArmidNode):
         return good
 
     def _publish(self, message: JointState) -> None:
-        core = self.identifier
-        assert core.separate is not None
-        estimate = core.separate.estimate
-        self._estimates.publish(
-            ParameterEstimate(
-                header=message.header,
-                name=[f'{p.name}' for p in estimate.parameters],
-                joint=[p.joint for p in estimate.parameters],
-                unit=[p.unit for p in estimate.parameters],
-                value=estimate.values.tolist(),
-                std_dev=estimate.std.tolist(),
-                samples=len(core.separate.residual),
-            )
-        )
+        found = self.identifier.separate
+        assert found is not None
+        estimate = estimate_message(found.estimate, len(found.residual))
+        estimate.header = message.header
+        self._estimates.publish(estimate)
 
     def _time(self, message: JointState) -> float:
         stamp = message.header.stamp
@@ -232,10 +220,4 @@ def _named(found: Interaction | None, suffix: str = '') -> dict[str, object]:
     return values
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(InteractionIdentifierNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, InteractionIdentifierNode)

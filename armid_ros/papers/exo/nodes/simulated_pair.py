@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 import math
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,6 @@ from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.leg_pair import leg_pair
 from armid_ros.papers.exo.plant.simulated_pair import SimulatedPair
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from rclpy.publisher import Publisher
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
@@ -38,9 +38,9 @@ class SimulatedPairNode(ArmidNode):
 
     table = (
         NodeParameter('gait', '', 'CSV of one leg over a cycle; empty: level walking.'),
-        NodeParameter('stiffness', 1e4, 'Stiffness of all springs.', 'N/m', lower=0.0, upper=1e6),
+        NodeParameter('stiffness', 1e4, 'Stiffness of all springs.', 'N/m', limits=(0.0, 1e6)),
         NodeParameter('segments', list(SEGMENTS), 'Where springs are; without names: none.'),
-        NodeParameter('slack', 0.0, 'Slack before springs pull.', 'm', lower=0.0, upper=0.1),
+        NodeParameter('slack', 0.0, 'Slack before springs pull.', 'm', limits=(0.0, 0.1)),
         NodeParameter(
             'driven',
             [''],
@@ -48,20 +48,19 @@ class SimulatedPairNode(ArmidNode):
             'move as the gait says.',
         ),
         NodeParameter(
-            'torque_rate', 100.0, 'Sample rate of torques.', 'Hz', lower=10.0, upper=1000.0
+            'torque_rate', 100.0, 'Sample rate of torques.', 'Hz', limits=(10.0, 1000.0)
         ),
-        NodeParameter('angle_noise', 0.05, 'Standard deviation.', 'deg', lower=0.0, upper=10.0),
-        NodeParameter('torque_noise', 0.5, 'Standard deviation.', 'N m', lower=0.0, upper=100.0),
-        NodeParameter('seed', 0, 'Random seed of the noise.', lower=0, upper=2**62),
+        NodeParameter('angle_noise', 0.05, 'Standard deviation.', 'deg', limits=(0.0, 10.0)),
+        NodeParameter('torque_noise', 0.5, 'Standard deviation.', 'N m', limits=(0.0, 100.0)),
+        NodeParameter('seed', 0, 'Random seed of the noise.', limits=(0, 2**62)),
         NodeParameter(
-            'rate', 1000.0, 'Publishing rate of both joint states.', 'Hz', lower=50.0, upper=5000.0
+            'rate', 1000.0, 'Publishing rate of both joint states.', 'Hz', limits=(50.0, 5000.0)
         ),
         NodeParameter(
             'real_time_factor',
             1.0,
             'Simulated time per real time, if the computer can. 0: moves only when told.',
-            lower=0.0,
-            upper=1000.0,
+            limits=(0.0, 1000.0),
         ),
     )
 
@@ -87,7 +86,7 @@ class SimulatedPairNode(ArmidNode):
         factor = self.value('real_time_factor')
         if factor:
             period = max(1.0 / (self.value('rate') * factor), 0.0005)
-            self.create_timer(period, self.catch_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            self.look_every(period, self.catch_up)
 
     @property
     def hardware(self) -> str:
@@ -164,10 +163,4 @@ class SimulatedPairNode(ArmidNode):
         )
 
 
-def main(args: Sequence[str] | None = None) -> None:
-    """Run the node."""
-    run(SimulatedPairNode, args)
-
-
-if __name__ == '__main__':
-    main()
+main = partial(run, SimulatedPairNode)
