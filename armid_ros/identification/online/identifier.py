@@ -17,7 +17,7 @@ from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.checks import MissingSamples, StreamChecks
 from armid_ros.identification.online.learner import Learner, OnlineSettings
-from armid_ros.identification.online.nuisance_rows import Seed
+from armid_ros.identification.online.nuisance_rows import Row
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import RowNoise
@@ -242,13 +242,14 @@ class OnlineIdentifier:
         self._last_moving[np.abs(motion.dq) >= _REST_VELOCITY] = motion.t
         resting = motion.t - self._last_moving > _REST_TIME
         self._last_useless[resting & self._held] = motion.t
+        begins = self._last_row is None
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
             return None
         self._last_row = motion.t
         used = motion.t - self._last_useless > _FORGOTTEN / self._row_filter.pole
         usable = not (self._checks.silent or self._checks.error)
-        return self._learn(motion, step, used & usable)
+        return self._learn(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
         """Return values and covariance of the base parameters, errors that last included."""
@@ -351,7 +352,7 @@ class OnlineIdentifier:
         return None if pole is None else 3.0 / pole + self._row_filter.delay
 
     def _learn(
-        self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
+        self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_], begins: bool
     ) -> OnlineSample:
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
@@ -369,7 +370,7 @@ class OnlineIdentifier:
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
         sample = WeightedSample(rows / gain, measured / gain, weights)
-        innovation = self._learner.predict(stamp, sample, Seed(motion, step, gain))
+        innovation = self._learner.predict(Row(stamp, sample, motion, step, gain, begins))
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     @property
