@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from armid_ros.arm import ArmModel
-from armid_ros.effects import CATALOGUE, Effect
+from armid_ros.effects import CATALOGUE
 from armid_ros.estimate import Estimate, ParameterName
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, read_only
@@ -130,53 +130,45 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
         count = len(effect.quantities)
         for owner in effect.owners:
             columns = list(range(first, first + count))
-            found.append(_candidate(effect.name, owner, columns, base))
+            found.append(_candidate(effect.name, owner, base, columns))
             if effect.traits.friction:
                 friction.setdefault(owner, []).extend(columns)
             first += count
-    several = {joint: c for joint, c in friction.items() if len(c) > 1}
-    found += [_candidate('friction', joint, c, base) for joint, c in several.items()]
-    carried = [kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.comes_and_goes]
-    found += [_carried(effect, arm, base) for effect in carried if effect.adds_to(arm.robot)]
+    several = {joint: columns for joint, columns in friction.items() if len(columns) > 1}
+    found += [_candidate('friction', joint, base, columns) for joint, columns in several.items()]
+    # a body that a link may hold; its parameters add to the link's own
+    for body in (kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.comes_and_goes):
+        columns, names = list(body.adds_to(arm.robot)), body.parameters(arm.robot)
+        if columns:
+            found.append(_candidate(body.name, body.joints[0], base, columns, names))
     return tuple(candidate for candidate in found if candidate.parameters)
 
 
 def _candidate(
-    name: str, joint: str, columns: Sequence[int], base: BaseParameters
+    name: str,
+    joint: str,
+    base: BaseParameters,
+    added_to: Sequence[int],
+    names: Sequence[ParameterName] = (),
 ) -> ChangeCandidate:
-    kept = _independent(base.grouping[:, columns])
-    directions = base.grouping[:, [columns[k] for k in kept]]
+    """Return a change of standard parameters, or of what is named and adds to them."""
+    columns = base.grouping[:, added_to]
+    independent = _independent(columns)
+    kept = [k for k in independent if not names or k < _REPORTED]
+    parameters = names or [base.standard[k] for k in added_to]
     return ChangeCandidate(
-        name, joint, tuple(base.standard[columns[k]] for k in kept), directions, directions
-    )
-
-
-def _carried(effect: Effect, arm: ArmModel, base: BaseParameters) -> ChangeCandidate:
-    """Return a body that a link may hold; its parameters add to the link's own."""
-    names = effect.parameters(arm.robot)
-    columns = base.grouping[:, list(effect.adds_to(arm.robot))]
-    kept = [k for k in _independent(columns) if k < _REPORTED]
-    return ChangeCandidate(
-        effect.name,
-        effect.joints[0],
-        tuple(names[k] for k in kept),
+        name,
+        joint,
+        tuple(parameters[k] for k in kept),
         columns[:, kept],
-        columns[:, _independent(columns)],
-        common=True,
+        columns[:, independent],
+        common=bool(names),
     )
 
 
 def _independent(columns: FloatArray) -> list[int]:
     """Return the columns that those before them do not span."""
-    basis = np.zeros((len(columns), 0))
-    kept = []
-    for k, column in enumerate(columns.T):
-        length = np.linalg.norm(column)
-        if not length > 0.0:
-            continue
-        rest = column / length
-        rest = rest - basis @ (basis.T @ rest)
-        if np.linalg.norm(rest) > _INDEPENDENT:
-            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-            kept.append(k)
-    return kept
+    lengths = np.linalg.norm(columns, axis=0)
+    unit = columns / np.where(lengths > 0.0, lengths, 1.0)
+    ranks = [np.linalg.matrix_rank(unit[:, :k], _INDEPENDENT) for k in range(len(lengths) + 1)]
+    return [int(k) for k in np.flatnonzero(np.diff(ranks))]

@@ -230,9 +230,12 @@ class ChangeSearch:
         for k in range(len(self._blocks) - 1):
             window = yield from self._window(k, residual_scale)
             yield
-            rows.append(self._likelihood(self._ratios(window)))
+            rows.append(self._ratios(window))
             yield
-        likelihood = np.array(rows)
+        # logarithms of likelihoods, each free parameter being charged for
+        usual = np.nanmedian(np.concatenate([u.factors for u in self._usual.values()]))
+        observations = sum(len(block.samples) for block in self._blocks)
+        likelihood = np.array(rows) / (2.0 * usual) - 0.5 * self._sizes * np.log(observations)
         at = likelihood.max(axis=0)
         best = int(np.argmax(at))
         first = int(np.flatnonzero(likelihood[:, best] > at[best] - _ALIKE)[-1])
@@ -256,10 +259,3 @@ class ChangeSearch:
         if rivals and seen < _LATEST:
             return None
         return FoundChange(tuple(self._blocks), first, named, rivals, float(at[best]))
-
-    def _likelihood(self, ratios: FloatArray) -> FloatArray:
-        """Return logarithms of likelihoods, each free parameter being charged for."""
-        factors = np.concatenate([u.factors for u in self._usual.values()])
-        usual = float(np.nanmedian(factors))
-        observations = sum(len(block.samples) for block in self._blocks)
-        return np.asarray(ratios / (2.0 * usual) - 0.5 * self._sizes * np.log(observations))

@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import at_once, Background, Job, Pieces
@@ -30,7 +31,7 @@ from armid_ros.identification.online.change_search import (
     ChangeSettings,
     FoundChange,
 )
-from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
+from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
 from armid_ros.identification.online.null_calibration import ResidualScale
 from armid_ros.identification.online.recursive import (
     Learned,
@@ -50,27 +51,19 @@ _REMEMBERED = 240
 #: Samples that are learned in one piece of work, together or one by one, as with forgetting. More
 #: than come in the meantime, so that what came late is caught up with.
 _TOGETHER, _ONE_BY_ONE = 10, 4
-#: Samples whose nuisance rows are made in one piece of work.
+#: Rows whose nuisance columns are made in one piece of work.
 _WIDENED = 3
-
-
-#: A sample, and what its nuisance rows are made from.
-Narrow = tuple[WeightedSample, Seed]
+Item = TypeVar('Item')
 
 
 @dataclass(eq=False)
 class _Stretch:
-    """
-    Samples that were not searched so far; those of a block, or what an interruption left.
-
-    None among them begins a new stretch of rows.
-
-    """
+    """Rows that were not searched so far; those before an interruption have no end."""
 
     begin: float
     narrow: Learned
     end: float | None = None
-    samples: list[Narrow | None] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
 
 
 class ChangeWatch:
@@ -129,9 +122,8 @@ class ChangeWatch:
         self._left: deque[float] = deque(maxlen=_REMEMBERED)
         self._open: _Stretch | None = None
         self._unseen: deque[_Stretch] = deque()
-        self._late: list[Narrow | None] | None = None
+        self._late: list[Row] | None = None
         self._searching = False
-        self._nuisance.reset()
 
     def use(self, settings: ChangeSettings | None, forgetting: float) -> None:
         """
@@ -151,36 +143,21 @@ class ChangeWatch:
 
     def interrupt(self) -> None:
         """Begin a new stretch of rows, which does not continue the one before."""
-        if self._late is not None:
-            self._late.append(None)
-            return
-        self._open = self._open or _Stretch(0.0, self._estimator.learned())
-        self._open.samples.append(None)
-        self._hand_over(None)
+        if self._late is None:
+            self._open = self._open or _Stretch(0.0, self._estimator.learned())
+            self._hand_over(None)
 
-    def update(self, t: float, sample: WeightedSample, seed: Seed) -> FloatArray:
-        """
-        Let the estimator take in one sample; see ``RecursiveLeastSquares.update``.
-
-        Parameters
-        ----------
-        t : float
-            Time of the sample [s].
-        sample : WeightedSample
-            Of the estimator.
-        seed : Seed
-            What the nuisance rows are made from.
-
-        """
-        if self._open is not None and t - self._open.begin >= BLOCK:
-            self._hand_over(t)
+    def update(self, row: Row) -> None:
+        """Let the estimator take in one row; see ``RecursiveLeastSquares.update``."""
+        if self._open is not None and row.t - self._open.begin >= BLOCK:
+            self._hand_over(row.t)
         if self._late is not None:  # a change was named, and what came since is learned again
-            self._late.append((sample, seed))
+            self._late.append(row)
         else:
             if self._open is None:
-                self._open = _Stretch(t, self._estimator.learned())
-            self._open.samples.append((sample, seed))
-        return self._estimator.update(*sample)
+                self._open = _Stretch(row.t, self._estimator.learned())
+            self._open.rows.append(row)
+        self._estimator.update(*row.sample)
 
     def _among_all(self, directions: FloatArray) -> FloatArray:
         """Return directions in the parameters of the estimator in those of the wider one."""
@@ -202,7 +179,7 @@ class ChangeWatch:
         try:
             while self._unseen:
                 stretch = self._unseen.popleft()
-                samples = yield from self._widened(stretch.samples)
+                samples = yield from self._widened(stretch.rows)
                 before = self._wider.learned()
                 yield from self._learn(self._wider, samples)
                 if stretch.end is None:
@@ -222,27 +199,19 @@ class ChangeWatch:
 
     @property
     def _at_a_time(self) -> int:
-        return _ONE_BY_ONE if self._estimator.forgets else _TOGETHER
+        return _ONE_BY_ONE if self._estimator.forgetting < 1.0 else _TOGETHER
 
-    def _widened(self, samples: Sequence[Narrow | None]) -> Pieces[list[WeightedSample]]:
-        """Return samples with the rows of all that is learned, of successive samples."""
-        whole: list[WeightedSample] = []
-        waiting: list[Narrow] = []
-        for number, narrow in enumerate(samples, start=1):
-            if narrow is not None:
-                waiting.append(narrow)
-            if narrow is None or len(waiting) == _WIDENED or number == len(samples):
-                if waiting:
-                    own = np.stack([sample.rows for sample, _ in waiting])
-                    further = self._nuisance.rows([seed for _, seed in waiting])
-                    rows = np.concatenate([own, further], axis=2)
-                    for (sample, _), wide in zip(waiting, rows, strict=True):
-                        whole.append(sample._replace(rows=wide))
-                waiting = []
-                yield
-            if narrow is None:
-                self._nuisance.reset()
-        return whole
+    def _widened(self, rows: Sequence[Row]) -> Pieces[list[WeightedSample]]:
+        """Return successive samples with the columns of all that is learned."""
+        samples: list[WeightedSample] = []
+        for part in _parts(rows, _WIDENED):
+            own = np.stack([row.sample.rows for row in part])
+            wide = np.concatenate([own, self._nuisance.columns(part)], axis=2)
+            samples += [
+                row.sample._replace(rows=both) for row, both in zip(part, wide, strict=True)
+            ]
+            yield
+        return samples
 
     def _summed(
         self, stretch: _Stretch, end: float, samples: Sequence[WeightedSample], before: Learned
@@ -305,7 +274,7 @@ class ChangeWatch:
         stretches = (*self._unseen, *([self._open] if self._open else ()))
         self._unseen.clear()
         self._open, self._late = None, []
-        since += yield from self._widened([one for part in stretches for one in part.samples])
+        since += yield from self._widened([row for part in stretches for row in part.rows])
         again = copy(self._estimator)
         for estimator, known, directions in (
             (self._wider, last.before, self._among_all(reopened)),
@@ -342,7 +311,7 @@ class ChangeWatch:
         return max(1.0, squares / (count - free) / float(np.median(self._left)))
 
 
-def _parts(samples: Sequence[WeightedSample], size: int) -> Iterator[Sequence[WeightedSample]]:
-    """Yield so many samples after the other."""
-    for first in range(0, len(samples), size):
-        yield samples[first : first + size]
+def _parts(items: Sequence[Item], size: int) -> Iterator[Sequence[Item]]:
+    """Yield so many items after the other."""
+    for first in range(0, len(items), size):
+        yield items[first : first + size]

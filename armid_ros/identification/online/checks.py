@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from armid_ros.identification.rows.checks import position_problem, REST_RANGE, SHORTEST, SILENT
+from armid_ros.identification.samples.spikes import SpikeGate
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
@@ -17,40 +18,44 @@ _BEHIND = 1.0
 
 class StreamChecks:
     """
-    Watch how far positions and torques of a stream have ranged.
+    Whether anything can be learned from a stream, by how far its good samples have ranged.
 
     Parameters
     ----------
     robot : Robot
         Gives the limits.
+    gate : SpikeGate
+        Knows from where to where positions and torques range.
 
     """
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
+    def __init__(self, robot: Robot, gate: SpikeGate) -> None:
+        self._robot, self._gate = robot, gate
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
-        n = self._robot.n_joints
-        self._lowest, self._highest = np.full((2, n), np.inf), np.full((2, n), -np.inf)
+        """Forget when the arm began to move."""
         self._moved: float | None = None
         self._moving = 0.0
         self._judged: tuple[bytes, str] | None = None
 
-    def take(self, t: float, q: FloatArray, tau: FloatArray) -> None:
-        """Take in a sample that is not damaged: stamp, positions, torques, shape (n,)."""
-        for place, signal in enumerate((q, tau)):
-            np.minimum(self._lowest[place], signal, out=self._lowest[place])
-            np.maximum(self._highest[place], signal, out=self._highest[place])
-        if self._moved is None and np.any(self._highest[0] - self._lowest[0] > REST_RANGE):
-            self._moved = t
+    def take(self, t: float) -> None:
+        """Take in the stamp of a sample that is not damaged."""
+        if self._moved is None:
+            lowest, highest = self._positions
+            self._moved = t if np.any(highest - lowest > REST_RANGE) else None
         self._moving = 0.0 if self._moved is None else t - self._moved
+
+    @property
+    def _positions(self) -> tuple[FloatArray, FloatArray]:
+        n = self._robot.n_joints
+        return self._gate.lowest[:n], self._gate.highest[:n]
 
     @property
     def silent(self) -> bool:
         """Whether no torque has ever changed, so that nothing can be learned from it."""
-        return bool((self._highest[1] <= self._lowest[1]).all())
+        n = self._robot.n_joints
+        return bool((self._gate.highest[-n:] <= self._gate.lowest[-n:]).all())
 
     @property
     def error(self) -> str:
@@ -58,10 +63,10 @@ class StreamChecks:
         if self.silent and abs(self._moving) > SHORTEST:
             return SILENT
         # the range is judged for each row, and seldom grows
-        ranged = self._lowest[0].tobytes() + self._highest[0].tobytes()
+        lowest, highest = self._positions
+        ranged = lowest.tobytes() + highest.tobytes()
         if self._judged is None or self._judged[0] != ranged:
-            problem = position_problem(self._robot, self._lowest[0], self._highest[0])
-            self._judged = ranged, problem
+            self._judged = ranged, position_problem(self._robot, lowest, highest)
         return self._judged[1]
 
 

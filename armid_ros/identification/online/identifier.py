@@ -17,11 +17,12 @@ from armid_ros.identification.online.change import Change
 from armid_ros.identification.online.change_watch import ChangeSettings
 from armid_ros.identification.online.checks import MissingSamples, StreamChecks
 from armid_ros.identification.online.learner import Learner, OnlineSettings
-from armid_ros.identification.online.nuisance_rows import Seed
+from armid_ros.identification.online.nuisance_rows import Row
 from armid_ros.identification.online.recursive import check_forgetting, WeightedSample
 from armid_ros.identification.rows.causal import CausalFilter, CausalMotion, check_gap, TripleLag
 from armid_ros.identification.rows.row_noise import RowNoise
 from armid_ros.identification.samples.joint_gate import joint_gate
+from armid_ros.identification.samples.straight_line import StreamSample
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
@@ -139,7 +140,6 @@ class OnlineIdentifier:
             settings.cutoff,
             max_gap=settings.max_gap,
             measured_velocity=settings.measured_velocity,
-            prismatic=robot.prismatic,
         )
         measured = 'qvt' if settings.measured_velocity else 'qt'
         self._gate = joint_gate(
@@ -149,7 +149,7 @@ class OnlineIdentifier:
             max_gap=_LONGEST_DAMAGE,
             false_alarm_time=(settings.changes or ChangeSettings()).false_alarm_time,
         )
-        self._checks = StreamChecks(robot)
+        self._checks = StreamChecks(robot, self._gate)
         self._missing = MissingSamples()
         self.latest: tuple[OnlineSample, ...] = ()
         self._row_filter = TripleLag(settings.cutoff)
@@ -163,7 +163,7 @@ class OnlineIdentifier:
         self._generation = -1
         self._last_row: float | None = None
         self._last_moving = np.full(robot.n_joints, -np.inf)
-        self._last_useless: FloatArray | None = None
+        self._last_useless = self._last_moving.copy()  # at rest, or before the row filter started
         self._noise: RowNoise | None = None
 
     def reset(self) -> None:
@@ -199,14 +199,12 @@ class OnlineIdentifier:
         """
         learned = self._learner.settle()
         signal = self._filter.signal(t, q, dq, tau)
+        self.latest = ()
         if signal is not None:
             self._missing.take(t, self._filter.period)
-        if signal is None:
-            self.latest = ()
-        else:
             good = self._gate.take(t, signal, self._without_consequence)
-            found = [self._take(one.t, one.x, begins=one.begins) for one in good]
-            self.latest = tuple(one for brought in found for one in brought)
+            found = [self._take(sample) for sample in good]
+            self.latest = tuple(one for one in found if one is not None)
         # some of what takes long, with a sample that does nothing else if there are such
         period = self._filter.period or 0.0
         if self.latest:
@@ -225,32 +223,33 @@ class OnlineIdentifier:
         self._work.finish()
         return self.__dict__
 
-    def _take(
-        self, t: float, signal: FloatArray, *, begins: bool = False
-    ) -> tuple[OnlineSample, ...]:
+    def _take(self, sample: StreamSample) -> OnlineSample | None:
         """Learn from a good sample, which may begin a stretch; return what it brought."""
-        n = self.arm.robot.n_joints
-        if begins:
+        if sample.begins:
             self._filter.restart('position_step')
-        self._checks.take(t, signal[:n], signal[-n:])
-        motion = self._filter.advance(t, signal)
+        self._checks.take(sample.t)
+        motion = self._filter.advance(sample.t, sample.x)
         if motion is None:
-            return ()
+            return None
         if self._filter.generation != self._generation:
             # the row filter starts anew, together with the motion filter
             self._row_filter.reset()
             self._learner.interrupt()
             self._generation = self._filter.generation
-            self._last_row = self._last_useless = self._noise = None
+            self._last_row = self._noise = None
             self._last_moving[:] = -np.inf
-        useless = self._watch_rest(motion)
+            self._last_useless[:] = motion.t
+        self._last_moving[np.abs(motion.dq) >= _REST_VELOCITY] = motion.t
+        resting = motion.t - self._last_moving > _REST_TIME
+        self._last_useless[resting & self._held] = motion.t
+        begins = self._last_row is None
         step = self._row_period if self._last_row is None else motion.t - self._last_row
         if step < self._row_period - 0.5 * (self._filter.period or 0.0):
-            return ()
+            return None
         self._last_row = motion.t
-        used = motion.t - useless > _FORGOTTEN / self._row_filter.pole
+        used = motion.t - self._last_useless > _FORGOTTEN / self._row_filter.pole
         usable = not (self._checks.silent or self._checks.error)
-        return (self._learn(motion, step, used & usable),)
+        return self._learn(motion, step, used & usable, begins)
 
     def estimate(self) -> Estimate:
         """Return values and covariance of the base parameters, errors that last included."""
@@ -337,15 +336,9 @@ class OnlineIdentifier:
     def spikes(self) -> Mapping[tuple[str, str], int]:
         """Joint states left out as a signal jumped and came back, by joint and signal."""
         joints = self.arm.robot.joints
-        names = (
-            ('position', 'velocity', 'effort')
-            if self.settings.measured_velocity
-            else ('position', 'effort')
-        )
-        return {
-            (joints[k % len(joints)], names[k // len(joints)]): count
-            for k, count in self._gate.spikes.items()
-        }
+        signals = ('position', *(['velocity'] * self.settings.measured_velocity), 'effort')
+        names = [(joint, signal) for signal in signals for joint in joints]
+        return {names[k]: count for k, count in self._gate.spikes.items()}
 
     @property
     def restarts(self) -> Mapping[str, int]:
@@ -358,17 +351,8 @@ class OnlineIdentifier:
         pole = self._filter.pole
         return None if pole is None else 3.0 / pole + self._row_filter.delay
 
-    def _watch_rest(self, motion: CausalMotion) -> FloatArray:
-        """Return when each joint was last at rest, or the row filter started, shape (n,) [s]."""
-        if self._last_useless is None:
-            self._last_useless = np.full(len(motion.q), motion.t)
-        self._last_moving[np.abs(motion.dq) >= _REST_VELOCITY] = motion.t
-        resting = motion.t - self._last_moving > _REST_TIME
-        self._last_useless[resting & self._held] = motion.t
-        return self._last_useless
-
     def _learn(
-        self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_]
+        self, motion: CausalMotion, step: float, used: npt.NDArray[np.bool_], begins: bool
     ) -> OnlineSample:
         state = (motion.q[None], motion.dq[None], motion.ddq[None])
         one = Motion(self.arm.robot.joints, np.array([motion.t]), *state)
@@ -386,7 +370,7 @@ class OnlineIdentifier:
         stamp = motion.t - (self.delay or 0.0)
         weights = np.asarray(used * independent)
         sample = WeightedSample(rows / gain, measured / gain, weights)
-        innovation = self._learner.predict(stamp, sample, Seed(motion, step, gain))
+        innovation = self._learner.predict(Row(stamp, sample, motion, step, gain, begins))
         return OnlineSample(stamp, measured, measured - innovation * gain, used)
 
     @property

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.errors import IdentificationError
@@ -21,17 +20,19 @@ from armid_ros.estimate import Estimate
 from armid_ros.identification.online.background import Background
 from armid_ros.identification.online.change import Change, change_candidates
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
-from armid_ros.identification.online.nuisance_rows import NuisanceRows, Seed
-from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
+from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
+from armid_ros.identification.online.recursive import RecursiveLeastSquares
 from armid_ros.identification.online.robust_covariance import RobustCovariance
 from armid_ros.identification.rows.causal import ROW_RATE_RATIO
-from armid_ros.identification.rows.row_noise import ResidualDeviation, sensor_noise
+from armid_ros.identification.rows.row_noise import sensor_noise
 from armid_ros.model import BaseParameters
 from armid_ros.motion import FloatArray
 import numpy as np
 
 #: Windows of which the colour of the noise is learned [s]: longer than what it lasts.
 _WINDOW = 4.0
+#: What is divided by is at least this.
+_SMALLEST = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -88,15 +89,6 @@ class OnlineSettings:
         return rate
 
 
-class _Row(NamedTuple):
-    """A row that was predicted and is to be learned from."""
-
-    t: float
-    sample: WeightedSample
-    seed: Seed
-    innovation: FloatArray
-
-
 class Learner:
     """
     Learns the base parameters of an arm, how certain they are, and when they have changed.
@@ -135,15 +127,15 @@ class Learner:
                 settings.changes,
                 work,
             )
-        self._residual_deviation = ResidualDeviation(arm.robot.n_joints, settings.forgetting)
-        self._reopened = 0
-        self._waiting: _Row | None = None
+        self._joints = arm.robot.n_joints
+        self.reset()
 
     def reset(self) -> None:
         """Forget everything; nothing may be left to be done in the background."""
-        self._waiting = None
+        self._waiting: tuple[Row, FloatArray] | None = None
         self._reopened = 0
-        self._residual_deviation.reset()
+        # of residuals: weighted squares, their weights, and the standard deviation
+        self._squares, self._counts, self._deviation = np.zeros((3, self._joints))
         self._estimator.reset()
         self._scores.reset()
         if self._watch is not None:
@@ -152,8 +144,7 @@ class Learner:
     def use(self, settings: OnlineSettings) -> None:
         """Go on with another forgetting, and another belief in changes."""
         self.settle()
-        for part in (self._estimator, self._scores, self._residual_deviation):
-            part.forgetting = settings.forgetting
+        self._estimator.forgetting = self._scores.forgetting = settings.forgetting
         if self._watch is not None:
             self._watch.use(settings.changes, settings.forgetting)
 
@@ -164,40 +155,31 @@ class Learner:
         if self._watch is not None:
             self._watch.interrupt()
 
-    def predict(self, t: float, sample: WeightedSample, seed: Seed) -> FloatArray:
-        """
-        Take in a row, and return what the estimate before it misses the torque by.
-
-        Parameters
-        ----------
-        t : float
-            Time of the row [s].
-        sample : WeightedSample
-            The row.
-        seed : Seed
-            What it was made from.
-
-        """
+    def predict(self, row: Row) -> FloatArray:
+        """Take in a row, and return what the estimate before it misses the torque by."""
         self.settle()
-        innovation = sample.tau - sample.rows @ self._estimator.values
-        self._waiting = _Row(t, sample, seed, innovation)
+        innovation = row.sample.tau - row.sample.rows @ self._estimator.values
+        self._waiting = row, innovation
         return innovation
 
     def settle(self) -> bool:
         """Learn from the row that waits; return whether there was one."""
-        row, self._waiting = self._waiting, None
-        if row is None:
+        if self._waiting is None:
             return False
+        (row, innovation), self._waiting = self._waiting, None
         sample, estimator = row.sample, self._estimator
         if self._watch is None:
             estimator.update(*sample)
         else:
-            self._watch.update(row.t, sample, row.seed)
+            self._watch.update(row)
             for change in self._watch.changes[self._reopened :]:
                 self._scores.reopen(change.reopened, estimator.values)
                 self._reopened += 1
         left = sample.tau - sample.rows @ estimator.values
-        self._residual_deviation.learn(row.innovation, left, sample.weights)
+        self._squares = estimator.forgetting * self._squares + sample.weights * innovation * left
+        self._counts = estimator.forgetting * self._counts + sample.weights
+        known = np.maximum(self._counts, _SMALLEST)
+        self._deviation = np.sqrt(np.maximum(self._squares, 0.0) / known)
         scale = estimator.scale(sample.weights)
         self._scores.add(sample.rows * scale[:, None], sample.tau * scale, estimator.values)
         return True
@@ -211,7 +193,7 @@ class Learner:
     def residual_deviation(self) -> FloatArray:
         """Return what the estimate leaves of torques, as noise of single samples, (n,) [N m]."""
         self.settle()
-        return self._residual_deviation.size
+        return self._deviation
 
     @property
     def values(self) -> FloatArray:

@@ -19,29 +19,39 @@ from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE
+from armid_ros.identification.online.recursive import WeightedSample
 from armid_ros.identification.rows.causal import CausalMotion, TripleLag
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
 
-class Seed(NamedTuple):
+class Row(NamedTuple):
     """
-    What the rows of one sample are made from.
+    What is learned from one sample, and what further columns of it are made from.
 
     Attributes
     ----------
+    t : float
+        Its time [s].
+    sample : WeightedSample
+        What the estimator takes in.
     motion : CausalMotion
         Behind the motion filter.
     step : float
-        Time since the sample before [s].
+        Time since the row before [s].
     gain : float
         What the rows are divided by.
+    begins : bool
+        Whether it does not continue the row before.
 
     """
 
+    t: float
+    sample: WeightedSample
     motion: CausalMotion
     step: float
     gain: float
+    begins: bool = False
 
 
 class NuisanceRows:
@@ -78,47 +88,21 @@ class NuisanceRows:
             for name in effect.parameters(arm.robot)
         )
 
-    def reset(self) -> None:
-        """Begin a new stretch."""
-        self._filter.reset()
-
-    def torques(self, motion: Motion) -> FloatArray:
-        """
-        Return the friction of a unit of each quantity, joint by joint.
-
-        Parameters
-        ----------
-        motion : Motion
-            N samples.
-
-        Returns
-        -------
-        ndarray, shape (N, n, K)
-            Torques; each acts on its own joint.
-
-        """
-        columns = [effect.columns(motion, self._arm) for effect in self._effects]
-        torques = np.empty((len(motion), motion.n_joints, len(columns)))
-        for k, column in enumerate(columns):
-            torques[:, :, k] = np.diagonal(column, axis1=1, axis2=2)
-        return torques
-
-    def rows(self, seeds: Sequence[Seed]) -> FloatArray:
-        """Return the rows of N successive samples, shape (N, n, K n)."""
-        moved = [(s.motion.q, s.motion.dq, s.motion.ddq) for s in seeds]
+    def columns(self, some: Sequence[Row]) -> FloatArray:
+        """Return the columns of N successive rows, shape (N, n, K n)."""
+        moved = [(row.motion.q, row.motion.dq, row.motion.ddq) for row in some]
         q, dq, ddq = (np.stack(part) for part in zip(*moved, strict=True))
-        motion = Motion(self._arm.robot.joints, np.array([s.motion.t for s in seeds]), q, dq, ddq)
-        torques = self.torques(motion)
-        filtered = np.empty_like(torques)
-        for seed, raw, place in zip(seeds, torques, filtered, strict=True):
-            smooth = self._filter.update(seed.step, raw.reshape(-1))[2]
-            np.divide(smooth.reshape(raw.shape), seed.gain, out=place)
-        return by_joint(filtered)
-
-
-def by_joint(torques: FloatArray) -> FloatArray:
-    """Return torques that act on their own joint, (..., n, K), as rows, (..., n, K n)."""
-    *samples, n, count = torques.shape
-    rows = np.zeros((*samples, n, count, n))
-    np.einsum('...jkj->...jk', rows)[...] = torques
-    return rows.reshape(*samples, n, count * n)
+        t = np.array([row.motion.t for row in some])
+        motion = Motion(self._arm.robot.joints, t, q, dq, ddq)
+        # the friction of a unit of each quantity, of which each acts on its own joint
+        torques = np.empty((len(some), motion.n_joints, len(self._effects)))
+        for k, effect in enumerate(self._effects):
+            torques[:, :, k] = np.diagonal(effect.columns(motion, self._arm), axis1=1, axis2=2)
+        columns = np.zeros((*torques.shape, motion.n_joints))
+        own = np.einsum('sjkj->sjk', columns)
+        for row, raw, place in zip(some, torques, own, strict=True):
+            if row.begins:
+                self._filter.reset()
+            smooth = self._filter.update(row.step, raw.reshape(-1))[2]
+            np.divide(smooth.reshape(raw.shape), row.gain, out=place)
+        return columns.reshape(len(some), motion.n_joints, -1)

@@ -126,12 +126,12 @@ class NullCalibration:
         self._fresh = 0
         self._rare = stats.chi2.isf(_RARE, self._sizes)
         self._tail = 1.0
+        self._limits: tuple[float, FloatArray] | None = None
         self._mean = below + _TAIL * self._most
         # of the logarithm of the factor that makes the mean right, from one window
         self._variance = (square + _TAIL * self._most**2 - self._mean**2) / below**2
         self.factors = np.full(len(sizes), np.nan)
         self._freedom = np.zeros(len(sizes))
-        self._limits: tuple[FloatArray, float, FloatArray] | None = None
 
     def learning(self, ratios: FloatArray, strength: FloatArray) -> Job:
         """
@@ -167,8 +167,6 @@ class NullCalibration:
         independent = counts / self._overlap
         judged = independent >= _FEWEST
         if not judged.any():
-            self.factors = np.full(len(self._sizes), np.nan)
-            self._freedom = np.zeros(len(self._sizes))
             return
         single = np.full(len(self._sizes), np.nan)
         for columns in _in_pieces(later):
@@ -195,6 +193,7 @@ class NullCalibration:
         self.factors, self._tail = factors, max(1.0, tail)
         self._freedom = np.zeros(len(self._sizes))
         self._freedom[judged] = 2.0 / left  # what a mean square of so many degrees varies by
+        self._limits = None
 
     @staticmethod
     def _tail_of(seen: FloatArray, rare: FloatArray) -> Pieces[float]:
@@ -227,25 +226,15 @@ class NullCalibration:
 
         """
         judged = self._freedom > 0.0
+        if self._limits is None or self._limits[0] != chance:
+            self._limits = chance, limits(chance, self._sizes[judged], self._freedom[judged])
         result = np.zeros(len(self._sizes))
         stronger = np.maximum.reduceat(
             strength / self._strength.clip(_SMALLEST), self._first
         ).clip(1.0)
         usual = 1.0 + (_MARGIN * self._tail * self.factors[judged] - 1.0) * stronger[judged]
-        result[judged] = ratios[judged] / (usual * self._limits_at(chance)[judged])
+        result[judged] = ratios[judged] / (usual * self._limits[1])
         return result
-
-    def _limits_at(self, chance: float) -> FloatArray:
-        """Return what ratios over their usual size exceed with a small chance; inf: not known."""
-        known = self._limits
-        if known is not None and known[0] is self._freedom and known[1] == chance:
-            return known[2]
-        judged = self._freedom > 0.0
-        sizes, freedom = self._sizes[judged], self._freedom[judged]
-        found = np.full(len(self._sizes), np.inf)
-        found[judged] = limits(chance, sizes, freedom)
-        self._limits = self._freedom, chance, found
-        return found
 
 
 def _in_pieces(values: FloatArray) -> Iterator[slice]:

@@ -83,18 +83,17 @@ class RecursiveLeastSquares:
     ----------
     parameters : tuple of ParameterName
         P names.
-    noise : array_like, shape (m,), optional
+    noise : array_like, shape (m,)
         Standard deviation of the noise of the m rows of a sample, usually one per joint [N m].
-        Without it the rows weigh the same and the covariance is scaled by the residuals.
     forgetting : float
         1 keeps everything. Below 1, a direction that is excited all the time is estimated from
         about the last 1 / (1 - forgetting) samples.
     start : array_like, shape (P,), optional
         Values to begin with, zero by default, within PRIOR_STD: a ridge too weak to be seen once a
         parameter is excited.
-    scale_covariance : bool, optional
-        Whether the covariance is multiplied by ``variance_factor``; by default when the noise is
-        not given. Right when the noise is known up to a factor.
+    scale_covariance : bool
+        Whether the noise is known up to a factor only, the covariance being multiplied by
+        ``variance_factor``.
 
     Raises
     ------
@@ -105,6 +104,8 @@ class RecursiveLeastSquares:
     ----------
     parameters : tuple of ParameterName
         P names.
+    noise_is_relative : bool
+        As `scale_covariance`.
     samples : int
         Samples used since the last reset.
 
@@ -113,24 +114,22 @@ class RecursiveLeastSquares:
     def __init__(
         self,
         parameters: tuple[ParameterName, ...],
-        noise: npt.ArrayLike | None = None,
+        noise: npt.ArrayLike,
         *,
         forgetting: float = 1.0,
         start: npt.ArrayLike | None = None,
-        scale_covariance: bool | None = None,
+        scale_covariance: bool = False,
     ) -> None:
         check_forgetting(forgetting)
         self.parameters = parameters
         self.samples = 0
         self._forgetting = float(forgetting)
-        self._noise = None if noise is None else np.array(noise, dtype=np.float64)
-        if self._noise is not None and (
-            self._noise.ndim != 1 or not np.all((self._noise > 0.0) & (self._noise < np.inf))
-        ):
+        self._noise = np.array(noise, dtype=np.float64)
+        if self._noise.ndim != 1 or not np.all((self._noise > 0.0) & (self._noise < np.inf)):
             raise IdentificationError(
                 f'noise {self._noise}: has to be one finite standard deviation > 0 for each joint'
             )
-        self._scale = noise is None if scale_covariance is None else scale_covariance
+        self.noise_is_relative = scale_covariance
         count = len(parameters)
         values = np.zeros(count) if start is None else np.asarray(start, dtype=np.float64)
         if values.shape != (count,) or not np.all(np.isfinite(values)):
@@ -239,8 +238,7 @@ class RecursiveLeastSquares:
 
     def scale(self, weights: FloatArray) -> FloatArray:
         """Return what gives rows of these weights noise of variance 1, shape (m,) [1/(N m)]."""
-        root = np.sqrt(weights)
-        return root if self._noise is None else root / self._noise
+        return np.asarray(np.sqrt(weights) / self._noise)
 
     def learned(self) -> Learned:
         """Return what is known now."""
@@ -279,11 +277,6 @@ class RecursiveLeastSquares:
         self._take(self._root, self._values)  # R theta is not kept up while samples are forgotten
 
     @property
-    def forgets(self) -> bool:
-        """Whether samples lose weight with time."""
-        return self._forgetting < 1.0
-
-    @property
     def values(self) -> FloatArray:
         """Estimated parameters, shape (P,)."""
         return self._values
@@ -291,17 +284,8 @@ class RecursiveLeastSquares:
     @property
     def covariance(self) -> FloatArray:
         """Covariance of the values, shape (P, P)."""
-        return square_root.inverse_products(self._root) * self.covariance_factor
-
-    @property
-    def noise_is_relative(self) -> bool:
-        """Whether the noise is known up to a factor only, which is taken from the residuals."""
-        return self._scale
-
-    @property
-    def covariance_factor(self) -> float:
-        """Return the factor of the covariance: the variance factor, or 1 for known noise."""
-        return self.variance_factor if self._scale else 1.0
+        factor = self.variance_factor if self.noise_is_relative else 1.0
+        return square_root.inverse_products(self._root) * factor
 
     @property
     def variance_factor(self) -> float:
@@ -333,7 +317,7 @@ class RecursiveLeastSquares:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         rows = np.asarray(rows, dtype=np.float64)
         tau = np.asarray(tau, dtype=np.float64)
-        count = len(tau) if self._noise is None else len(self._noise)
+        count = len(self._noise)
         expected = (count, len(self.parameters))
         if rows.shape != expected or tau.shape != expected[:1]:
             raise IdentificationError(

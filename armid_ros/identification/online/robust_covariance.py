@@ -134,8 +134,9 @@ class RobustCovariance:
         if not window.counts.any():
             return
         if self._latest is not None:
-            settled = self._settled or _nothing(window)
-            yield from _add(settled, self._latest)
+            settled = self._latest
+            if self._settled is not None:
+                settled = yield from _sum(self._settled, self._latest)
             # the share of what is known with a window that it brings, mean of all directions
             both = settled.information + window.information
             size = np.sqrt(np.diag(both).clip(PRIOR_STD**-2))
@@ -150,9 +151,7 @@ class RobustCovariance:
                     yield
                 settled.counts[:] *= kept
             self._settled = settled
-            whole = _nothing(window)
-            yield from _add(whole, settled)
-            yield from _add(whole, window)
+            whole = yield from _sum(settled, window)
             self._shape = yield from _shape(whole, values)
         self._latest = window
 
@@ -198,16 +197,13 @@ class RobustCovariance:
         return np.asarray(half @ half.T)
 
 
-def _nothing(like: _Bands) -> _Bands:
-    return _Bands(np.zeros_like(like.products), np.zeros_like(like.counts))
-
-
-def _add(some: _Bands, more: _Bands) -> Job:
-    """Add to products, joint by joint."""
-    for products, others in zip(some.products, more.products, strict=True):
-        products += others
+def _sum(some: _Bands, more: _Bands) -> Pieces[_Bands]:
+    """Return the sums of products, joint by joint."""
+    products = np.empty_like(some.products)
+    for place, first, second in zip(products, some.products, more.products, strict=True):
+        np.add(first, second, out=place)
         yield
-    some.counts[:] += more.counts
+    return _Bands(products, some.counts + more.counts)
 
 
 def _transformed(columns: FloatArray) -> Pieces[_Bands]:

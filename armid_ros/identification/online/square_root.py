@@ -77,7 +77,7 @@ def replaced(root: FloatArray, rows: FloatArray, forgetting: float) -> FloatArra
     budget = _LOSS_RATIO * (1.0 - forgetting) * len(root)
     # the level for which the gains cut off at it, ascending, add up to the budget
     some = np.maximum(gains, 0.0)
-    levels = (budget - np.cumsum(some) + some) / np.arange(len(some), 0, -1)
+    levels = (budget - np.append(0.0, np.cumsum(some[:-1]))) / np.arange(len(some), 0, -1)
     above = some >= levels
     level = min(float(levels[np.argmax(above)]), _LARGEST_LOSS) if above.any() else _LARGEST_LOSS
     kept = np.sqrt(np.maximum(1.0 - level / np.maximum(gains, level), 0.0))

@@ -16,9 +16,7 @@ of that of one filter in front of the regressor.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
 import math
-from types import MappingProxyType
 from typing import NamedTuple
 
 from armid_ros.errors import IdentificationError
@@ -67,7 +65,7 @@ class TripleLag:
     """
 
     def __init__(self, cutoff: float) -> None:
-        self.pole = pole_of(cutoff)
+        self.pole = 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
         self._dt = 0.0
         self._step = np.zeros((3, 5))
         #: Three stages, the signal of the sample before, and how far it has moved since.
@@ -126,11 +124,6 @@ class TripleLag:
             step[stage, 4] = 1.0 - (stage + 1.0 - ending) / x
 
 
-def pole_of(cutoff: float) -> float:
-    """Return the pole [rad/s] of a triple lag with a cut-off frequency [Hz]."""
-    return 2.0 * np.pi * cutoff / _CUTOFF_OF_POLE
-
-
 class CausalMotion(NamedTuple):
     """
     One sample of joint motion behind the motion filter.
@@ -156,9 +149,10 @@ class CausalFilter:
     Filter and differentiate joint states as they come.
 
     The sampling period is the median of the first intervals, learned again after every restart.
-    A sample with a wrong length, a number that is not finite or beyond what arms have, or a stamp
-    slightly behind is left out and counted; the signal is interpolated across. A gap or a larger
-    jump of time restarts the filter, which gives nothing until it has settled again.
+    A sample with a wrong length, or a number that is not finite or beyond what arms have, is left
+    out and counted; the signal is interpolated across. A gap, or a stamp that is no later than the
+    last one, restarts the filter, which gives nothing until it has settled again. That positions
+    do not jump by full turns is seen to by a `SpikeGate`.
 
     Parameters
     ----------
@@ -172,8 +166,6 @@ class CausalFilter:
     measured_velocity : bool
         Differentiate the measured velocity instead of the position. Better with coarse encoders,
         worse with drives that filter or delay what they report.
-    prismatic : array_like of bool, shape (n,), optional
-        Joints that slide; the position of the others may jump by full turns.
 
     Raises
     ------
@@ -184,6 +176,11 @@ class CausalFilter:
     ----------
     generation : int
         Number of starts; what filters the output further starts anew when it changes.
+    period : float or None
+        Sampling period [s], None until it is known.
+    rejected, restarts : Counter of str
+        Samples that were left out, and restarts of the filter, by reason: dropout, jump_back, and
+        those asked for.
 
     """
 
@@ -194,7 +191,6 @@ class CausalFilter:
         *,
         max_gap: int = 10,
         measured_velocity: bool = False,
-        prismatic: npt.ArrayLike | None = None,
     ) -> None:
         if not (np.isfinite(cutoff) and cutoff > 0.0):
             raise IdentificationError(f'cut-off frequency {cutoff} Hz: has to be above 0')
@@ -203,43 +199,29 @@ class CausalFilter:
         self._cutoff = cutoff
         self.max_gap = max_gap
         self._measured_velocity = measured_velocity
-        self._rejected: Counter[str] = Counter()
-        self._restarts: Counter[str] = Counter()
-        self._revolute = np.ones(n_joints) if prismatic is None else 1.0 - np.asarray(prismatic)
-        self._lag: TripleLag | None = None
         self._outputs = np.zeros((3, 3))
-        self._intervals: list[float] = []
-        self._start: float | None = None
-        self._last: float | None = None
-        self._position: FloatArray | None = None
         self.generation = 0
         self.reset()
 
     def reset(self) -> None:
         """Start anew and set the counters to zero."""
-        self._rejected.clear()
-        self._restarts.clear()
-        self._restart()
+        self.rejected: Counter[str] = Counter()
+        self.restarts: Counter[str] = Counter()
+        self._begin()
 
     def restart(self, reason: str) -> None:
         """Begin a new stretch, as what comes does not continue what was before."""
-        self._restarts[reason] += 1
-        self._restart()
+        self.restarts[reason] += 1
+        self._begin()
 
-    @property
-    def rejected(self) -> Mapping[str, int]:
-        """Return counts of samples that were left out, by reason."""
-        return MappingProxyType(self._rejected)
-
-    @property
-    def restarts(self) -> Mapping[str, int]:
-        """Restarts of the filter, by reason: dropout, jump_back, and those asked for."""
-        return MappingProxyType(self._restarts)
-
-    @property
-    def period(self) -> float | None:
-        """Return the sampling period [s], None until it is known."""
-        return self._period
+    def _begin(self) -> None:
+        self.generation += 1
+        self.period: float | None = None
+        self._intervals: list[float] = []
+        self._lag: TripleLag | None = None
+        self._start: float | None = None
+        self._last: float | None = None
+        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self.max_gap)
 
     @property
     def pole(self) -> float | None:
@@ -267,66 +249,54 @@ class CausalFilter:
         """
         parts = [q, dq, tau] if self._measured_velocity and dq is not None else [q, tau]
         if self._measured_velocity and dq is None:
-            self._rejected['no_velocity'] += 1
+            self.rejected['no_velocity'] += 1
             return None
         arrays = [np.asarray(part, dtype=np.float64) for part in parts]
         for array in arrays:
             if array.shape != (self._n_joints,):
-                self._rejected['wrong_length'] += 1
+                self.rejected['wrong_length'] += 1
                 return None
         signal = np.concatenate(arrays)
         largest = float(np.abs(signal).max())
         if not (largest <= LARGEST and math.isfinite(t)):
             finite = math.isfinite(largest) and math.isfinite(t)
-            self._rejected['impossible' if finite else 'not_finite'] += 1
+            self.rejected['impossible' if finite else 'not_finite'] += 1
             return None
         return signal
 
     def advance(self, t: float, signal: FloatArray) -> CausalMotion | None:
         """Filter what `signal` has stacked; None while the filter settles."""
-        if not self._in_order(t):
-            return None
-        dt, self._last = 0.0 if self._last is None else t - self._last, t
+        dt = 0.0 if self._last is None else t - self._last
+        longest = self.max_gap * self.period if self.period else np.inf
+        if self._last is not None and not 0.0 < dt <= longest:
+            self.restart('dropout' if dt > 0.0 else 'jump_back')
+            dt = 0.0
+        self._last = t
         if self._lag is None:
-            self._learn(dt)
+            self._learn_period(dt)
             return None
         if self._start is None:
             self._start = t
-        position = signal[: self._n_joints]
-        if self._position is not None:
-            step = position - self._position
-            if float(np.abs(step).max()) > math.pi:  # a driver that keeps a joint within +-pi
-                position -= 2.0 * np.pi * np.rint(step / (2.0 * np.pi)) * self._revolute
-        self._position = position
         missing = self._missing(t, dt, signal)
         for value in (*missing, signal):
             stages = self._lag.update(dt / (len(missing) + 1), value)
         self._recent.append((t, signal))
         if t - self._start < _SETTLED / self._lag.pole:
             return None
-        return self._motion(t, stages)
-
-    def _in_order(self, t: float) -> bool:
-        """Return whether to use a sample; one that does not continue the stream starts anew."""
-        if self._last is None:
-            return True
-        dt = t - self._last
-        longest = self.max_gap * self._period if self._period else np.inf
-        if 0.0 < dt <= longest:
-            return True
-        if dt == 0.0 or (self._period and -longest <= dt < 0.0):  # noqa: RUF069 - equal stamps differ by zero
-            self._rejected['out_of_order'] += 1
-            return False
-        self.restart('dropout' if dt > 0.0 else 'jump_back')
-        return True
+        n = self._n_joints
+        outputs = np.dot(self._outputs, stages)
+        outputs.setflags(write=False)
+        value, slope, bend = outputs
+        dq, ddq = (value[n:], bend[n:]) if self._measured_velocity else (slope, bend)
+        return CausalMotion(t, value[:n], dq[:n], ddq[:n], value[-n:])
 
     def _missing(self, t: float, dt: float, signal: FloatArray) -> list[FloatArray]:
         """Return what stands for the samples missing before one."""
         # A straight line would have no acceleration, so the rows would lack that of the whole gap.
         # They are on the cubic through the sample behind the gap and three before it, which are as
         # far apart as the gap is long, for then it has hardly more noise than they.
-        assert self._period is not None
-        count = round(dt / self._period) if dt > _GAP * self._period else 1
+        assert self.period is not None
+        count = round(dt / self.period) if dt > _GAP * self.period else 1
         if count < 2 or not self._recent:
             return []
         last = t - dt
@@ -338,24 +308,13 @@ class CausalFilter:
         factors = np.linalg.solve(np.vander(place), values)
         return list(np.vander(inside, len(place)) @ factors)
 
-    def _restart(self) -> None:
-        self.generation += 1
-        self._period: float | None = None
-        self._intervals = []
-        self._lag = None
-        self._start = None
-        self._last = None
-        self._position = None
-        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=3 * self.max_gap)
-
-    def _learn(self, dt: float) -> None:
+    def _learn_period(self, dt: float) -> None:
+        """Take in an interval, and make the filter when there are enough of them."""
         if dt > 0.0:
             self._intervals.append(dt)
-        if len(self._intervals) == _PERIOD_INTERVALS:
-            self._period = float(np.median(self._intervals))
-            self._make_filter(self._period)
-
-    def _make_filter(self, period: float) -> None:
+        if len(self._intervals) < _PERIOD_INTERVALS:
+            return
+        self.period = period = float(np.median(self._intervals))
         fastest = _FASTEST_POLE / period * _CUTOFF_OF_POLE / (2.0 * np.pi)
         self._lag = TripleLag(min(MOTION_FILTER_RATIO * self._cutoff, fastest))
         pole = self._lag.pole
@@ -368,13 +327,3 @@ class CausalFilter:
         slope = (0.0, pole, -pole)
         bend = slope if self._measured_velocity else (curvature, -2.0 * curvature, curvature)
         self._outputs = np.array([(0.0, 0.0, 1.0), slope, bend])
-
-    def _motion(self, t: float, stages: FloatArray) -> CausalMotion:
-        n = self._n_joints
-        outputs = np.dot(self._outputs, stages)
-        outputs.setflags(write=False)
-        value, slope, bend = outputs
-        if self._measured_velocity:
-            velocity = slice(n, 2 * n)
-            return CausalMotion(t, value[:n], value[velocity], bend[velocity], value[-n:])
-        return CausalMotion(t, value[:n], slope[:n], bend[:n], value[-n:])

@@ -222,22 +222,17 @@ def driven_by_friction(
     described = np.concatenate([inverse_dynamics(robot, motion) for motion in motions])
     tau = np.concatenate(torques)
     for joint, name in enumerate(robot.joints):
-        held, dq = _held(motions, joint)
-        held = np.column_stack([held, described[:, joint]])
+        q, dq, ddq = (
+            np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
+            for which in ('q', 'dq', 'ddq')
+        )
+        weight = [np.ones(len(q)), np.sin(q), np.cos(q)]
+        held = np.column_stack([*weight, ddq, described[:, joint]])
         rest = _rest(np.column_stack([np.sign(dq), tau[:, joint]]), held)
         size = float(np.sqrt(np.prod(np.sum(rest**2, axis=0))))
         if size > 0.0 and rest[:, 0] @ rest[:, 1] < -_CLEAR * size:
             found.append(name)
     return found
-
-
-def _held(motions: Sequence[Motion], joint: int) -> tuple[FloatArray, FloatArray]:
-    """Return columns of weight and inertia of a joint, shape (N, 4), and its velocity, (N,)."""
-    q, dq, ddq = (
-        np.concatenate([getattr(motion, which)[:, joint] for motion in motions])
-        for which in ('q', 'dq', 'ddq')
-    )
-    return np.column_stack([np.ones(len(q)), np.sin(q), np.cos(q), ddq]), dq
 
 
 def _rest(values: FloatArray, nuisance: FloatArray) -> FloatArray:

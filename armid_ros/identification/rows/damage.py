@@ -110,10 +110,10 @@ def impossible_excursions(
     list of Excursion
 
     """
-    lines = gate.line_errors(t, x)
+    lines = gate.line_errors(t, x, floor)
     found: list[Excursion] = []
     done = 0
-    for k in np.flatnonzero(np.any(lines.off(floor) > 1.0, axis=1)).tolist():
+    for k in np.flatnonzero(np.any(lines.off > 1.0, axis=1)).tolist():
         if k < done:
             continue
         start, known = int(lines.stretch[k]), []

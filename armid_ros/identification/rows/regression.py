@@ -307,21 +307,6 @@ def filtered_columns(
     ndarray, shape (M, n, r)
 
     """
-    return _filtered(arm, _sources(arm, columns), motion, used, tick)
-
-
-class _Source(NamedTuple):
-    """Where wanted columns come from: the rigid body, which is smooth, or an effect."""
-
-    columns: Callable[[Motion], FloatArray]
-    inner: npt.NDArray[np.intp]  # which of them are wanted, and where they go
-    outer: npt.NDArray[np.intp]
-    instantaneous: bool  # a part of the motion will do
-    smooth: bool  # fewer samples will do
-
-
-def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
-    """Return where the wanted columns come from, without what is not wanted at all."""
     parts = [(arm.rigid_columns, len(arm.robot.rigid_parameters), True)]
     parts += [
         (partial(arm.columns_of, effect), len(values), effect.instantaneous)
@@ -334,7 +319,17 @@ def _sources(arm: ArmModel, columns: npt.NDArray[np.intp]) -> list[_Source]:
             inner = columns[outer] - start
             sources.append(_Source(function, inner, outer, local, smooth=start == 0))
         start += size
-    return sources
+    return _filtered(arm, sources, motion, used, tick)
+
+
+class _Source(NamedTuple):
+    """Where wanted columns come from: the rigid body, which is smooth, or an effect."""
+
+    columns: Callable[[Motion], FloatArray]
+    inner: npt.NDArray[np.intp]  # which of them are wanted, and where they go
+    outer: npt.NDArray[np.intp]
+    instantaneous: bool  # a part of the motion will do
+    smooth: bool  # fewer samples will do
 
 
 def _filtered(

@@ -17,8 +17,6 @@ from scipy import signal
 _NOISE_OF_LIMIT = 0.01
 #: The same relative to how much a torque varies, before anything has been fitted to it.
 NOISE_OF_TORQUE = 0.01
-#: What is divided by is at least this.
-_LEAST_COUNT = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -32,18 +30,18 @@ class RowNoise:
 
     Attributes
     ----------
-    period : float
-        Sampling period T [s].
     bandwidth : float
         B [Hz].
-    peak : float
-        Largest value of the impulse response of H [1/s].
+    gain : float
+        Standard deviation of the noise of a row over that of a sample.
+    single : float
+        What one sample is off by that moves a row as noise of 1 in all samples does.
 
     """
 
-    period: float
     bandwidth: float
-    peak: float
+    gain: float
+    single: float
 
     @classmethod
     def of(cls, period: float, motion_pole: float, row_pole: float) -> RowNoise:
@@ -52,64 +50,20 @@ class RowNoise:
         nyquist = 0.5 / period
         f = np.linspace(0.0, min(nyquist, 20.0 * row_pole / (2.0 * np.pi)), 4001)
         w = 2.0 * np.pi * f
-        gain = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
-        bandwidth = float(2.0 * np.trapezoid(gain, f))
+        power = 1.0 / ((1.0 + (w / motion_pole) ** 2) * (1.0 + (w / row_pole) ** 2)) ** 3
+        bandwidth = float(2.0 * np.trapezoid(power, f))
+        gain = float(np.sqrt(period * bandwidth))
         # the largest value of the impulse response of both filters in series [1/s]
         ratio = motion_pole / row_pole  # in the time of the row filter
         response = signal.impulse(
             ([], [-ratio] * 3 + [-1.0] * 3, ratio**3), T=np.linspace(0, 20, 401)
         )
-        return cls(period, bandwidth, float(row_pole * np.max(response[1])))
-
-    @property
-    def gain(self) -> float:
-        """Return the standard deviation of the noise of a row over that of a sample."""
-        return float(np.sqrt(self.period * self.bandwidth))
-
-    @property
-    def single(self) -> float:
-        """Return what one sample is off by that moves a row as noise of 1 in all samples does."""
-        return self.gain / (self.period * self.peak)
+        peak = float(row_pole * np.max(response[1]))
+        return cls(bandwidth, gain, gain / (period * peak))
 
     def independent(self, step: float) -> float:
         """Return how many independent observations a row holds, `step` [s] after the last."""
         return min(1.0, self.bandwidth * step)
-
-
-class ResidualDeviation:
-    """
-    What an estimator leaves of the torque of every joint, as noise of single samples.
-
-    Parameters
-    ----------
-    joints : int
-        Their number n.
-    forgetting : float
-        Share of what was that a sample leaves.
-
-    Attributes
-    ----------
-    size : ndarray, shape (n,)
-        Standard deviation [N m]; 0 before the first sample.
-
-    """
-
-    def __init__(self, joints: int, forgetting: float = 1.0) -> None:
-        self._joints = joints
-        self.forgetting = forgetting
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget everything."""
-        self._squares, self._counts = np.zeros(self._joints), np.zeros(self._joints)
-        self.size = np.zeros(self._joints)
-
-    def learn(self, before: FloatArray, after: FloatArray, weights: FloatArray) -> None:
-        """Take in the residual of a sample before and after it was learned, shape (n,)."""
-        self._squares = self.forgetting * self._squares + weights * before * after
-        self._counts = self.forgetting * self._counts + weights
-        known = np.maximum(self._counts, _LEAST_COUNT)
-        self.size = np.sqrt(np.maximum(self._squares, 0.0) / known)
 
 
 def sensor_noise(robot: Robot, given: tuple[float, ...] | None) -> FloatArray:

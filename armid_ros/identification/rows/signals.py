@@ -28,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import correlate1d
 
 #: Samples per second below which no motion of an arm is followed [Hz].
 SLOWEST = 2.0
@@ -377,9 +378,8 @@ def _differentiated(
 
 def _central_difference(x: FloatArray, step: float) -> FloatArray:
     """Differentiate along the first axis: five points, error of the fourth order in the step."""
-    padded = np.pad(x, ((2, 2), (0, 0)), mode='edge')
-    difference = 8.0 * (padded[3:-1] - padded[1:-3]) - (padded[4:] - padded[:-4])
-    return np.asarray(difference / (12.0 * step))
+    weights = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * step)
+    return np.asarray(correlate1d(x, weights, axis=0, mode='nearest'))
 
 
 def _unbroken_positions(recording: Recording, rate: float) -> list[FloatArray]:
@@ -412,19 +412,8 @@ def _motion_band(stretches: Sequence[tuple[FloatArray, npt.ArrayLike]], rate: fl
 
 
 def _position_spectrum(recording: Recording) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """
-    Return the spectra of positions, and what of them is white noise.
-
-    Returns
-    -------
-    frequency : ndarray, shape (K,)
-        Frequencies [Hz].
-    power : ndarray, shape (K, n)
-        Power [rad^2/Hz or m^2/Hz].
-    floor : ndarray, shape (n,)
-        Its median in the upper two fifths.
-
-    """
+    """Return frequencies (K,) and power (K, n) of positions, and their white noise (n,) per Hz."""
     rate = 1.0 / recording.period
     frequency, power = mean_spectrum(_unbroken_positions(recording, rate), rate)
-    return frequency, power, np.median(power[frequency > 0.3 * rate], axis=0)
+    upper = frequency > 0.3 * rate  # two fifths, in which there is no motion
+    return frequency, power, np.median(power[upper], axis=0)

@@ -11,7 +11,8 @@ sample in a hundred completes one and must not take longer than a stream can wai
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from armid_ros.identification.samples.straight_line import (
     Missed,
@@ -70,6 +71,7 @@ class NoiseLevel:
         self._sizes, self._shares = np.zeros((2, _REMEMBERED, count))
         self._seen = 0
         self._errors, self._moves = np.empty((2, WINDOW + together, count))
+        self._growths = np.empty((WINDOW + together, 2, 1))
         self._waiting = 0
 
     def set(self, usual: Usual) -> None:
@@ -106,8 +108,8 @@ class NoiseLevel:
 
     def learn(self, missed: Missed, move: FloatArray) -> None:
         """Take in the prediction error of a good sample and its move, shape (m,)."""
-        growth = self.usual.growth(missed.noise, missed.bend)
-        np.divide(missed.error, growth, out=self._errors[self._waiting])
+        self._errors[self._waiting] = missed.error
+        self._growths[self._waiting, :, 0] = missed.noise, missed.bend
         self._moves[self._waiting] = move
         self._waiting += 1
 
@@ -115,7 +117,8 @@ class NoiseLevel:
         """Measure what is usual anew if a whole window of errors came."""
         if self._waiting < WINDOW:
             return
-        errors, moves = self._errors[: self._waiting], self._moves[: self._waiting]
+        growths, moves = self._growths[: self._waiting], self._moves[: self._waiting]
+        errors = self._errors[: self._waiting] / self.usual.growth(growths[:, 0], growths[:, 1])
         self._waiting = 0
         self._most = np.maximum(self._most, np.abs(errors).max(axis=0))
         size = robust_scale(errors, SHARE)
@@ -141,8 +144,7 @@ class NoiseLevel:
         return np.maximum(np.minimum(self._most, step), least)
 
 
-@dataclass(frozen=True, eq=False)
-class LineErrors:
+class LineErrors(NamedTuple):
     """
     Errors of the straight lines through the two samples before each.
 
@@ -150,44 +152,26 @@ class LineErrors:
     ----------
     stretch : ndarray of int, shape (N,)
         First sample of the stretch without a long gap that a sample is of.
-    error : ndarray, shape (N, m)
-        How far off each sample is, when a smooth signal bends on; 0 for the first of a stretch.
+    off : ndarray, shape (N, m)
+        How far off each sample is when a smooth signal bends on, over what is too far; 0 for the
+        first of a stretch.
     bent : ndarray, shape (N, m)
         How far off the straight line it is, over a period.
-    limit : ndarray, shape (N, m)
-        How far off is too far.
     usual : Usual
         What is usual of the loudest part of the whole.
 
     """
 
     stretch: npt.NDArray[np.intp]
-    error: FloatArray
+    off: FloatArray
     bent: FloatArray
-    limit: FloatArray
     usual: Usual
-
-    def off(self, floor: FloatArray) -> FloatArray:
-        """
-        Return how far off each sample is, over what is too far.
-
-        Parameters
-        ----------
-        floor : ndarray, shape (m,)
-            What a sample may be off by without consequence.
-
-        Returns
-        -------
-        ndarray, shape (N, m)
-
-        """
-        limit = np.maximum(np.maximum(self.limit, floor), np.finfo(float).tiny)
-        return np.asarray(np.abs(self.error) / limit)
 
 
 def line_errors(
     t: FloatArray,
     x: FloatArray,
+    floor: FloatArray,
     turn: FloatArray,
     max_gap: int,
     quantile: Callable[[float], float],
@@ -201,6 +185,8 @@ def line_errors(
         Stamps, at least 3, each after the one before [s].
     x : ndarray, shape (N, m)
         Signals.
+    floor : ndarray, shape (m,)
+        What a sample may be off by without consequence.
     turn : ndarray, shape (m,)
         Jumps of a signal that are none, 0 without.
     max_gap : int
@@ -238,8 +224,9 @@ def line_errors(
     usual = replace(usual, size=np.maximum(usual.size, least))
     bent = error / bend
     error[3:] -= usual.smoothness * bent[2:-1] * bend[3:]
-    limit = usual.limits(quantile(period), noise, bend)
-    return LineErrors(np.maximum.accumulate(first), error, bent, limit, usual)
+    limit = np.maximum(usual.limits(quantile(period), noise, bend), floor)
+    off = np.abs(error) / np.maximum(limit, np.finfo(float).tiny)
+    return LineErrors(np.maximum.accumulate(first), off, bent, usual)
 
 
 def _loudest(period: float, sizes: FloatArray, shares: FloatArray) -> Usual:

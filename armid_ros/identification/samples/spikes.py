@@ -34,7 +34,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 import math
 
-from armid_ros.errors import IdentificationError
 from armid_ros.identification.samples.noise_level import line_errors, LineErrors, NoiseLevel
 from armid_ros.identification.samples.straight_line import (
     all_unwrapped,
@@ -54,8 +53,6 @@ from scipy import stats
 FIRST = 20
 #: A sample goes on from others that are nearer by this factor than where the line leads.
 _NEARER = 0.5
-#: Periods without a sample after which one waits for the next, which may contradict its stamp.
-_LEAP = 1.5
 #: What is divided by is at least this.
 _TINY = 1e-300
 
@@ -92,6 +89,8 @@ class SpikeGate:
         was off; erratic, which followed neither what was before nor other ones; out_of_order.
     left_out : list of Excursion
         What the last call to `take` left out as spike, pulse or erratic.
+    lowest, highest : ndarray, shape (m,)
+        From where to where the good samples range, but for the two that a stretch begins with.
 
     """
 
@@ -106,11 +105,6 @@ class SpikeGate:
         finest: npt.ArrayLike = 0.0,
         onset: npt.ArrayLike = 0.0,
     ) -> None:
-        if not (max_gap >= 1 and false_alarm_time > 0.0):
-            raise IdentificationError(
-                f'damage of up to {max_gap} samples and a false alarm every '
-                f'{false_alarm_time} s: both have to be above 0'
-            )
         self._turn = np.where(np.asarray(turning, dtype=bool), 2.0 * np.pi, 0.0)
         self._continuous = np.broadcast_to(np.asarray(continuous, dtype=bool), self._turn.shape)
         self._pulsing = np.broadcast_to(np.asarray(pulsing, dtype=bool), self._turn.shape)
@@ -124,9 +118,9 @@ class SpikeGate:
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
-        self._early: StreamSample | None = None
+        self._last: FloatArray | None = None  # of the good samples, across stretches
         count = len(self._turn)
-        self._lowest, self._highest = np.full(count, np.inf), np.full(count, -np.inf)
+        self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
         self._level = NoiseLevel(count, self._max_gap + 1, *self._least_seen)
         self._least: tuple[Usual, float, FloatArray] | None = None
         self._restart([])
@@ -146,25 +140,10 @@ class SpikeGate:
 
         """
         self.left_out = []
-        early, self._early, tail = self._early, None, self._tail
-        good: list[StreamSample] = []
-        if early is not None and tail is not None:
-            if tail.t < t < early.t:  # what goes on from before is kept, for there is more of it
-                self.rejected['out_of_order'] += 1
-            else:
-                good = self._take(early, floor)
-        ahead = 0.0 if self._tail is None else t - self._tail.t
-        if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
-            # something seems to be lost before it
-            self._early = StreamSample(t, x)
-            return good
-        return good + self._take(StreamSample(t, x), floor)
-
-    def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
-        """Take in a sample whose stamp is not contradicted by the next one."""
         if self._known:
-            x = unwrapped(sample.x, self._known[1].x, self._turn)
-            sample = sample if x is sample.x else replace(sample, x=x)
+            self._last = self._known[1].x
+        x = x if self._last is None else unwrapped(x, self._last, self._turn)
+        sample = StreamSample(t, x)
         if not self._in_time(sample):
             return []
         if self._first is None:
@@ -193,9 +172,9 @@ class SpikeGate:
         if known:
             self._period, self._quantile = usual.period, self._quantile_of(usual.period)
 
-    def line_errors(self, t: FloatArray, x: FloatArray) -> LineErrors:
+    def line_errors(self, t: FloatArray, x: FloatArray, floor: FloatArray) -> LineErrors:
         """Return how far off the samples of a whole recording are, as `take` would predict."""
-        return line_errors(t, x, self._turn, self._max_gap, self._quantile_of)
+        return line_errors(t, x, floor, self._turn, self._max_gap, self._quantile_of)
 
     def possible(self, excursion: Excursion, lowest: FloatArray, highest: FloatArray) -> bool:
         """
@@ -206,9 +185,10 @@ class SpikeGate:
         spans: an impact is of the order of what drives it.
 
         """
-        most = np.maximum(excursion.limit, highest - lowest)
-        far = excursion.beyond(lowest, highest) > most
-        return not bool(np.any(far | ((excursion.off > 1.0) & ~self._pulsing)))
+        values = np.stack([sample.x for sample in excursion.samples])
+        beyond = np.maximum(lowest - values, values - highest).max(axis=0)
+        far = beyond > np.maximum(excursion.limit, highest - lowest)
+        return not bool(np.any((excursion.off > 1.0) & (far | ~self._pulsing)))
 
     def _quantile_of(self, period: float) -> float:
         """Return how many standard deviations noise exceeds at one false alarm in that time."""
@@ -228,7 +208,6 @@ class SpikeGate:
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
         self._off = self._limit = np.zeros(len(self._turn))
         self._stray: StreamSample | None = None
-        self._early = None
         self._period = np.inf
         self._quantile = 0.0
 
@@ -265,7 +244,9 @@ class SpikeGate:
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
-        missed = self._lines_through(first)
+        missed = [
+            missed_by(first[k : k + 2], first[k + 2], self._period) for k in range(len(first) - 2)
+        ]
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
@@ -277,7 +258,9 @@ class SpikeGate:
         start = straight.index(True)
         first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
         self._known = first[start], first[start + 1]
-        self._leave_out_ahead(first[:start], missed[0], floor)
+        if start:
+            off, limit = self._off_by(missed[0], floor), self._limits(missed[0], floor)
+            self._leave_out(Excursion(tuple(first[:start]), off, limit))
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -315,28 +298,10 @@ class SpikeGate:
         if 2 * self._went_on > self._max_gap:
             if len(self._held) > 1 and self._stepped(floor):
                 self._held[0] = replace(self._held[0], begins=True)
-            return self._go_on(floor)
+            return self._accept(self._held)
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
-
-    def _go_on(self, floor: FloatArray | float) -> list[StreamSample]:
-        """Pass on what is held, for it is real; what among it is damaged is judged for itself."""
-        held, self._held = self._held, []
-        missed = self._lines_through(held)
-        steady = ~self._pulsing
-        straight = [bool(np.all(self._off_by(one, floor)[steady] <= 1.0)) for one in missed]
-        if all(straight) or not any(straight):
-            return self._accept(held)
-        start = straight.index(True)
-        self._leave_out_ahead(held[:start], missed[0], floor)
-        held[start] = replace(held[start], begins=held[0].begins)
-        if all(straight[start:]):
-            return self._accept(held[start:])
-        good = self._accept(held[start : start + 2])
-        for sample in held[start + 2 :]:
-            good = good + self._judge(sample, floor)
-        return good
 
     def _goes_on(self, sample: StreamSample, off: FloatArray, floor: FloatArray | float) -> bool:
         """Return whether a sample goes on from what is held, as well as from what was before."""
@@ -392,24 +357,11 @@ class SpikeGate:
             one = missed or missed_by(self._known, sample, self._period)
             self._level.learn(one, sample.x - self._known[1].x)
             self._bent = one.error / one.bend
-            np.minimum(self._lowest, sample.x, out=self._lowest)
-            np.maximum(self._highest, sample.x, out=self._highest)
+            np.minimum(self.lowest, sample.x, out=self.lowest)
+            np.maximum(self.highest, sample.x, out=self.highest)
             self._known = self._known[1], sample
         self._level.settle(self._period)
         return samples
-
-    def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
-        """Return what the line through each two samples misses the next one by."""
-        pairs = range(len(samples) - 2)
-        return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
-
-    def _leave_out_ahead(
-        self, samples: Sequence[StreamSample], missed: Missed, floor: FloatArray | float
-    ) -> None:
-        """Count samples, if any, ahead of the first ones that are in line."""
-        if samples:
-            of = self._off_by(missed, floor), self._limits(missed, floor)
-            self._leave_out(Excursion(tuple(samples), *of))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
         """Count what is left out, by its reason."""
@@ -418,7 +370,7 @@ class SpikeGate:
         if erratic:
             self.rejected['erratic'] += count
             return
-        if self.possible(excursion, self._lowest, self._highest):
+        if self.possible(excursion, self.lowest, self.highest):
             self.rejected['pulse'] += count
         else:
             self.rejected['spike'] += count

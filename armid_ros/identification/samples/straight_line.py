@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 import math
 from typing import NamedTuple
 
 from armid_ros.motion import FloatArray
 import numpy as np
-from scipy import stats
+from scipy import special
 
 #: Correlation of successive errors of a straight line in white noise.
 _NOISE_CORRELATION = -2.0 / 3.0
@@ -69,12 +69,6 @@ class Excursion:
     samples: tuple[StreamSample, ...]
     off: FloatArray
     limit: FloatArray
-
-    def beyond(self, lowest: FloatArray, highest: FloatArray) -> FloatArray:
-        """Return how far the signals that jump are beyond some range, shape (m,)."""
-        values = np.stack([sample.x for sample in self.samples])
-        outside = np.maximum(lowest - values, values - highest).max(axis=0)
-        return np.where(self.off > 1.0, np.maximum(outside, 0.0), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +171,7 @@ def robust_scale(missed: FloatArray, share: float) -> FloatArray:
     place = share * (len(ordered) - 1)
     first = int(place)
     low, high = ordered[first], ordered[min(first + 1, len(ordered) - 1)]
-    return np.asarray((low + (place - first) * (high - low)) / _normal_quantile(share))
+    return np.asarray((low + (place - first) * (high - low)) / special.ndtri(0.5 + share / 2.0))
 
 
 def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
@@ -189,9 +183,3 @@ def share_of_noise(missed: FloatArray, size: FloatArray) -> FloatArray:
     correlation = np.divide(products, squares, where=squares > 0.0, out=np.ones_like(squares))
     share = (1.0 - correlation) / (1.0 - _NOISE_CORRELATION)
     return np.asarray(np.minimum(np.maximum(share, 0.0), 1.0))
-
-
-@cache
-def _normal_quantile(share: float) -> float:
-    """Return what so few normal variables exceed in size; scipy takes longer than the rest."""
-    return float(stats.norm.ppf(0.5 + share / 2.0))

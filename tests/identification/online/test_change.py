@@ -9,6 +9,7 @@ from armid_ros.identification.online.background import at_once
 from armid_ros.identification.online.change import Change, change_candidates, ChangeCandidate
 from armid_ros.identification.online.change_score import Block, ScoreStatistics, weighing
 from armid_ros.identification.online.change_watch import ChangeSettings, ChangeWatch
+from armid_ros.identification.online.nuisance_rows import Row
 from armid_ros.identification.online.null_calibration import NullCalibration
 from armid_ros.identification.online.recursive import RecursiveLeastSquares, WeightedSample
 import numpy as np
@@ -28,12 +29,14 @@ class NoNuisance:
 
     parameters = ()
 
-    def reset(self):
-        """Begin a new stretch."""
-
-    def rows(self, seeds):
+    def columns(self, some):
         """Return no column."""
-        return np.empty((len(seeds), 4, 0))
+        return np.empty((len(some), 4, 0))
+
+
+def row(t, rows, tau, weights):
+    """Return a row that is made into no other."""
+    return Row(t, WeightedSample(rows, tau, weights), None, 0.0, 1.0)
 
 
 def watching(estimator, candidate):
@@ -233,7 +236,7 @@ def test_a_window_that_the_model_fits_worse_than_usual_says_less_of_the_size():
             after = k >= 5000
             now = truth + 5.0 * after * step[:, 0]
             tau = rows[k] @ now + noise[k] * (louder if after else 1.0)
-            watch.update(0.005 * k, WeightedSample(rows[k], tau, np.ones(4)), None)
+            watch.update(row(0.005 * k, rows[k], tau, np.ones(4)))
         (change,) = watch.changes
         assert change.t == pytest.approx(25.0, abs=0.26)
         lower, upper = change.size.interval()[0]
@@ -254,7 +257,7 @@ def test_what_shows_for_a_moment_before_an_arm_rests_is_no_change(rests):
         rows = rng.normal(size=(4, 3))
         tau = rows @ (truth + 5.0 * (k >= 5000) * step[:, 0]) + rng.normal(size=4)
         weights = np.zeros(4) if rests and k > 5120 else np.ones(4)
-        watch.update(0.005 * k, WeightedSample(rows, tau, weights), None)
+        watch.update(row(0.005 * k, rows, tau, weights))
     assert len(watch.changes) == (0 if rests else 1)
 
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.identification.online.nuisance_rows import by_joint, NuisanceRows
+from armid_ros.identification.online.nuisance_rows import NuisanceRows, Row
+from armid_ros.identification.rows.causal import CausalMotion
 from armid_ros.motion import Motion
 from armid_ros.robots import load_robot
 import numpy as np
@@ -17,6 +18,11 @@ def arm_with(*names: str) -> ArmModel:
     for name in names:
         arm = arm.with_effect(make_effect(name, arm.robot))
     return arm
+
+
+def row(q, dq, ddq) -> Row:
+    """Return the first row of a stretch, which filters leave as it is."""
+    return Row(0.0, None, CausalMotion(0.0, q, dq, ddq, q), 0.005, 1.0, begins=True)
 
 
 def test_columns_are_those_of_the_effects_that_the_arm_lacks():
@@ -31,7 +37,7 @@ def test_columns_are_those_of_the_effects_that_the_arm_lacks():
     q, dq, ddq = np.random.default_rng(0).normal(size=(3, arm.robot.n_joints))
     nuisance = NuisanceRows(arm, 5.0)
     one = Motion(arm.robot.joints, np.zeros(1), q[None], 0.2 * dq[None], ddq[None])
-    rows = by_joint(nuisance.torques(one)[0])
+    (rows,) = nuisance.columns([row(q, 0.2 * dq, ddq)])
     expected = np.concatenate([effect.columns(one, arm)[0] for effect in lacking], axis=1)
     np.testing.assert_allclose(rows, expected, atol=1e-12)
     assert [p.joint for p in nuisance.parameters] == list(arm.robot.joints) * len(lacking)
@@ -44,5 +50,4 @@ def test_what_is_identified_is_not_nuisance():
     nuisance = NuisanceRows(everything, 5.0)
     assert nuisance.parameters == ()
     n = everything.robot.n_joints
-    one = Motion(everything.robot.joints, np.zeros(1), *np.ones((3, 1, n)))
-    assert nuisance.torques(one).shape == (1, n, 0)
+    assert nuisance.columns([row(*np.ones((3, n)))]).shape == (1, n, 0)

@@ -122,7 +122,8 @@ def test_unknown_noise_is_taken_from_the_residuals():
     rng = np.random.default_rng(4)
     rows = rng.normal(size=(2000, 3, 5))
     tau = rows @ np.arange(5.0) + 0.02 * rng.normal(size=(2000, 3))
-    estimator = feed(RecursiveLeastSquares(names(5)), rows, tau)
+    unknown = RecursiveLeastSquares(names(5), np.ones(3), scale_covariance=True)
+    estimator = feed(unknown, rows, tau)
     assert np.sqrt(estimator.variance_factor) == pytest.approx(0.02, rel=0.05)
     w = rows.reshape(-1, 5)
     np.testing.assert_allclose(
@@ -192,6 +193,15 @@ def test_information_never_falls():
         before = after
 
 
+def test_what_is_learned_of_what_nothing_was_known_of_is_finite_where_a_joint_rests():
+    """Two rows that bring more than 1e16 times what was known, and one that brings nothing."""
+    estimator = RecursiveLeastSquares(names(3), np.ones(3), forgetting=0.99)
+    for _ in range(3):
+        estimator.update(np.diag([1e4, 1e4, 0.0]), np.array([1e4, -2e4, 0.0]))
+    np.testing.assert_allclose(estimator.values, [1.0, -2.0, 0.0], atol=1e-9)
+    assert np.all(np.isfinite(estimator.covariance))
+
+
 @pytest.mark.parametrize('size', [1.0, 1e-3])
 @pytest.mark.parametrize('forgetting', [1.0, 0.99])
 def test_resting_arm_neither_forgets_nor_drifts(forgetting, size):
@@ -253,11 +263,11 @@ def test_reset_returns_to_the_beginning():
 
 def test_bad_settings_are_refused():
     with pytest.raises(IdentificationError, match='forgetting factor'):
-        RecursiveLeastSquares(names(2), forgetting=1.1)
+        RecursiveLeastSquares(names(2), [1.0], forgetting=1.1)
     with pytest.raises(IdentificationError, match='standard deviation'):
         RecursiveLeastSquares(names(2), [1.0, 0.0])
     with pytest.raises(IdentificationError, match='start'):
-        RecursiveLeastSquares(names(2), start=[1.0, 2.0, 3.0])
+        RecursiveLeastSquares(names(2), [1.0], start=[1.0, 2.0, 3.0])
 
 
 def test_with_more_parameters_it_begins_anew_and_equals_batch_of_all():

@@ -164,8 +164,6 @@ def test_period_is_learned_and_bounds_the_filter():
         ('not_finite', lambda t, q, tau: (np.nan, q, None, tau)),
         ('wrong_length', lambda t, q, tau: (t, q[:1], None, tau)),
         ('wrong_length', lambda t, q, tau: (t, q, None, [])),
-        ('out_of_order', lambda t, q, tau: (t - 3e-3, q + 5.0, None, tau)),
-        ('out_of_order', lambda t, q, tau: (t - 1e-3, q + 5.0, None, tau)),
     ],
 )
 def test_a_bad_sample_is_as_if_it_had_not_come(reason, spoil):
@@ -213,17 +211,6 @@ def test_a_short_gap_is_bridged():
     assert not causal.restarts
     expected = all_values[np.searchsorted(all_stamps, stamps)][:, :2]
     np.testing.assert_allclose(values[:, :2], expected, atol=5e-5)
-
-
-def test_a_joint_may_wrap_around():
-    t = np.arange(0.0, 2.0, 1e-3)
-    q = np.stack([4.0 * t, 4.0 * t], axis=1)
-    wrapped = np.mod(q + np.pi, 2 * np.pi) - np.pi
-    prismatic = [False, True]
-    causal = CausalFilter(2, CUTOFF, prismatic=prismatic)
-    _, values = table(run(causal, t, wrapped, np.zeros_like(q)))
-    np.testing.assert_allclose(values[:, 2], 4.0, rtol=1e-4)
-    assert np.abs(values[:, 3]).max() > 10.0
 
 
 def test_measured_velocity_is_differentiated_when_wanted():
