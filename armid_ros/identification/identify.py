@@ -244,11 +244,11 @@ def identify(
         fit, remarks = with_uncertain_inertia(whole, fit, recordings, used)
         notes += remarks
     else:
+        data = base, problem, recordings, used
         if settings.physical is not None or settings.prefers_bodies:
-            bodies = _bodies(arm, theory, (base, problem, recordings, used), settings, rng)
+            bodies = _bodies(arm, theory, data, settings, rng)
         if bodies is None or (bodies.cost > _CHEAP and settings.physical is None):
-            fit = _fitted(arm, base, problem, recordings, used, settings)
-            theory, fit = _with_what_shows_now(theory, fit, recordings, used, settings, rng)
+            theory, fit = _fitted(arm, theory, data, settings, rng)
         else:
             settings, theory, fit = bodies.settings, bodies.theory, bodies.fit
             notes += bodies.certificate.sentences()
@@ -293,15 +293,13 @@ def _bodies(
     rng: np.random.Generator,
 ) -> _Bodies | None:
     """Fit links that are bodies; None where they are not asked for and there are none."""
-    base, problem, recordings, used = data
-    known = settings.physical or PhysicalSettings()
     if settings.method == 'iv':
         return None
+    known = settings.physical or PhysicalSettings()
     asked = replace(settings, physical=known)
-    fit = _fitted(arm, base, problem, recordings, used, asked)
-    theory, fit = _with_what_shows_now(theory, fit, recordings, used, asked, rng)
+    theory, fit = _fitted(arm, theory, data, asked, rng)
     try:
-        fit, proof = fit_to_bodies(arm, fit, recordings, used, asked.least_squares, known, rng)
+        fit, proof = fit_to_bodies(arm, fit, *data[2:], asked.least_squares, known, rng)
     except IdentificationError:
         if settings.physical is not None:
             raise
@@ -311,18 +309,32 @@ def _bodies(
 
 def _fitted(
     arm: ArmModel,
-    base: BaseParameters,
-    problem: Sequence[Regression],
-    recordings: Sequence[Recording],
-    used: Conditioning,
+    theory: BaseParameters,
+    data: tuple[BaseParameters, Sequence[Regression], Sequence[Recording], Conditioning],
     settings: IdentificationSettings,
-) -> FittedValues:
-    """Fit by least squares what data determine better than the description does."""
-    method, told, free, solution = settings.least_squares, base, None, None
-    if settings.holds_description:
+    rng: np.random.Generator,
+) -> tuple[BaseParameters, FittedValues]:
+    """Fit what data determine better than the description, and return what any motion shows."""
+    base, problem, recordings, used = data
+    method = settings.least_squares
+
+    def fitted(arm: ArmModel, base: BaseParameters, problem: Sequence[Regression]) -> FittedValues:
+        if not settings.holds_description:
+            return fit_values(arm, base, problem, recordings, used, method)
         told, problem, solution = determined(arm, base, problem, method)
         free = None if told.rank == base.rank else ungrouped(arm, base)
-    return fit_values(arm, told, problem, recordings, used, method, free, solution)
+        return fit_values(arm, told, problem, recordings, used, method, free, solution)
+
+    fit = fitted(arm, base, problem)
+    rigid = len(arm.robot.rigid_parameters)
+    if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
+        return theory, fit
+    # again with what the described arm does not show, such as saturation that it never reaches
+    now = fit.arm.base_parameters(rng)
+    if now.rank <= theory.rank:
+        return theory, fit
+    columns = regressions(fit.arm, now.independent, recordings, used)
+    return now, fitted(fit.arm, *excited(now, columns))
 
 
 def _require_samples(
@@ -363,22 +375,3 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
             'change one another too much in these data; leave some out, or record more'
         )
     return tuple(remarks)
-
-
-def _with_what_shows_now(
-    theory: BaseParameters,
-    fit: FittedValues,
-    recordings: Sequence[Recording],
-    used: Conditioning,
-    settings: IdentificationSettings,
-    rng: np.random.Generator,
-) -> tuple[BaseParameters, FittedValues]:
-    """Fit again with what the described arm does not show, such as saturation it never reaches."""
-    rigid = len(fit.arm.robot.rigid_parameters)
-    if np.all(np.any(theory.grouping[:, rigid:], axis=0)):
-        return theory, fit
-    now = fit.arm.base_parameters(rng)
-    if now.rank <= theory.rank:
-        return theory, fit
-    columns = regressions(fit.arm, now.independent, recordings, used)
-    return now, _fitted(fit.arm, *excited(now, columns), recordings, used, settings)

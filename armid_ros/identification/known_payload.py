@@ -42,70 +42,6 @@ _SURE = 0.05
 
 
 @dataclass(frozen=True)
-class KnownPayload:
-    """
-    A point mass on a link.
-
-    Attributes
-    ----------
-    mass : float
-        [kg].
-    link : str
-        Of the description, in whose frame its place is.
-    place : tuple of float
-        Centre of mass [m].
-
-    """
-
-    mass: float
-    link: str
-    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    @classmethod
-    def parse(cls, text: str) -> tuple[str, KnownPayload]:
-        """
-        Read 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'; return the recording and what it carries.
-
-        Raises
-        ------
-        IdentificationError
-            The text is neither.
-
-        """
-        *parts, body = parted(text, '=')
-        bag = '='.join(parts)
-        mass, _, where = body.partition('@')
-        link, *place = listed(where, ':')
-        try:
-            x, y, z = (float(part) for part in (':'.join(place) or '0,0,0').split(','))
-            payload = cls(float(mass), link, (x, y, z))
-        except ValueError:
-            payload = None
-        if payload is None or not bag or not link or not 0.0 < payload.mass < np.inf:
-            raise IdentificationError(
-                f"--payload '{text}' has to be BAG=KG@LINK, or BAG=KG@LINK:X,Y,Z with its centre "
-                'of mass in the frame of the link [m]'
-            )
-        return bag, payload
-
-    def carried_by(self, robot: Robot) -> Robot:
-        """Return the robot with the payload; IdentificationError if it has no such link."""
-        frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
-        frame = frames.get(self.link)
-        if frame is None or frame.parentJoint == 0:
-            links = [name for name, one in frames.items() if one.parentJoint > 0]
-            raise IdentificationError(
-                f"--payload: no joint moves a link '{self.link}'; links are {', '.join(links)}"
-                f'{meant(self.link, links)}'
-            )
-        center = frame.placement.act(np.array(self.place))
-        body = pin.Inertia(self.mass, center, np.zeros((3, 3))).toDynamicParameters()
-        parameters = robot.rigid_parameters.reshape(-1, 10).copy()
-        parameters[frame.parentJoint - 1] += body
-        return robot.with_inertias(parameters.ravel())
-
-
-@dataclass(frozen=True)
 class DriveGains:
     """
     Measured effort over the torque of the drive.
@@ -175,7 +111,7 @@ def payloads_of(
     found: dict[str, Robot] = {}
     sources = {str(bag): r.source for bag, r in zip(bags, recordings, strict=True)}
     for text in texts:
-        name, payload = KnownPayload.parse(text)
+        name, link, payload = parse_payload(text)
         named = [bag for bag in bags if name in (str(bag), bag.name, bag.stem)]
         if len(named) != 1:
             raise IdentificationError(
@@ -183,8 +119,57 @@ def payloads_of(
                 f'{", ".join(map(str, bags))}'
             )
         source = sources[str(named[0])]
-        found[source] = payload.carried_by(found.get(source, robot))
+        found[source] = with_payload(found.get(source, robot), link, payload)
     return found
+
+
+def parse_payload(text: str) -> tuple[str, str, pin.Inertia]:
+    """
+    Read 'BAG=KG@LINK' or 'BAG=KG@LINK:X,Y,Z'.
+
+    Returns
+    -------
+    bag, link : str
+        The recording and the link that carries it.
+    payload : pinocchio.Inertia
+        A point mass in the frame of the link.
+
+    Raises
+    ------
+    IdentificationError
+        The text is neither.
+
+    """
+    *parts, body = parted(text, '=')
+    bag = '='.join(parts)
+    number, _, where = body.partition('@')
+    link, *place = listed(where, ':')
+    try:
+        mass = float(number)
+        center = [float(part) for part in (':'.join(place) or '0,0,0').split(',')]
+    except ValueError:
+        mass, center = np.nan, []
+    if len(center) != 3 or not bag or not link or not 0.0 < mass < np.inf:
+        raise IdentificationError(
+            f"--payload '{text}' has to be BAG=KG@LINK, or BAG=KG@LINK:X,Y,Z with its centre "
+            'of mass in the frame of the link [m]'
+        )
+    return bag, link, pin.Inertia(mass, np.array(center), np.zeros((3, 3)))
+
+
+def with_payload(robot: Robot, link: str, payload: pin.Inertia) -> Robot:
+    """Return a robot with a payload on a link; IdentificationError if it has no such link."""
+    frames = {f.name: f for f in robot.model.frames if f.type == pin.FrameType.BODY}
+    frame = frames.get(link)
+    if frame is None or frame.parentJoint == 0:
+        links = [name for name, one in frames.items() if one.parentJoint > 0]
+        raise IdentificationError(
+            f"--payload: no joint moves a link '{link}'; links are {', '.join(links)}"
+            f'{meant(link, links)}'
+        )
+    parameters = robot.rigid_parameters.reshape(-1, 10).copy()
+    parameters[frame.parentJoint - 1] += frame.placement.act(payload).toDynamicParameters()
+    return robot.with_inertias(parameters.ravel())
 
 
 def drive_gains(

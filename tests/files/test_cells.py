@@ -8,7 +8,7 @@ from armid_ros.cli.diagnose.partner import _tie
 from armid_ros.cli.options import box
 from armid_ros.effects import make_effect, parse_effect
 from armid_ros.files.cells import listed, parted
-from armid_ros.identification.known_payload import KnownPayload
+from armid_ros.identification.known_payload import parse_payload
 from armid_ros.nodes.running.launching import Argument
 from armid_ros.robots import load_robot
 import pytest
@@ -51,8 +51,9 @@ def test_options_take_such_names_in_quotes(robot, joint):
     quoted = f'"{joint}"'
     corners = ([-1.0, 0.0, 0.0], [1.0, 2.0, 3.0])
     assert box(f'{quoted}=-1,0,0:1,2,3', robot) == (joint, corners)
-    bag, payload = KnownPayload.parse(f'a=b.mcap=2.6@{quoted}:0,0,0.1')
-    assert (bag, payload) == ('a=b.mcap', KnownPayload(2.6, joint, (0.0, 0.0, 0.1)))
+    bag, link, payload = parse_payload(f'a=b.mcap=2.6@{quoted}:0,0,0.1')
+    assert (bag, link, payload.mass) == ('a=b.mcap', joint, 2.6)
+    assert payload.lever.tolist() == [0.0, 0.0, 0.1]
     tie = _tie(f'{quoted}@0,0,1={quoted}', robot, robot)
     assert (tie.joint, tie.other_joint, tie.point) == (joint, joint, (0.0, 0.0, 1.0))
     assert _coupling(f'{quoted},x=3/2') == (joint, 'x', 1.5)

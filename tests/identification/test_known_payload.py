@@ -12,11 +12,12 @@ from armid_ros.identification import identify, SignalSettings
 from armid_ros.identification.known_payload import (
     corrected,
     drive_gains,
-    KnownPayload,
     payloads_of,
+    with_payload,
 )
 from armid_ros.robots import load_robot
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from .conftest import multisine, recorded
@@ -41,7 +42,8 @@ def ladder(arm):
     for number, mass in enumerate((0.0, 1.0, 2.6)):
         robot = arm.robot
         if mass:
-            robot = KnownPayload(mass, link, (0.0, 0.0, -0.05)).carried_by(robot)
+            payload = pin.Inertia(mass, np.array([0.0, 0.0, -0.05]), np.zeros((3, 3)))
+            robot = with_payload(robot, link, payload)
         motion = multisine(robot.joints, 30.0, 200.0, number, amplitude=0.7)
         recording = recorded(
             replace(arm, robot=robot), motion, number, torque_noise=0.05, source=BAGS[number].stem

@@ -90,7 +90,7 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
     places = [group for group in groups.values() if len(group) > 1]
     residuals = residual_changes(before.fit, after.fit)
     chance = CHANCE / sum((True, bool(places), bool(residuals)))
-    wholes = [_Whole.of(sides, (first, second), shared, group) for group in places]
+    chances = [_whole(sides, (first, second), shared, group)[2] for group in places]
     changes = tuple(
         ParameterChange(name, row[0], row[1], row[2], row[3], sure)
         for name, row, sure in zip(
@@ -100,20 +100,21 @@ def compare(before: ParameterFile, after: ParameterFile) -> Comparison:
             strict=True,
         )
     )
-    sure = beyond_chance([whole.chance for whole in wholes], chance)
     found = tuple(
-        GroupChange('' if own[0].rigid else own[0].joint, own, whole.chance, one)
-        for own, whole, one in zip(
-            [tuple(shared[k] for k in group) for group in places], wholes, sure, strict=True
+        GroupChange('' if own[0].rigid else own[0].joint, own, p_value, sure)
+        for own, p_value, sure in zip(
+            [tuple(shared[k] for k in group) for group in places],
+            chances,
+            beyond_chance(chances, chance),
+            strict=True,
         )
     )
     rigid = [k for k, name in enumerate(shared) if name.rigid]
     load = None
     moved = any(changes[k].changed for k in rigid) or any(g.changed and not g.joint for g in found)
     if joint and moved:
-        whole = _Whole.of(sides, (first, second), shared, rigid)
         terms = [first.terms.get(shared[k], {}) for k in rigid]
-        load = _find_load(terms, whole.difference, whole.covariance)
+        load = _find_load(terms, *_whole(sides, (first, second), shared, rigid)[:2])
     left = beyond_chance([one.p_value for one in residuals], chance)
     return Comparison(
         before,
@@ -223,38 +224,28 @@ def _single_chances(before: _Side, after: _Side) -> FloatArray:
     return np.where(std > 0.0, chances, same)
 
 
-@dataclass(frozen=True)
-class _Whole:
-    """Differences of several parameters, their covariance, and how likely they are by chance."""
-
-    difference: FloatArray  # (p,)
-    covariance: FloatArray  # of noise, times what recordings show beyond it, (p, p)
-    chance: float
-
-    @classmethod
-    def of(
-        cls,
-        sides: Sequence[_Side],
-        files: Sequence[ParameterFile],
-        names: Sequence[ParameterName],
-        group: Sequence[int],
-    ) -> _Whole:
-        """Look at those of some positions among the shared names."""
-        own = [names[k] for k in group]
-        difference = (sides[1].values - sides[0].values)[list(group)]
-        covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
-        if not np.all(np.diag(covariance) > 0.0):
-            return cls(difference, covariance, 1.0)
-        scatter = np.concatenate([side.scatter[:, list(group)] for side in sides])
-        inflation = 1.0
-        if len(scatter):
-            squares, rank = _squares(scatter, covariance)
-            inflation = max(1.0, squares / rank)
-        squares, rank = _squares(difference[np.newaxis], covariance)
-        freedom = sum(max(len(side.scatter) - 1, 0) for side in sides)
-        known = np.inf if inflation <= 1.0 else rank * freedom
-        chance = float(tail(squares / inflation, rank, known))
-        return cls(difference, inflation * covariance, chance)
+def _whole(
+    sides: Sequence[_Side],
+    files: Sequence[ParameterFile],
+    names: Sequence[ParameterName],
+    group: Sequence[int],
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return differences at some positions, their covariance, and their p-value together."""
+    own = [names[k] for k in group]
+    difference = (sides[1].values - sides[0].values)[list(group)]
+    covariance = files[0].covariance_of(own) + files[1].covariance_of(own)
+    if not np.all(np.diag(covariance) > 0.0):
+        return difference, covariance, 1.0
+    # the covariance is that of noise, times what recordings show beyond it
+    scatter = np.concatenate([side.scatter[:, list(group)] for side in sides])
+    inflation = 1.0
+    if len(scatter):
+        squares, rank = _squares(scatter, covariance)
+        inflation = max(1.0, squares / rank)
+    squares, rank = _squares(difference[np.newaxis], covariance)
+    freedom = sum(max(len(side.scatter) - 1, 0) for side in sides)
+    known = np.inf if inflation <= 1.0 else rank * freedom
+    return difference, inflation * covariance, float(tail(squares / inflation, rank, known))
 
 
 def _squares(rows: FloatArray, covariance: FloatArray) -> tuple[float, int]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import get_args
+from typing import get_args, NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.identification.assess.grade_limits import by_error, LIMITS, Word
@@ -105,20 +105,18 @@ def grade(
         *(fault for fault in sensors if fault.word != 'good'),
         *(mistakes or (Fault(text, 'poor') for text in units)),
     ]
+    worst: dict[str | None, _Worst] = {
+        bag: _worst(Score.of(fits).joint_relative_error_percent, fits, result)
+        for bag, fits in validation.items()
+    } or {None: _worst(result.halves.joints, result.training, result)}
     reasons = [
         *faults,
-        *_errors(result, validation),
+        *_errors(result, worst, [fit for fits in validation.values() for fit in fits]),
         *_resting(result, validation),
         *(fault for fault in sensors if fault.word == 'good'),
     ]
     ordered = _worst_first(reasons)
-    judged = [(Score.of(fits).joint_relative_error_percent, fits) for fits in validation.values()]
-    worst = [
-        (float(errors[joint]), joint)
-        for errors, fits in judged or [(result.halves.joints, result.training)]
-        for joint in [_worst(errors, fits, result)[0]]
-    ]
-    error, joint = max(worst)
+    error, joint = max((one.measured, one.joint) for one in worst.values())
     return Grade(
         ordered[0].word,
         tuple(f'{reason.text[0].upper()}{reason.text[1:]}.' for reason in ordered),
@@ -156,20 +154,23 @@ def _mistakes(
     return faults
 
 
-def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> Iterator[Fault]:
-    for bag, fits in validation.items():
-        _, error, said = _worst(Score.of(fits).joint_relative_error_percent, fits, result)
-        use = {
-            'good': '',
-            'poor': ', too much to compute torques with',
-            'unusable': ', the model does not describe this motion',
-        }
-        word = by_error(error)
-        yield Fault(f'torque error on {bag}, held out: {said}{use[word]}', word)
-    if not validation:
-        yield _halves(result)
+def _errors(
+    result: Identification, worst: Mapping[str | None, _Worst], held_out: Sequence[Fit]
+) -> Iterator[Fault]:
+    """Judge the joint that is predicted worst, and name those that are not predicted."""
+    use = {
+        'good': '',
+        'poor': ', too much to compute torques with',
+        'unusable': ', the model does not describe this motion',
+    }
+    for bag, one in worst.items():
+        word = by_error(one.beyond)
+        if bag is None:
+            yield _halves(result, word, one.text)
+        else:
+            yield Fault(f'torque error on {bag}, held out: {one.text}{use[word]}', word)
     # what was held out, or what was fitted where nothing was
-    fits = [fit for part in validation.values() for fit in part] or list(result.training)
+    fits = held_out or result.training
     every = Score.of(fits).joint_relative_error_percent
     if np.all(every[moving(fit.motion for fit in fits)] > LIMITS.unusable):
         yield Fault(f'the torque of no joint is predicted to {LIMITS.unusable:g} %', 'unusable')
@@ -183,39 +184,33 @@ def _errors(result: Identification, validation: Mapping[str, Sequence[Fit]]) -> 
         yield Fault(text, 'good')
 
 
-def _worst(
-    errors: FloatArray, fits: Sequence[Fit], result: Identification
-) -> tuple[int, float, str]:
-    """
-    Choose the joint that is predicted worst, or is off most where noise is all of that.
+class _Worst(NamedTuple):
+    """The joint that is predicted worst: its error, that without noise [%], and that in words."""
 
-    Returns
-    -------
-    worst : int
-        Index of the joint.
-    error : float
-        Its error beyond noise [%].
-    text : str
-        Its error in words.
+    joint: int
+    measured: float
+    beyond: float
+    text: str
 
-    """
+
+def _worst(errors: FloatArray, fits: Sequence[Fit], result: Identification) -> _Worst:
+    """Choose the joint that is predicted worst, or is off most where noise is all of that."""
     joints, beyond = result.arm.robot.joints, beyond_noise(errors, fits, result.used)
     moves = moving(fit.motion for fit in fits)
     worst = int(np.lexsort((np.where(moves, errors, -1.0), beyond))[-1])
-    error = float(beyond[worst])
-    noisy = by_error(error) != by_error(errors[worst])
+    measured, error = float(errors[worst]), float(beyond[worst])
+    noisy = by_error(error) != by_error(measured)
     details = [f'{error:.3g} % without noise'] if noisy else []
     details += [f'worst joint: {joints[worst]}'] if len(joints) > 1 else []
-    said = f'{errors[worst]:.3g} %'
-    return worst, error, f'{said} ({", ".join(details)})' if details else said
+    text = f'{measured:.3g} %' + (f' ({", ".join(details)})' if details else '')
+    return _Worst(worst, measured, error, text)
 
 
-def _halves(result: Identification) -> Fault:
+def _halves(result: Identification, word: Word, error: str) -> Fault:
     """Judge by what one half of the data says of the other, where nothing was held out."""
     training = Score.of(result.training).joint_relative_error_percent
     every = result.halves.joints
-    _, error, said = _worst(every, result.training, result)
-    word, text = by_error(error), f'cross-check between the halves of the data: {said}'
+    text = f'cross-check between the halves of the data: {error}'
     undetermined = every > np.maximum(LIMITS.undetermined * training, 100.0 * LIMITS.floor)
     undetermined &= beyond_noise(every, result.training, result.used) > 0.0
     if np.any(undetermined):

@@ -93,21 +93,11 @@ def late_torque(robot: Robot, recording: Recording, used: Conditioning) -> Delay
 
 
 def _rows(robot: Robot, motion: Motion, used: Conditioning) -> tuple[FloatArray, FloatArray]:
-    """
-    Return what a torque may consist of, and the torque, in the band of the motion.
-
-    Dry friction is filtered as the torque is: it steps within a sample.
-
-    Returns
-    -------
-    own : ndarray, shape (n, M, k)
-        Of each joint columns of its own: offset, viscous friction, drive inertia, dry friction
-        that gives way over no length and over several, constant and in proportion to the load.
-    shared : ndarray, shape (n, M, 10 n + 3)
-        What bodies near the description add, what a delay of 1 s does, what is to be explained,
-        and the torque [N m or N].
-
-    """
+    """Return columns of each joint's own, (n, M, k), and shared ones, (n, M, 10 n + 3)."""
+    # own are offset, viscous friction, drive inertia, and dry friction that gives way over no
+    # length and over several, constant and in proportion to the load, filtered as the torque is,
+    # for it steps within a sample; shared are what bodies near the description add, what a delay
+    # of 1 s does, what is to be explained, and the torque
     assert motion.tau is not None
     n, kept = motion.n_joints, np.array(decimated_samples(len(motion), used), dtype=np.intp)
     bent = Hysteresis(

@@ -118,27 +118,22 @@ def sensor_faults(
         uneven = uneven_stamps(one, used.cutoff_hz, band_hz)
         if uneven:
             yield Fault(f'in {uneven}', 'poor')
-        yield from _clock_notes(one)
+        if one.report.restarted:
+            yield Fault(
+                f'the clock jumped back; {one.report.restarted} of {one.report.messages} '
+                'messages, on the shorter side of it, are left out',
+                'good',
+                one.source,
+            )
+        rounded = rounded_stamps(one)
+        if rounded:
+            yield Fault(rounded, 'good', one.source)
         yield from encoder_faults(one, arm.robot.position_units)
         yield from velocity_faults(one)
         yield from _jumps(arm.robot, one)
         own = [part.motion for part in rows if part.source == one.source]
         yield from torque_faults(arm, one, own)
     yield from held_elsewhere(arm.robot, recordings, [part.motion for part in rows])
-
-
-def _clock_notes(recording: Recording) -> Iterator[Fault]:
-    """Yield stamps that jumped back, or are rounded."""
-    report, rounded = recording.report, rounded_stamps(recording)
-    if report.restarted:
-        yield Fault(
-            f'the clock jumped back; {report.restarted} of {report.messages} messages, on the '
-            'shorter side of it, are left out',
-            'good',
-            recording.source,
-        )
-    if rounded:
-        yield Fault(rounded, 'good', recording.source)
 
 
 def _jumps(robot: Robot, recording: Recording) -> Iterator[Fault]:

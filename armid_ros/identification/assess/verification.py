@@ -162,7 +162,10 @@ def forward_validation(
     reference = replace(motion, t=motion.t - motion.t[0])
     feedback = LinearFeedback.of(nominal or arm, bandwidth=_BANDWIDTH, weighs=False)
     controller = _RecordedTorque(reference, feedback)
-    plant = Plant(unlimited(arm.along(reference)), hard_stops=False)
+    along = arm.along(reference)
+    far, free = np.full(motion.n_joints, _FAR), np.full(motion.n_joints, np.inf)
+    robot = replace(along.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
+    plant = Plant(replace(along, robot=robot), hard_stops=False)
     run = simulate(plant, reference, rng=np.random.default_rng(0), controller=controller)
     t = run.truth.t
     recorded = np.column_stack([np.interp(t, reference.t, column) for column in reference.q.T])
@@ -351,11 +354,3 @@ def simulate_held_out(
         if patched is not None:
             pairs.append(ForwardValidation(plain, patched))
     return tuple(pairs), tuple(left_out)
-
-
-def unlimited(arm: ArmModel) -> ArmModel:
-    """Return an arm whose joints have no limits that a simulation could run into."""
-    n = arm.robot.n_joints
-    far, free = np.full(n, _FAR), np.full(n, np.inf)
-    robot = replace(arm.robot, lower=-far, upper=far, velocity_limit=free, torque_limit=free)
-    return replace(arm, robot=robot)

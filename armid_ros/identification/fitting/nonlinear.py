@@ -135,9 +135,11 @@ def fit_values(
     free : ndarray, shape (10 n, k), optional
         Orthonormal directions of the rigid parameters that change no torque, where they are not
         all those that base does not tell apart.
+    solution : Solution, optional
+        Of the problem, where it is there.
 
     """
-    solution = solve(problem, method, bounds(arm, base))
+    solution = solution or solve(problem, method, bounds(arm, base))
     motions = [part.motion for part in problem]
     chosen = ungrouped(arm, base) if free is None else free
     reached = moved(arm, base, solution.values, chosen)

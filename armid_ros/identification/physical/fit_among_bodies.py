@@ -184,15 +184,15 @@ def _bodies(
     held = (effects - lower <= scale) | (upper - effects <= scale)
     names = arm.parameters[len(theta) - len(lower) :]
     values = base.values(theta)
-    factor = settings.mass_range or np.inf
-    off = np.abs(np.log(rigid[:, 0] / prior[: rigid.size : PER_LINK]))
-    off = off > (1.0 - _AT_MASS) * np.log(factor)
+    described = prior[: rigid.size].reshape(-1, PER_LINK)
+    off = np.abs(np.log(rigid[:, 0] / described[:, 0]))
+    off = off > (1.0 - _AT_MASS) * np.log(settings.mass_range or np.inf)
     certificate = PhysicalCertificate(
         links=links,
         shares=np.array(
             [
-                scipy.linalg.eigh(pseudo_inertia(own), pseudo_inertia(described))[0][0]
-                for own, described in zip(rigid, prior[: rigid.size].reshape(-1, 10), strict=True)
+                scipy.linalg.eigh(pseudo_inertia(own), pseudo_inertia(before))[0][0]
+                for own, before in zip(rigid, described, strict=True)
             ]
         ),
         at_bound=tuple(name for name, at in zip(names, held, strict=True) if at),

@@ -270,32 +270,22 @@ class TestRefusals:
         with pytest.raises(ModelError, match='No such file'):
             read_parameters(tmp_path / 'identification.json')
 
-    def test_another_document(self, tmp_path):
+    @pytest.mark.parametrize(
+        ('text', 'said'),
+        [
+            ('{"schema": "other"}', 'schema'),
+            ('{"schema":', 'neither JSON nor YAML'),
+            (
+                '{"schema": "armid/identification/1", "robot": "x", "parameters": '
+                '[{"joint": "a", "value": 1, "std": 1, "unit": ""}]}',
+                'name',
+            ),
+        ],
+    )
+    def test_another_or_a_broken_document_and_a_row_without_a_name(self, tmp_path, text, said):
         path = tmp_path / 'identification.json'
-        path.write_text(json.dumps({'schema': 'other'}))
-        with pytest.raises(ModelError, match='schema'):
-            read_parameters(path)
-
-    def test_a_broken_document(self, tmp_path):
-        path = tmp_path / 'identification.json'
-        path.write_text('{"schema":')
-        with pytest.raises(ModelError, match='neither JSON nor YAML'):
-            read_parameters(path)
-
-    def test_a_covariance_of_another_size(self, tmp_path):
-        path = tmp_path / 'identification.json'
-        rows = [{'name': 'm1', 'joint': 'a', 'value': 1, 'std': 1, 'unit': 'kg'}]
-        document = {'schema': 'armid/identification/1', 'robot': 'x', 'parameters': rows}
-        path.write_text(json.dumps({**document, 'covariance': [[1.0], [0.0, 1.0]]}))
-        with pytest.raises(ModelError, match='no triangle of 1 rows'):
-            read_parameters(path)
-
-    def test_a_row_without_a_name(self, tmp_path):
-        path = tmp_path / 'identification.json'
-        rows = [{'joint': 'a', 'value': 1, 'std': 1, 'unit': ''}]
-        document = {'schema': 'armid/identification/1', 'robot': 'x', 'parameters': rows}
-        path.write_text(json.dumps(document))
-        with pytest.raises(ModelError, match='name'):
+        path.write_text(text)
+        with pytest.raises(ModelError, match=said):
             read_parameters(path)
 
 
@@ -306,7 +296,7 @@ def written(tmp_path, **changes):
         'schema': 'armid/identification/1',
         'robot': 'arm',
         'parameters': [{**row, **{k: v for k, v in changes.items() if k in row}}],
-        'covariance': [[changes.get('variance', 0.01)]],
+        'covariance': changes.get('covariance', [[0.01]]),
         'scatter': changes.get('scatter', [[0.1], [0.2]]),
         'training': {'relative_error_percent': changes.get('error', 5.0)},
     }
@@ -321,8 +311,9 @@ def written(tmp_path, **changes):
         ({'value': 10**400}, 'has to be a finite number'),
         ({'std': float('inf')}, 'the std of Izz1 of joint a has to be a finite number'),
         ({'std': -0.1}, 'the std of Izz1 of joint a is negative'),
-        ({'variance': -0.01}, 'a negative variance'),
-        ({'variance': float('nan')}, 'not finite'),
+        ({'covariance': [[-0.01]]}, 'a negative variance'),
+        ({'covariance': [[float('nan')]]}, 'not finite'),
+        ({'covariance': [[1.0], [0.0, 1.0]]}, 'no triangle of 1 rows'),
         ({'error': 'x'}, 'relative_error_percent'),
         ({'scatter': [[0.1, 0.2]]}, 'a scatter whose rows are not of 1 values'),
         ({'scatter': [[float('inf')]]}, 'a scatter has to be a finite number'),

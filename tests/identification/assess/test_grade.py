@@ -279,17 +279,20 @@ def test_a_dead_channel_of_torque_is_unusable(structure, run, other, since):
     assert found.word == 'unusable'
 
 
-def test_currents_for_torques_are_asked_about(structure, run):
-    """A free fit is as good in any unit; it may be the masses of the description."""
-    found, _ = graded(structure, [replace(run, tau=0.05 * run.tau)])
-    assert found.word == 'poor'
-    assert 'seem to be 0.05 times the torque in N m' in found.reasons[0]
-
-
-def test_torques_in_kilogram_force_metres_are_unusable(structure, run):
-    found, _ = graded(structure, [replace(run, tau=run.tau / 9.80665)])
-    assert found.word == 'unusable'
-    assert 'in kgf m instead of N m' in found.reasons[0]
+@pytest.mark.parametrize(
+    ('factor', 'word', 'said'),
+    [
+        (0.05, 'poor', 'seem to be 0.05 times the torque in N m'),  # it may be wrong masses
+        (1.0 / 9.80665, 'unusable', 'in kgf m instead of N m'),
+    ],
+)
+def test_currents_for_torques_are_asked_about_and_a_unit_is_unusable(
+    structure, run, factor, word, said
+):
+    """A free fit is as good in any unit."""
+    found, _ = graded(structure, [replace(run, tau=factor * run.tau)])
+    assert found.word == word
+    assert said in found.reasons[0]
 
 
 def test_gravity_of_the_earth_on_a_recording_from_the_moon_is_unusable(arm, structure):
