@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.model import point_motion
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.report.arm_drawing import flat, SIDE, Strip, svg_points
@@ -20,7 +20,7 @@ _MARGIN = 0.06
 _SCALE = 260.0
 #: Springs are drawn so many times longer than they are, or nobody would see them.
 _MAGNIFIED = 4.0
-_BASE = (0.0, 0.0, 0.0)
+_BASE = np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,14 @@ def draw_poses(
 
 def _lines(robot: Robot, q: FloatArray) -> list[FloatArray]:
     """Return the chain from base to last body, and a spur to every body's far end (N, P, 2)."""
-    origins = [np.zeros((len(q), 3))]
-    origins += [point_motion(robot, joint, _BASE, q)[0] for joint in robot.joints]
+    frames, origins = LinkFrames.of(robot, q), [np.zeros((len(q), 3))]
+    origins += [frames.places(joint, _BASE) for joint in robot.joints]
     spurs = []
     for body, joint in enumerate(robot.joints):
         lever = np.array(robot.model.inertias[body + 1].lever)
         last = body == robot.n_joints - 1
         following = None if last else np.array(robot.model.jointPlacements[body + 2].translation)
         if following is None or np.linalg.norm(following) < 1e-9:
-            end, _ = point_motion(robot, joint, (6.0 if last else 1.8) * lever, q)
+            end = frames.places(joint, (6.0 if last else 1.8) * lever)
             spurs.append(flat(SIDE, np.stack([origins[body + 1], end], axis=1)))
     return [flat(SIDE, np.stack(origins, axis=1)), *spurs]
