@@ -59,7 +59,7 @@ class Attached(Effect):
             row[:3] = lever * min((reach or _REACH) / max(away, _SHORTEST), 1.0)
         return values
 
-    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the geometry as it is; other shapes have their grids."""
         return tuple(
             self.shape_values[:, [index]]
@@ -182,9 +182,11 @@ class InterfaceSlack(Attached):
         target = thin.rest(thin.residual[:, :, np.newaxis])[:, 0]
         starts, frames = [], LinkFrames.of(arm.robot, thin.q)
         for joint, shape in zip(self.joints, self.shape_values, strict=True):
-            single = InterfaceSlack((joint,), tuple(shape.tolist()))
-            anchors, slacks = _proposals(frames.places(joint, shape[:3]))
-            columns = thin.rest(single.columns_of_straps(frames, anchors, slacks))
+            places = frames.places(joint, shape[:3])
+            anchors, slacks = _proposals(places)
+            pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
+            straps = np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
+            columns = thin.rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
             best = np.argsort(-gain)[:_STRAPS]
@@ -210,26 +212,6 @@ class InterfaceSlack(Attached):
             pulls = _pulls(places - anchors[:, owner], slack)
             columns[:, :, owner] = frames.torques(joint, places, pulls)
         return columns
-
-    def columns_of_straps(
-        self, frames: LinkFrames, anchors: FloatArray, slacks: FloatArray
-    ) -> FloatArray:
-        """
-        Return the torque per stiffness of many straps from the first attachment, (N, n, A).
-
-        Parameters
-        ----------
-        frames : LinkFrames
-            Where the links are.
-        anchors : ndarray, shape (A, 3)
-            Fixed points of the base frame [m].
-        slacks : ndarray, shape (A,)
-            Their slacks [m].
-
-        """
-        joint, places = self.joints[0], frames.places(self.joints[0], self._attachments[0])
-        pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
-        return np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
 
 
 def _pulls(ways: FloatArray, slack: float) -> FloatArray:

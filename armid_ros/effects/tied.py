@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.interaction import Anchor, Attached, HumanInteraction, InterfaceSlack
@@ -95,14 +95,24 @@ class Tied(Attached):
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the slacks to start from: where straps end is known."""
-        return self.shape_grids(unexplained.motion, arm)
+        return Attached.shape_starts(self, unexplained, arm)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         return self.shape_values
 
     def particulars(self) -> dict[str, Any]:
         """Return the other machine and the points of both where the springs end."""
-        return {'partner': self.partner, 'ties': [_tie_row(tie) for tie in self.ties]}
+        rows = [
+            {
+                'name': tie.name,
+                'joint': tie.joint,
+                'point': list(tie.point),
+                'partner_joint': tie.other_joint,
+                'partner_point': list(tie.other_point),
+            }
+            for tie in self.ties
+        ]
+        return {'partner': self.partner, 'ties': rows}
 
 
 @dataclass(frozen=True)
@@ -118,16 +128,6 @@ class TiedSlack(Tied, InterfaceSlack):
     """Strap to a point whose motion is known: it pulls beyond a slack only."""
 
     shapes = (replace(InterfaceSlack.shapes[-1], default=0.003, grid=_SLACKS),)
-
-
-def _tie_row(tie: Tie) -> dict[str, Any]:
-    return {
-        'name': tie.name,
-        'joint': tie.joint,
-        'point': list(tie.point),
-        'partner_joint': tie.other_joint,
-        'partner_point': list(tie.other_point),
-    }
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,6 @@ class TiedKind:
     effect: type[Tied]
     ties: tuple[Tie, ...]
     partner: str = ''
-
-    changes_body: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Refuse two ties on one joint, whose parameters would have one name."""

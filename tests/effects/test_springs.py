@@ -157,17 +157,6 @@ def test_without_slack_an_interface_is_a_spring(robot, motion):
     np.testing.assert_allclose(arms[0].torque(motion), arms[1].torque(motion), atol=1e-9)
 
 
-def test_many_straps_from_one_point_pull_as_each_of_them_does(robot, motion):
-    strap = make_effect('interface_slack@elbow_pitch', robot)
-    anchors, slacks = np.array([[0.3, 0.2, 0.4], [-0.5, 0.1, 0.2]]), np.array([0.0, 0.6])
-    together = strap.columns_of_straps(LinkFrames.of(robot, motion.q), anchors, slacks)
-    for k, (anchor, slack) in enumerate(zip(anchors, slacks, strict=True)):
-        own = strap.with_shape([*strap.shape[:3], *anchor, slack])
-        column = ArmModel(robot).columns_of(own, motion)[:, :, 0]
-        np.testing.assert_allclose(together[:, :, k], column, atol=1e-12)
-        assert np.any(column)
-
-
 def test_a_slack_strap_does_not_pull(robot, added, motion):
     shape = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     assert not np.any(added(motion, 'interface_slack@elbow_pitch', 400.0, shape))

@@ -136,7 +136,7 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
             first += count
     several = {joint: c for joint, c in friction.items() if len(c) > 1}
     found += [_candidate('friction', joint, c, base) for joint, c in several.items()]
-    carried = [kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.comes_and_goes]
+    carried = [kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.weighs]
     found += [_carried(effect, arm, base) for effect in carried if effect.adds_to(arm.robot)]
     return tuple(candidate for candidate in found if candidate.parameters)
 
