@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 from armid_ros.arm.arm_model import ArmModel
 from armid_ros.model import LinkFrames, regressor
@@ -16,6 +16,8 @@ import numpy as np
 
 #: Regressors of more than this are computed whenever they are needed [bytes].
 _MOST = 1_000_000_000
+
+_Result = TypeVar('_Result')
 
 
 class Regressors:
@@ -59,12 +61,7 @@ class Regressors:
 
 @dataclass(frozen=True, repr=False)
 class _Memoized(ArmModel):
-    """
-    An arm that computes the torques of a motion once, for all effects that ask.
-
-    Arms that are made of it have its regressors, too.
-
-    """
+    """An arm that computes what a motion takes once; arms made of it have its regressors."""
 
     regressors: Regressors = field(default_factory=Regressors, compare=False)
 
@@ -72,23 +69,22 @@ class _Memoized(ArmModel):
     def _known(self) -> dict[tuple[str, int], tuple[Motion, Any]]:
         return {}
 
-    def _once(self, what: str, motion: Motion, compute: Callable[[Motion], Any]) -> Any:
+    def _once(self, what: str, motion: Motion, compute: Callable[[Motion], _Result]) -> _Result:
         key = what, id(motion)
         if key not in self._known:
             self._known[key] = motion, compute(motion)
-        return self._known[key][1]
+        result: _Result = self._known[key][1]
+        return result
 
     def link_motion(self, motion: Motion) -> Motion:
         """Return where the links are along a recorded motion."""
         if self.action().displacement is None:
             return motion
-        linked: Motion = self._once('link', motion, super().link_motion)
-        return linked
+        return self._once('link', motion, super().link_motion)
 
     def link_frames(self, motion: Motion) -> LinkFrames:
         """Return where all links are along a recorded motion."""
-        frames: LinkFrames = self._once('frames', motion, super().link_frames)
-        return frames
+        return self._once('frames', motion, super().link_frames)
 
     def _regressor(self, motion: Motion) -> FloatArray | None:
         """Return the regressor where links move as was recorded, and there is room for it."""
@@ -110,31 +106,23 @@ class _Memoized(ArmModel):
     def body_columns(self, motion: Motion) -> FloatArray:
         """Return the regressor of the load along a recorded motion, shape (N, n, 10 n)."""
         known = self._regressor(motion)
-        if known is not None:
-            return known
-        columns: FloatArray = self._once('body', motion, super().body_columns)
-        return columns
+        return self._once('body', motion, super().body_columns) if known is None else known
 
     def gravity_columns(self, motion: Motion) -> FloatArray:
         """Differentiate the load along a recorded motion by gravity, shape (N, n, 3)."""
-        columns: FloatArray = self._once('gravity', motion, super().gravity_columns)
-        return columns
+        return self._once('gravity', motion, super().gravity_columns)
 
     def smoothed(self, motion: Motion) -> Motion:
         """Return a recorded motion without what is beyond its band."""
-        smooth: Motion = self._once('smooth', motion, super().smoothed)
-        return smooth
+        return self._once('smooth', motion, super().smoothed)
 
     def load_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Differentiate the load by position, velocity, acceleration, each (N, n, n)."""
-        by_q, by_dq, by_ddq = self._once('derivatives', motion, super().load_derivatives)
-        return by_q, by_dq, by_ddq
+        return self._once('derivatives', motion, super().load_derivatives)
 
     def link_torque_derivatives(self, motion: Motion) -> tuple[FloatArray, FloatArray] | None:
         """Differentiate what holds the links by position and velocity, each (N, n, n)."""
-        slopes: tuple[FloatArray, FloatArray] | None
-        slopes = self._once('holding', motion, super().link_torque_derivatives)
-        return slopes
+        return self._once('holding', motion, super().link_torque_derivatives)
 
     def joint_torque(self, motion: Motion) -> FloatArray:
         """Return the true torques of a recorded motion, shape (N, n) [N m]."""

@@ -11,7 +11,7 @@ parameter, whether the file is simulated, diagnosed or compared.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from armid_ros.effects import CATALOGUE, Quantity, Shape
 from armid_ros.effects.quantities import written_units
@@ -25,14 +25,6 @@ _KEYS = *_NEEDED, 'misfit'
 _NEEDED_OF_PARAMETER = 'name', 'joint', 'value'
 _KEYS_OF_PARAMETER = *_NEEDED_OF_PARAMETER, 'std', 'unit'
 _NEEDED_OF_EFFECT = 'name', 'joints', 'parameters'
-
-
-class _Row(NamedTuple):
-    """A parameter, where it is in the document, and the units it may have; none if any."""
-
-    place: tuple[str | int, ...]
-    content: Any
-    units: tuple[str, ...]
 
 
 def checked_model(text: str) -> dict[str, Any]:
@@ -61,11 +53,10 @@ def checked_model(text: str) -> dict[str, Any]:
             f'{", ".join(_KEYS)}'
         )
     _require(document, _NEEDED, 'a model')
-    for row in _rows(document, text):
-        fault = _fault(row.content, row.units)
-        if fault is not None:
-            key, said = fault
-            raise ModelError(f'line {yaml_line(text, (*row.place, key))}: {said}')
+    for place, row, units in _rows(document, text):
+        key, fault = _fault(row, units)
+        if fault:
+            raise ModelError(f'line {yaml_line(text, (*place, key))}: {fault}')
     return document
 
 
@@ -77,10 +68,12 @@ def wrong_unit(row: Mapping[str, Any], units: Collection[str]) -> str:
     return f"{_called(row)} has the unit '{row['unit']}'; it has to be {expected}"
 
 
-def _rows(document: Mapping[str, Any], text: str) -> Iterator[_Row]:
-    """Yield all parameters of a document."""
+def _rows(
+    document: Mapping[str, Any], text: str
+) -> Iterator[tuple[tuple[str | int, ...], Any, tuple[str, ...]]]:
+    """Yield where each parameter is, the parameter, and the units it may have; none if any."""
     for k, row in enumerate(document['rigid_parameters']):
-        yield _Row(('rigid_parameters', k), row, link_unit(_name(row)))
+        yield ('rigid_parameters', k), row, link_unit(_name(row))
     for k, entry in enumerate(document['effects']):
         if not isinstance(entry, dict):
             line = yaml_line(text, ('effects', k))
@@ -91,11 +84,11 @@ def _rows(document: Mapping[str, Any], text: str) -> Iterator[_Row]:
         units = {one.name: written_units(one.unit) for one in known}
         for part in ('parameters', 'shapes'):
             for place, row in enumerate(entry.get(part, ())):
-                yield _Row(('effects', k, part, place), row, units.get(_name(row), ()))
+                yield ('effects', k, part, place), row, units.get(_name(row), ())
 
 
-def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str] | None:
-    """Return the key at which a parameter is wrong, and what is wrong; None if nothing is."""
+def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str]:
+    """Return the key at which a parameter is wrong, and what is wrong; empty if nothing is."""
     if not isinstance(row, dict):
         keys = ', '.join(_KEYS_OF_PARAMETER)
         return '', f'a parameter has {keys}; here is {str(row)[:40]!r}'
@@ -113,8 +106,7 @@ def _fault(row: Any, units: tuple[str, ...]) -> tuple[str, str] | None:
         finite(row['value'], called)
     except ValueError as fault:
         return 'value', str(fault)
-    said = wrong_unit(row, units)
-    return ('unit', said) if said else None
+    return 'unit', wrong_unit(row, units)
 
 
 def _require(content: Mapping[str, Any], keys: Collection[str], whose: str) -> None:

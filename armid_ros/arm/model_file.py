@@ -183,7 +183,11 @@ def load_model(path: str | Path, robot: Robot | ArmModel | str | Path | None = N
     text = read_text(path, ModelError)
     with reading(path, ModelError):
         document = checked_model(text)
-        return _arm(document, robot or _described(path, str(document['robot'])))
+        if robot is None:
+            source = str(document['robot'])
+            beside = path.parent / source
+            robot = load_robot(str(beside) if is_file(beside) else source)
+        return _arm(document, robot)
 
 
 def read_model(text: str, robot: Robot, source: str) -> ArmModel:
@@ -218,11 +222,6 @@ def _gravity(given: Any) -> FloatArray:
             "'gravity' has to be three finite numbers [m/s^2] in the frame of the base, as "
             f'[0, 0, -9.81], not {str(given)[:40]!r}'
         ) from None
-
-
-def _described(path: Path, source: str) -> Robot:
-    beside = path.parent / source
-    return load_robot(str(beside) if is_file(beside) else source)
 
 
 def _arm(document: dict[str, Any], robot: Robot) -> ArmModel:

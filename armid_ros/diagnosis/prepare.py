@@ -134,7 +134,7 @@ def with_friction(arm: ArmModel, library: Sequence[str]) -> tuple[ArmModel, tupl
     fuller = arm
     for kind in CATALOGUE.values():
         joints = tuple(j for j in arm.robot.joints if (kind.name, j) not in there)
-        if kind.traits.everywhere and kind.name in library and joints:
+        if kind.traits.usual and kind.name in library and joints:
             fuller = fuller.with_effect(kind.on(arm.robot, joints))
             added += [kind.on(arm.robot, (joint,)) for joint in joints]
     return fuller, tuple(added)

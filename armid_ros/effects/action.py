@@ -237,8 +237,8 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
         inertia=sum((a.inertia for a in actions if a.inertia is not None), zero),
         dry_friction=_merge_friction([a.dry_friction for a in actions if a.dry_friction]),
         hysteresis=_merge_hysteresis([a.hysteresis for a in actions if a.hysteresis]),
-        torque=_sum([a.torque for a in actions if a.torque is not None]),
-        link_torque=_sum([a.link_torque for a in actions if a.link_torque is not None]),
+        torque=sum_laws([a.torque for a in actions if a.torque is not None]),
+        link_torque=sum_laws([a.link_torque for a in actions if a.link_torque is not None]),
         robot=robot,
         transmission=_merge_transmissions([a.transmission for a in actions if a.transmission]),
         drive=drive if drives else None,
@@ -248,11 +248,15 @@ def merge_actions(robot: Robot, actions: Sequence[Action]) -> Action:
     )
 
 
-def _sum(laws: list[TorqueLaw]) -> TorqueLaw | None:
+def sum_laws(laws: Sequence[TorqueLaw]) -> TorqueLaw | None:
+    """Return the sum of torque laws; None of none."""
+
     def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
         return np.asarray(sum(law(t, q, dq) for law in laws))
 
-    return torque if laws else None
+    if len(laws) < 2:
+        return laws[0] if laws else None
+    return torque
 
 
 def _merge_friction(elements: list[DryFriction]) -> DryFriction | None:

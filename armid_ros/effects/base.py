@@ -224,23 +224,19 @@ class Effect(ABC):
             for s in self.shapes
         )
 
-    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """
         Return where a search for a shape should start, for each shape (number of owners, G).
 
         Parameters
         ----------
-        motion : Motion
+        unexplained : Unexplained
             The data that the shape is to explain.
         arm : Arm
             The arm without the effect.
 
         """
         return tuple(np.tile(s.grid, (len(self.owners), 1)) for s in self.shapes)
-
-    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
-        """Return where a search for the shape should start in data: `shape_grids`, or better."""
-        return self.shape_grids(unexplained.motion, arm)
 
     @property
     def said_as(self) -> str:

@@ -145,8 +145,9 @@ class ActuatorSaturation(TorqueReading):
         known = np.isfinite(limits) & (limits > 0.0)
         return np.where(known, 0.8 * limits, self.shape_values)
 
-    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return shares of the highest torque that was measured."""
+        motion = unexplained.motion
         tau = arm.joint_torque(motion) if motion.tau is None else motion.tau
         highest = np.maximum(np.max(np.abs(tau[:, self.indices(motion.joints)]), axis=0), 1e-3)
         return (np.outer(highest, [0.3, 0.4, *np.linspace(0.5, 0.95, 10)]),)

@@ -347,7 +347,6 @@ class FrictionOfJoints:
 
     effect: FrictionLevel
     name: str = FrictionLevel.name
-    changes_body: bool = False
 
     def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """Return the effect, whose joints are those that have friction."""

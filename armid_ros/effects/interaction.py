@@ -4,8 +4,8 @@
 What holds a link: a spring and a damper to a person, to another machine or to the world.
 
 The spring is between a point of a link (``attachment``, in the frame of its joint) and an anchor:
-a fixed point of the base frame, or one whose motion was recorded, such as a point of the leg of a
-person in an exoskeleton. The force of the spring works on the arm, the opposite one on the anchor.
+a fixed point of the base frame, or one whose motion was recorded, see ``tied``. The force of the
+spring works on the arm, the opposite one on the anchor.
 
 """
 
@@ -24,10 +24,8 @@ from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
-import numpy.typing as npt
 
-#: Position and velocity [m, m/s] at times of shape (N,): (N, 3) for one anchor of all k springs,
-#: (N, k, 3) for one of each.
+#: Positions and velocities of all k anchors [m, m/s] at times of shape (N,), each (N or 1, k, 3).
 Anchor = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 #: How far a link reaches from its joint where the arm has no other to tell it [m].
@@ -49,9 +47,7 @@ _ATTACHMENT = tuple(
 
 @dataclass(frozen=True)
 class Attached(Effect):
-    """An effect between a point of each link and an anchor; None is a fixed point."""
-
-    anchor: Anchor | None = None
+    """An effect between a point of each link and an anchor."""
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         """Attach at the centres of mass: where links are, if a fit has put them beyond the arm."""
@@ -63,7 +59,7 @@ class Attached(Effect):
             row[:3] = lever * min((reach or _REACH) / max(away, _SHORTEST), 1.0)
         return values
 
-    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the geometry as it is; other shapes have their grids."""
         return tuple(
             self.shape_values[:, [index]]
@@ -73,35 +69,22 @@ class Attached(Effect):
         )
 
     @property
-    def anchored(self) -> bool:
-        """Whether it is known where the springs end."""
-        return self.anchor is not None
-
-    @property
     def _attachments(self) -> FloatArray:
         """Points of the links that springs are attached to, shape (k, 3) [m]."""
         return self.shape_values[:, :3]
 
-    def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions and velocities of all anchors, shape (N or 1, k, 3)."""
-        if self.anchor is None:
-            return reference[np.newaxis], np.zeros((1, 1, 3))
-        position, velocity = self.anchor(t)
-        return position.reshape(len(t), -1, 3), velocity.reshape(len(t), -1, 3)
-
-    def _reference(self, middle: LinkFrames) -> FloatArray:
-        """Return the fixed points that the anchors are taken from, shape (k, 3) [m]."""
-        return np.zeros((len(self.joints), 3))
+    @abstractmethod
+    def _anchor(self, arm: Arm) -> Anchor:
+        """Return where the springs end."""
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the torque against the springs."""
-        robot, reference = arm.robot, self._reference(arm.middle_frames)
+        robot, anchor = arm.robot, self._anchor(arm)
 
         def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
             times = np.broadcast_to(np.atleast_1d(t), (len(np.atleast_2d(q)),))
-            anchors = self._anchors(reference, times)
             frames = LinkFrames.of(robot, np.atleast_2d(q), self.joints)
-            columns = self._columns(frames, np.atleast_2d(dq), *anchors)
+            columns = self._columns(frames, np.atleast_2d(dq), *anchor(times))
             return np.asarray((columns @ values).reshape(np.shape(q)))
 
         return Action(link_torque=torque if np.any(values) else None)
@@ -109,8 +92,7 @@ class Attached(Effect):
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
         link = arm.link_motion(motion)
-        anchors = self._anchors(self._reference(arm.middle_frames), link.t)
-        return self._columns(arm.link_frames(motion), link.dq, *anchors)
+        return self._columns(arm.link_frames(motion), link.dq, *self._anchor(arm)(link.t))
 
     @abstractmethod
     def _columns(
@@ -124,10 +106,10 @@ class HumanInteraction(Attached):
     """
     Spring and damper between a link and an anchor, tau = J^T (k (p - r) + d (v - w) - f).
 
-    p and v are position and velocity of the attachment, r and w those of the anchor. Without a
-    recorded anchor r is where the attachment is in the middle of the range of motion; a spring
-    fixed at r' has the force f = k (r' - r) there (see ``fixed_at``), so that an anchor nobody
-    knows is three linear parameters. Confounded with joint_spring on a single moving joint and
+    p and v are position and velocity of the attachment, r and w those of the anchor, which is
+    where the attachment is in the middle of the range of motion, at rest; a spring fixed at r' has
+    the force f = k (r' - r) there, so that an anchor nobody knows is three linear parameters.
+    Confounded with joint_spring on a single moving joint and
     with the weight of the limb; the sum of the torques of a pair does not have it, their
     difference does.
     Source: the human-exoskeleton leg pair, springs between segments of equal number.
@@ -144,29 +126,10 @@ class HumanInteraction(Attached):
     )
     shapes = _ATTACHMENT
 
-    def fixed_at(
-        self, robot: Robot, point: npt.ArrayLike, stiffness: float, damping: float = 0.0
-    ) -> FloatArray:
-        """
-        Return the values of springs from every attachment to one fixed point.
-
-        Parameters
-        ----------
-        robot : Robot
-            The arm.
-        point : array_like, shape (3,)
-            The anchor in the base frame [m].
-        stiffness, damping : float
-            k [N/m] and d [N s/m].
-
-        """
-        reference = self._reference(LinkFrames.in_the_middle(robot))
-        forces = stiffness * (np.asarray(point, dtype=float) - reference)
-        return np.concatenate([[stiffness, damping, *force] for force in forces])
-
-    def _reference(self, middle: LinkFrames) -> FloatArray:
+    def _anchor(self, arm: Arm) -> Anchor:
         points = zip(self.joints, self._attachments, strict=True)
-        return np.concatenate([middle.places(joint, point) for joint, point in points])
+        middle = np.stack([arm.middle_frames.places(joint, point) for joint, point in points], 1)
+        return lambda t: (middle, np.zeros((1, 1, 3)))
 
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
@@ -188,8 +151,7 @@ class InterfaceSlack(Attached):
 
     tau = k J^T e max(|x| - slack, 0), where x = p - r is the way from the anchor to the attachment
     and e its direction. Without slack it is a human_interaction with a known anchor; different
-    tensions of the strap tell. The anchor is a shape: a point of the base frame, or an offset
-    from the recorded one.
+    tensions of the strap tell. The anchor is a shape: a point of the base frame.
 
     """
 
@@ -209,23 +171,22 @@ class InterfaceSlack(Attached):
     def _default_shape(self, robot: Robot) -> FloatArray:
         """Anchor each attachment where it is in the middle of the range of motion."""
         values = super()._default_shape(robot)
-        if self.anchor is None:
-            middle = LinkFrames.in_the_middle(robot)
-            for row, joint in zip(values, self.joints, strict=True):
-                row[3:6] = middle.places(joint, row[:3])[0]
+        middle = LinkFrames.in_the_middle(robot)
+        for row, joint in zip(values, self.joints, strict=True):
+            row[3:6] = middle.places(joint, row[:3])[0]
         return values
 
     def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return the anchors and slacks that take most of what is left."""
-        if self.anchored:
-            return super().shape_starts(unexplained, arm)
         thin = unexplained.thinned(_ROWS)
         target = thin.rest(thin.residual[:, :, np.newaxis])[:, 0]
         starts, frames = [], LinkFrames.of(arm.robot, thin.q)
         for joint, shape in zip(self.joints, self.shape_values, strict=True):
-            single = InterfaceSlack((joint,), tuple(shape.tolist()))
-            anchors, slacks = _proposals(frames.places(joint, shape[:3]))
-            columns = thin.rest(single.columns_of_straps(frames, anchors, slacks))
+            places = frames.places(joint, shape[:3])
+            anchors, slacks = _proposals(places)
+            pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
+            straps = np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
+            columns = thin.rest(straps)
             own, aim = np.sum(columns**2, axis=0), columns.T @ target
             gain = np.maximum(aim, 0.0) ** 2 / np.maximum(own, max(1e-12 * own.max(), 1e-300))
             best = np.argsort(-gain)[:_STRAPS]
@@ -237,9 +198,9 @@ class InterfaceSlack(Attached):
         """Slack of every strap, shape (k,) [m]."""
         return self.shape_values[:, -1]
 
-    def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        position, velocity = super()._anchors(reference, t)
-        return position + self.shape_values[:, 3:6], velocity
+    def _anchor(self, arm: Arm) -> Anchor:
+        fixed = self.shape_values[np.newaxis, :, 3:6], np.zeros((1, 1, 3))
+        return lambda t: fixed
 
     def _columns(
         self, frames: LinkFrames, dq: FloatArray, anchors: FloatArray, velocities: FloatArray
@@ -251,26 +212,6 @@ class InterfaceSlack(Attached):
             pulls = _pulls(places - anchors[:, owner], slack)
             columns[:, :, owner] = frames.torques(joint, places, pulls)
         return columns
-
-    def columns_of_straps(
-        self, frames: LinkFrames, anchors: FloatArray, slacks: FloatArray
-    ) -> FloatArray:
-        """
-        Return the torque per stiffness of many straps from the first attachment, (N, n, A).
-
-        Parameters
-        ----------
-        frames : LinkFrames
-            Where the links are.
-        anchors : ndarray, shape (A, 3)
-            Fixed points of the base frame [m].
-        slacks : ndarray, shape (A,)
-            Their slacks [m].
-
-        """
-        joint, places = self.joints[0], frames.places(self.joints[0], self._attachments[0])
-        pulls = [_pulls(places - a, slack) for a, slack in zip(anchors, slacks, strict=True)]
-        return np.stack([frames.torques(joint, places, pull) for pull in pulls], axis=2)
 
 
 def _pulls(ways: FloatArray, slack: float) -> FloatArray:

@@ -193,10 +193,6 @@ class LearnedTorque(Effect):
                 f'({", ".join(self.joints)})'
             )
 
-    @classmethod
-    def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
-        return robot.joints
-
     def particulars(self) -> dict[str, Any]:
         """Return the maps."""
         rows = zip(self.joints, self.maps, strict=bool(self.maps))
@@ -256,11 +252,6 @@ class LearnedTorque(Effect):
             return np.asarray(share * self.torque(robot, q, dq))
 
         return Action(link_torque=torque)
-
-
-def as_effect(maps: Mapping[str, TorqueMap]) -> Effect:
-    """Return the effect of maps by joint."""
-    return LearnedTorque(tuple(maps), maps=tuple(maps.values()))
 
 
 def counted(inputs: FloatArray, knee: float) -> FloatArray:

@@ -11,7 +11,7 @@ from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.quantities import Quantity, SURELY
 from armid_ros.estimate import ParameterName
-from armid_ros.model import LINK_PARAMETERS
+from armid_ros.model.rigid_body import LINK_PARAMETERS, LINK_UNITS
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -20,7 +20,6 @@ import numpy as np
 _REACH = 0.1
 #: Moments of inertia among the parameters of a link: Ixx, Iyy, Izz.
 _MOMENTS = 4, 6, 9
-_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 
 
 @dataclass(frozen=True)
@@ -37,25 +36,22 @@ class _LinkBody(Effect):
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the links' own columns of the regressor, shape (N, n, P)."""
-        return arm.body_columns(motion)[:, :, self._rows(arm.robot)]
+        return arm.body_columns(motion)[:, :, list(self.adds_to(arm.robot))]
 
     def action(self, values: FloatArray, arm: Arm) -> Action:
         """Return the robot with the parameters added to its links."""
         parameters = arm.robot.rigid_parameters.copy()
-        parameters[self._rows(arm.robot)] += values
+        parameters[list(self.adds_to(arm.robot))] += values
         return Action(robot=arm.robot.with_inertias(parameters))
 
     def spread(self, robot: Robot, found: Sequence[FloatArray] | None = None) -> FloatArray:
         """Return what descriptions of the links are off by at the most, shape (P,)."""
-        return described_spread(robot).ravel()[self._rows(robot)]
+        return described_spread(robot).ravel()[list(self.adds_to(robot))]
 
     def adds_to(self, robot: Robot) -> tuple[int, ...]:
         """Return the parameters of its links."""
         size = len(LINK_PARAMETERS)
         return tuple(size * joint + i for joint in self.indices(robot.joints) for i in range(size))
-
-    def _rows(self, robot: Robot) -> list[int]:
-        return list(self.adds_to(robot))
 
 
 def described_spread(robot: Robot) -> FloatArray:
@@ -90,7 +86,7 @@ class Payload(_LinkBody):
             lower=0.0 if name == 'm' else -np.inf,
             typical=(0.05, 10.0) if name == 'm' else None,
         )
-        for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)
+        for name, unit in zip(LINK_PARAMETERS, LINK_UNITS, strict=True)
     )
 
     @classmethod
@@ -112,13 +108,8 @@ class Payload(_LinkBody):
         return self._weighs(values, std, arm) and not self._is_no_body(values, std, arm)
 
     def _weighs(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """
-        Return whether it may weigh something, not farther away than the arm is long.
-
-        Its mass may be what no motion tells, such as that of an inner link; its moment has to be.
-
-        """
-        if std[0] == 0.0:  # noqa: RUF069 - set where no motion shows it
+        """Return whether it may weigh something, not farther away than the arm is long."""
+        if std[0] == 0.0:  # noqa: RUF069 - set where no motion shows it, as of an inner link
             return bool(np.any(values[1:4]))
         places = [placement.translation for placement in arm.robot.model.jointPlacements]
         length = float(np.sum(np.linalg.norm(places, axis=1))) + _REACH
@@ -126,13 +117,8 @@ class Payload(_LinkBody):
         return bool(heaviest > 0.0 and np.linalg.norm(values[1:4]) < length * heaviest)
 
     def _is_no_body(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:
-        """
-        Return whether no body can have such values.
-
-        About the joint its inertia is no less than that of its mass in one point, at its centre.
-        Nothing is said where values stand for others that the motion does not tell from them.
-
-        """
+        """Return whether no body can have such values, as far as the motion tells them."""
+        # about the joint its inertia is no less than that of its mass in one point, at its centre
         axis = arm.robot.geometry[self.indices(arm.robot.joints)[0]].turn
         x, y, z = axis
         share = np.array([x * x, 2.0 * x * y, y * y, 2.0 * x * z, 2.0 * y * z, z * z])
@@ -197,7 +183,7 @@ class LinkInertia(_LinkBody):
     summary = 'mass, centre or inertia of a link other than described'
     quantities = tuple(
         Quantity(f'{name}_difference', unit)
-        for name, unit in zip(LINK_PARAMETERS, _UNITS, strict=True)
+        for name, unit in zip(LINK_PARAMETERS, LINK_UNITS, strict=True)
     )
 
     def plausible(self, values: FloatArray, std: FloatArray, arm: Arm) -> bool:

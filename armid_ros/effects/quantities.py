@@ -147,12 +147,7 @@ class Shape:
 def joint_unit(unit: str, joint: str, robot: Robot) -> str:
     """Return a unit as it is on the joint: 'N m' is 'N' on a prismatic one."""
     slides = joint and robot.prismatic[robot.joints.index(joint)]
-    return slide_unit(unit) if slides else unit
-
-
-def slide_unit(unit: str) -> str:
-    """Return what a unit of a revolute joint is on a prismatic one."""
-    return _PRISMATIC_UNITS.get(unit, unit)
+    return _PRISMATIC_UNITS.get(unit, unit) if slides else unit
 
 
 def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
@@ -172,4 +167,6 @@ def pair_unit(unit: str, first: str, second: str, robot: Robot) -> str:
 
 def written_units(unit: str) -> tuple[str, ...]:
     """Return all that a unit can be on joints that turn or slide, or between two of them."""
-    return tuple(dict.fromkeys((unit, slide_unit(unit), *_MIXED_UNITS.get(unit, ()))))
+    return tuple(
+        dict.fromkeys((unit, _PRISMATIC_UNITS.get(unit, unit), *_MIXED_UNITS.get(unit, ())))
+    )

@@ -12,7 +12,7 @@ asked for, or everything is.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from importlib.metadata import entry_points, EntryPoint
+from importlib.metadata import entry_points
 import inspect
 import logging
 import re
@@ -36,10 +36,6 @@ class Kind(Protocol):
     @property
     def name(self) -> str:
         """Return what its effects are called."""
-
-    @property
-    def changes_body(self) -> bool:
-        """Whether they act by changing the rigid body or its gravity."""
 
     def on(self, robot: Robot, joints: tuple[str, ...] | None = None) -> Effect:
         """Make the effect for a robot."""
@@ -127,15 +123,6 @@ class Catalogue(Mapping[str, type[Effect]]):
                 f"the name '{kind.name}' of {_home(kind)} is that of {_home(there)}; choose "
                 'another one'
             )
-        self._check_quantities(kind)
-        self._kinds[kind.name] = kind
-
-    def remove(self, name: str) -> None:
-        """Take away a class that is not shipped; nothing happens if it is not there."""
-        if name not in self._shipped:
-            self._kinds.pop(name, None)
-
-    def _check_quantities(self, kind: type[Effect]) -> None:
         taken = {
             name: other.name
             for other in self._kinds.values()
@@ -148,6 +135,12 @@ class Catalogue(Mapping[str, type[Effect]]):
                     f"{kind.name}: the name '{name}' is that of a quantity of "
                     f'{taken[name]}; one model may have both, so choose another name'
                 )
+        self._kinds[kind.name] = kind
+
+    def remove(self, name: str) -> None:
+        """Take away a class that is not shipped; nothing happens if it is not there."""
+        if name not in self._shipped:
+            self._kinds.pop(name, None)
 
     def _complete_once(self) -> None:
         """Load the effects of all packages, the first time."""
@@ -156,7 +149,9 @@ class Catalogue(Mapping[str, type[Effect]]):
         self._complete = True
         for entry in entry_points(group=GROUP):
             try:
-                self._load(entry)
+                loaded = entry.load()
+                if not isinstance(loaded, ModuleType):
+                    self.add(loaded)
             except Exception as error:  # a package of somebody else may fail in any way
                 package = entry.dist.name if entry.dist else entry.value
                 self.broken[package] = f'{type(error).__name__}: {error}'
@@ -165,14 +160,6 @@ class Catalogue(Mapping[str, type[Effect]]):
                     package,
                     self.broken[package],
                 )
-
-    def _load(self, entry: EntryPoint) -> None:
-        loaded = entry.load()
-        if isinstance(loaded, ModuleType):
-            return
-        if not (inspect.isclass(loaded) and issubclass(loaded, Effect)):
-            raise ModelError(f'{entry.name} = {entry.value} is no class of effects and no module')
-        self.add(loaded)
 
 
 def check_kind(kind: type[Effect]) -> None:

@@ -11,6 +11,7 @@ from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape
 from armid_ros.effects.readings import Displacing, TorqueReading
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 import numpy as np
 
@@ -98,9 +99,11 @@ class TorqueDrift(TorqueReading):
     quantities = (Quantity('drift', 'N m', typical=(0.01, 5.0)),)
     shapes = (Shape('drift_time', 's', 0.1, 1e5, 600.0, (10.0, 60.0, 300.0, 1000.0, 3000.0)),)
 
-    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return times that differ on a recording: beyond three of it, a drift is a line."""
-        times = np.maximum(float(np.ptp(motion.t)) * np.array(_TIMES), self.shapes[0].lower)
+        times = np.maximum(
+            float(np.ptp(unexplained.motion.t)) * np.array(_TIMES), self.shapes[0].lower
+        )
         return (np.tile(times, (len(self.joints), 1)),)
 
     def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:

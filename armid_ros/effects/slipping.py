@@ -66,7 +66,10 @@ class Hysteresis:
         moves = np.abs(dq[0]) > _REST * np.abs(dq).max(axis=0)  # the rest is noise of a sensor
         states[0] = self.start(np.where(moves, dq[0], 0.0))
         for element, distance in enumerate(self.distance):
-            _slip(way[:, element], states[:, element], float(distance))
+            own, state = way[:, element], states[:, element]
+            for first, last, end in _stretches(own):
+                decay = np.exp(-np.abs(own[first + 1 : last + 1] - own[first]) / float(distance))
+                state[first + 1 : last + 1] = end - (end - state[first]) * decay
         return states
 
     def pullback(self, q: FloatArray, dq: FloatArray, weights: FloatArray) -> FloatArray:
@@ -105,13 +108,6 @@ def _stretches(way: FloatArray) -> list[tuple[int, int, float]]:
     turns = np.flatnonzero(np.diff(step)) + 1
     ends = zip(np.append(0, turns), np.append(turns, len(step)), strict=True)
     return [(int(a), int(b), float(step[a])) for a, b in ends if b > a]
-
-
-def _slip(way: FloatArray, state: FloatArray, distance: float) -> None:
-    """Fill in the states of one element, from reversal to reversal; the first is given."""
-    for first, last, end in _stretches(way):
-        decay = np.exp(-np.abs(way[first + 1 : last + 1] - way[first]) / distance)
-        state[first + 1 : last + 1] = end - (end - state[first]) * decay
 
 
 def _slip_pullback(

@@ -10,6 +10,7 @@ from armid_ros.effects.action import Action
 from armid_ros.effects.base import Arm, Effect
 from armid_ros.effects.layout import joint_columns, scatter
 from armid_ros.effects.quantities import Quantity, Shape, SURELY
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
 import numpy as np
@@ -86,8 +87,9 @@ class SoftLimit(Effect):
         edges = np.stack([lower + margin, upper - margin], axis=1)
         return np.where(known[:, np.newaxis], edges, self.shape_values)
 
-    def shape_grids(self, motion: Motion, arm: Arm) -> tuple[FloatArray, ...]:
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
         """Return positions near the ends of what was moved through."""
+        motion = unexplained.motion
         q = arm.link_motion(motion).q[:, self.indices(motion.joints)]
         lowest, highest = q.min(axis=0)[:, np.newaxis], q.max(axis=0)[:, np.newaxis]
         depth = (highest - lowest) * np.array(_EDGES)

@@ -24,6 +24,7 @@ import pickle
 from armid_ros.arm import ArmModel
 from armid_ros.effects.base import Effect
 from armid_ros.effects.registry import check_kind
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import load_robot, Robot
 import numpy as np
@@ -224,8 +225,11 @@ def instantaneous_means_sample_by_sample(trial: EffectCase) -> None:
 
 def shapes_stay_possible(trial: EffectCase) -> None:
     """Fail where default shapes or the starts of a search are outside of the bounds."""
-    effect = trial.effect
-    grids = effect.shape_grids(trial.motion, ArmModel(trial.robot))
+    effect, motion = trial.effect, trial.motion
+    assert motion.tau is not None
+    nothing = np.zeros((*motion.q.shape, 0))
+    unexplained = Unexplained(motion, motion.q, motion.tau, np.ones_like(motion.q), nothing)
+    grids = effect.shape_starts(unexplained, ArmModel(trial.robot))
     assert effect.shape_values.shape == (len(effect.owners), len(effect.shapes))
     for column, (shape, grid) in enumerate(zip(effect.shapes, grids, strict=True)):
         assert len(grid) == len(effect.owners), f'{shape.name}: a grid has a row per owner'

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from armid_ros.effects.base import Arm, Effect
-from armid_ros.effects.interaction import Attached, HumanInteraction, InterfaceSlack
+from armid_ros.effects.interaction import Anchor, Attached, HumanInteraction, InterfaceSlack
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.files import finite
-from armid_ros.model import LinkFrames
 from armid_ros.model.spring_ties import Tie
 from armid_ros.motion import FloatArray, Motion
 from armid_ros.robots import Robot
@@ -40,11 +40,14 @@ class Tied(Attached):
         Where they are, one on each joint.
     partner : str
         The description of the other machine: a shipped name or a path.
+    anchor : callable, or None
+        Where the points are along a motion, see `along`.
 
     """
 
     ties: tuple[Tie, ...] = ()
     partner: str = ''
+    anchor: Anchor | None = None
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -73,11 +76,6 @@ class Tied(Attached):
         curve = CubicHermiteSpline(motion.t, position, velocity)
         return replace(self, anchor=lambda t: (curve(t), curve(t, 1)))
 
-    @property
-    def anchored(self) -> bool:
-        """Whether it is known where the springs end: it is, along a motion."""
-        return True
-
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """Return the torque per quantity of every spring, shape (N, n, P)."""
         return Attached.columns(self.along(motion), motion, arm)
@@ -86,23 +84,35 @@ class Tied(Attached):
     def _attachments(self) -> FloatArray:
         return np.array([tie.point for tie in self.ties]).reshape(-1, 3)
 
-    def _anchors(self, reference: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if self.anchor is None:
+    def _anchor(self, arm: Arm) -> Anchor:
+        def unknown(t: FloatArray) -> tuple[FloatArray, FloatArray]:
             raise ModelError(
                 f'{self.name} of {", ".join(self.joints)} acts along recordings of '
                 f'{self.partner or "its partner"} alone; take it out of the model to simulate'
             )
-        return Attached._anchors(self, reference, t)
 
-    def _reference(self, middle: LinkFrames) -> FloatArray:
-        return np.zeros((len(self.ties), 3))
+        return self.anchor or unknown
+
+    def shape_starts(self, unexplained: Unexplained, arm: Arm) -> tuple[FloatArray, ...]:
+        """Return the slacks to start from: where straps end is known."""
+        return Attached.shape_starts(self, unexplained, arm)
 
     def _default_shape(self, robot: Robot) -> FloatArray:
         return self.shape_values
 
     def particulars(self) -> dict[str, Any]:
         """Return the other machine and the points of both where the springs end."""
-        return {'partner': self.partner, 'ties': [_tie_row(tie) for tie in self.ties]}
+        rows = [
+            {
+                'name': tie.name,
+                'joint': tie.joint,
+                'point': list(tie.point),
+                'partner_joint': tie.other_joint,
+                'partner_point': list(tie.other_point),
+            }
+            for tie in self.ties
+        ]
+        return {'partner': self.partner, 'ties': rows}
 
 
 @dataclass(frozen=True)
@@ -118,16 +128,6 @@ class TiedSlack(Tied, InterfaceSlack):
     """Strap to a point whose motion is known: it pulls beyond a slack only."""
 
     shapes = (replace(InterfaceSlack.shapes[-1], default=0.003, grid=_SLACKS),)
-
-
-def _tie_row(tie: Tie) -> dict[str, Any]:
-    return {
-        'name': tie.name,
-        'joint': tie.joint,
-        'point': list(tie.point),
-        'partner_joint': tie.other_joint,
-        'partner_point': list(tie.other_point),
-    }
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,6 @@ class TiedKind:
     effect: type[Tied]
     ties: tuple[Tie, ...]
     partner: str = ''
-
-    changes_body: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Refuse two ties on one joint, whose parameters would have one name."""

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 
 from armid_ros.effects.base import Arm
@@ -26,6 +27,20 @@ _MORE = 1.0001
 @dataclass(frozen=True)
 class LateReading(TorqueReading):
     """A reading that comes late, which shows in how fast the torque changes."""
+
+    @abstractmethod
+    def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
+        """Return what has come of signals of all joints, shape (N, n, ...)."""
+
+    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
+        """Return the torque as it comes, shape (N, n) [N m]."""
+        return self._late(values, motion, tau)
+
+    def transfer(
+        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
+    ) -> FloatArray:
+        """Return the columns, as late as the torque."""
+        return self._late(values, motion, columns)
 
     def columns(self, motion: Motion, arm: Arm) -> FloatArray:
         """
@@ -71,26 +86,16 @@ class TimeDelay(LateReading):
     def _default_joints(cls, robot: Robot) -> tuple[str, ...]:
         return ()
 
-    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the torque of earlier, shape (N, n) [N m]."""
-        return self._shifted(values, motion, tau)
-
-    def transfer(
-        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
-    ) -> FloatArray:
-        """Return the columns of earlier."""
-        return self._shifted(values, motion, columns)
-
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return -dtau/dt of earlier [N m/s], shape (N, n, P)."""
-        slope = -self._shifted(values, motion, tau, derivative=1)
+        slope = -self._late(values, motion, tau, derivative=1)
         return _by_owner(self, motion, slope)
 
     def memory(self, values: FloatArray) -> float:
         """Return the longest delay [s]."""
         return float(np.max(np.abs(values)))
 
-    def _shifted(
+    def _late(
         self, values: FloatArray, motion: Motion, x: FloatArray, derivative: int = 0
     ) -> FloatArray:
         earlier = rate_of_change(motion.t, x) if derivative else x
@@ -120,15 +125,12 @@ class TorqueLag(LateReading):
     linear = False
     instantaneous = False
 
-    def read(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
-        """Return the filtered torque, shape (N, n) [N m]."""
-        return self._filtered(values, motion, tau)
-
-    def transfer(
-        self, values: FloatArray, motion: Motion, tau: FloatArray, columns: FloatArray
-    ) -> FloatArray:
-        """Return the columns filtered alike."""
-        return self._filtered(values, motion, columns)
+    def _late(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
+        result = x.copy()
+        for lag, rows in zip(values, self._owned(motion), strict=True):
+            if lag:
+                result[:, rows] = low_pass(motion.t, x[:, rows], float(lag))
+        return result
 
     def sensitivity(self, values: FloatArray, motion: Motion, tau: FloatArray) -> FloatArray:
         """Return dreading/dT [N m/s], which is -dtau/dt where the lag is zero, (N, n, P)."""
@@ -142,13 +144,6 @@ class TorqueLag(LateReading):
     def memory(self, values: FloatArray) -> float:
         """Return the time after which the slowest filter has forgotten [s]."""
         return _FORGOTTEN * float(np.max(np.abs(values)))
-
-    def _filtered(self, values: FloatArray, motion: Motion, x: FloatArray) -> FloatArray:
-        result = x.copy()
-        for lag, rows in zip(values, self._owned(motion), strict=True):
-            if lag:
-                result[:, rows] = low_pass(motion.t, x[:, rows], float(lag))
-        return result
 
 
 def rate_of_change(t: FloatArray, x: FloatArray) -> FloatArray:

@@ -27,19 +27,16 @@ class Traits:
     sign : str
         What a positive value means, where the name does not say it.
     weighs : bool
-        Whether it is described by its mass, the first quantity, and where it is.
+        Whether it is carried, and so described by its mass, the first quantity, and where it is;
+        it is put down and picked up all day.
     usual : bool
-        Whether it is fitted by default: nearly every arm has it.
-    everywhere : bool
-        Whether every joint may have it.
+        Whether it is fitted by default: nearly every joint of every arm has it.
     friction : bool
         Whether it is friction: all friction of a joint may change at once.
     external : bool
         Whether it comes from outside the arm: a person, another machine.
     corrects : bool
         Whether it is an error of the description, and never happens to the arm.
-    comes_and_goes : bool
-        Whether it changes all day: a change is attributed to it if it explains as well.
     nuisance : tuple of tuple of float
         Shapes with which it is a nuisance parameter where nobody asked for it; () if it is none.
     separate : tuple of tuple of int
@@ -54,11 +51,9 @@ class Traits:
     sign: str = ''
     weighs: bool = False
     usual: bool = False
-    everywhere: bool = False
     friction: bool = False
     external: bool = False
     corrects: bool = False
-    comes_and_goes: bool = False
     nuisance: tuple[tuple[float, ...], ...] = ()
     separate: tuple[tuple[int, ...], ...] = ()
     urdf_attribute: str = ''
@@ -119,7 +114,6 @@ TRAITS = {
         shown_by='constant velocities, slow to fast, in both directions',
         look_at='the grease, its temperature, the seals and the bearings',
         usual=True,
-        everywhere=True,
         nuisance=((),),
         friction=True,
         urdf_attribute='damping',
@@ -129,7 +123,6 @@ TRAITS = {
         shown_by='slow constant velocity in both directions',
         look_at='the brake, the seals and the bearings, and whether it moves freely by hand',
         usual=True,
-        everywhere=True,
         nuisance=((),),
         friction=True,
         urdf_attribute='friction',
@@ -193,7 +186,6 @@ TRAITS = {
         shown_by='the same motion with and without the tool',
         look_at='the hand, the gripper, the tool, a part or a cable that it carries',
         weighs=True,
-        comes_and_goes=True,
     ),
     'link_inertia': Traits(
         shown_by='fast motion beside static holds',
@@ -213,7 +205,6 @@ TRAITS = {
         shown_by='static holds over the range of positions',
         look_at='the zero of the torque sensor, with the joint unloaded',
         usual=True,
-        everywhere=True,
     ),
     'joint_spring': Traits(
         shown_by='static holds over the range, with and without a payload',

@@ -92,7 +92,8 @@ class Staged:
     def _exchanged(self, names: Collection[str]) -> bool:
         """Exchange the folder for one with the result and what stays, if that is possible."""
         out = self.out.resolve()
-        if Path.cwd().is_relative_to(out) or not _same_owner(out, self.folder):
+        old, own = out.stat(), self.folder.stat()
+        if Path.cwd().is_relative_to(out) or (old.st_uid, old.st_gid) != (own.st_uid, own.st_gid):
             return False
         new = out.with_name(f'.{out.name}{STAGING}')
         goes = {STAGING, *names, *(path.name for path in self._earlier())}
@@ -187,11 +188,6 @@ def _exchange(first: Path, second: Path) -> None:
     if rename(_AT_FDCWD, os.fsencode(first), _AT_FDCWD, os.fsencode(second), _RENAME_EXCHANGE):
         code = ctypes.get_errno()
         raise OSError(code, os.strerror(code), str(second))
-
-
-def _same_owner(first: Path, second: Path) -> bool:
-    one, other = first.stat(), second.stat()
-    return (one.st_uid, one.st_gid) == (other.st_uid, other.st_gid)
 
 
 def _remove(path: Path) -> None:

@@ -9,7 +9,7 @@ from armid_ros.model.base_parameters import (
     levelled,
     regroup,
 )
-from armid_ros.model.kinematics import LinkFrames, point_motion, points_motion
+from armid_ros.model.kinematics import LinkFrames, points_motion
 from armid_ros.model.rigid_body import (
     gravity_sensitivity,
     inverse_dynamics,
@@ -30,7 +30,6 @@ __all__ = [
     'inverse_dynamics',
     'inverse_dynamics_derivatives',
     'levelled',
-    'point_motion',
     'points_motion',
     'random_motion',
     'regressor',

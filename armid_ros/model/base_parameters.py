@@ -230,12 +230,8 @@ def gravity_composites(robot: Robot, rng: np.random.Generator) -> BaseParameters
     rest = Motion(motion.joints, motion.t, motion.q, 0.0 * motion.dq, 0.0 * motion.ddq)
     names = rigid_parameter_names(robot)
     static = [j for j in range(len(names)) if j % len(LINK_PARAMETERS) < 4]
-    w = _stack(regressor(robot, rest))[:, static]
+    w = regressor(robot, rest)[:, :, static].reshape(-1, len(static))
     return group_columns(w, tuple(names[j] for j in static))
-
-
-def _stack(columns: FloatArray) -> FloatArray:
-    return columns.reshape(-1, columns.shape[-1])
 
 
 def _symbol_of(parameter: ParameterName) -> str:

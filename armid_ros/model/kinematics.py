@@ -10,37 +10,6 @@ from dataclasses import dataclass
 from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 import numpy as np
-import numpy.typing as npt
-
-
-def point_motion(
-    robot: Robot, joint: str, offset: npt.ArrayLike, q: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Follow a point of a link.
-
-    Parameters
-    ----------
-    robot : Robot
-        The arm.
-    joint : str
-        The joint that moves the link.
-    offset : array_like, shape (3,)
-        The point in the frame of that joint [m].
-    q : ndarray, shape (N, n)
-        Joint positions.
-
-    Returns
-    -------
-    position : ndarray, shape (N, 3)
-        In the base frame [m].
-    jacobian : ndarray, shape (N, 3, n)
-        Derivative by the joint positions.
-
-    """
-    point = np.asarray(offset, dtype=np.float64)[np.newaxis]
-    positions, jacobians = points_motion(robot, [joint], point, q)
-    return positions[:, 0], jacobians[:, 0]
 
 
 def points_motion(

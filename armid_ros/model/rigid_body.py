@@ -22,7 +22,7 @@ import pinocchio as pin
 #: Inertial parameters of one link in Pinocchio's order: mass, first moments, inertia about the
 #: origin of the joint frame.
 LINK_PARAMETERS = ('m', 'mx', 'my', 'mz', 'Ixx', 'Ixy', 'Iyy', 'Ixz', 'Iyz', 'Izz')
-_LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
+LINK_UNITS = ('kg', 'kg m', 'kg m', 'kg m') + ('kg m^2',) * 6
 #: Random states that suffice for an arm of any length: each has a row for every joint.
 _MOST_STATES = 560
 
@@ -40,13 +40,13 @@ def rigid_parameter_names(robot: Robot) -> tuple[ParameterName, ...]:
     return tuple(
         ParameterName(f'{name}{number}', joint, unit)
         for number, joint in enumerate(robot.joints, start=1)
-        for name, unit in zip(LINK_PARAMETERS, _LINK_UNITS, strict=True)
+        for name, unit in zip(LINK_PARAMETERS, LINK_UNITS, strict=True)
     )
 
 
 def link_unit(name: str) -> tuple[str, ...]:
     """Return the unit of an inertial parameter such as 'mx2'; none of what is called otherwise."""
-    units = dict(zip(LINK_PARAMETERS, _LINK_UNITS, strict=True))
+    units = dict(zip(LINK_PARAMETERS, LINK_UNITS, strict=True))
     unit = units.get(name.rstrip('0123456789'))
     return () if unit is None else (unit,)
 

@@ -27,6 +27,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot, robot_from_urdf
 from armid_ros.robots.meshes import find_mesh
 import numpy as np
+import pinocchio as pin
 import scipy.linalg
 
 #: The least share of a body's pseudo-inertia, in any direction, that its own link keeps.
@@ -87,8 +88,12 @@ def export_urdf(
             for key, table in (('damping', damping or {}), ('friction', friction or {}))
             if joint.attributes['name'] in table
         }
-        if values:
-            _set_dynamics(document, joint, values)
+        element = joint.find('dynamics')
+        if element is not None:
+            document.set_attributes(element, values)
+        elif values:
+            row = ' '.join(f'{key}="{value}"' for key, value in values.items())
+            document.append(joint, [f'<dynamics {row}/>'])
     for element in document.root.all('ros2_control'):  # hosts and passwords of drives
         document.remove(element)
     _set_meshes(document, document.root, robot.path)
@@ -169,10 +174,11 @@ def _carriers(robot: Robot, root: Element) -> dict[str, int]:
 
 def _set_inertial(document: XmlText, link: Element, parameters: FloatArray) -> None:
     """Write ten parameters as mass, centre and inertia about it, in the axes of the link."""
-    mass, center, tensor = _central(parameters)
+    body = pin.Inertia.FromDynamicParameters(parameters)
+    tensor = body.inertia
     values = {
-        'origin': {'xyz': ' '.join(map(repr, center)), 'rpy': '0 0 0'},
-        'mass': {'value': repr(mass)},
+        'origin': {'xyz': ' '.join(map(repr, body.lever.tolist())), 'rpy': '0 0 0'},
+        'mass': {'value': repr(float(body.mass))},
         'inertia': {
             'ixx': repr(float(tensor[0, 0])),
             'ixy': repr(float(tensor[0, 1])),
@@ -200,25 +206,6 @@ def _set_inertial(document: XmlText, link: Element, parameters: FloatArray) -> N
             document.set_attributes(element, row)
     if missing:
         document.append(inertial, missing)
-
-
-def _central(parameters: FloatArray) -> tuple[float, list[float], FloatArray]:
-    """Return mass, centre of mass, and inertia about it, shape (3, 3)."""
-    mass = float(parameters[0])
-    center = parameters[1:4] / mass
-    ixx, ixy, iyy, ixz, iyz, izz = parameters[4:]
-    about_origin = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    shift = mass * (center @ center * np.eye(3) - np.outer(center, center))
-    return mass, [float(c) for c in center], about_origin - shift
-
-
-def _set_dynamics(document: XmlText, joint: Element, values: Mapping[str, str]) -> None:
-    element = joint.find('dynamics')
-    if element is not None:
-        document.set_attributes(element, values)
-        return
-    row = ' '.join(f'{key}="{value}"' for key, value in values.items())
-    document.append(joint, [f'<dynamics {row}/>'])
 
 
 def _set_meshes(document: XmlText, element: Element, urdf: Path | None) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from armid_ros.arm import ArmModel
 from armid_ros.diagnosis import Diagnosis
 from armid_ros.diagnosis.data.trajectory import Trajectory
-from armid_ros.effects.learned import as_effect, TorqueMap
+from armid_ros.effects.learned import LearnedTorque, TorqueMap
 from armid_ros.errors import IdentificationError
 from armid_ros.files.cells import csv_cell
 from armid_ros.motion import FloatArray
@@ -200,8 +200,8 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         return None
     found.sort(key=lambda one: -one.before)
     order = sorted(found, key=lambda one: base.robot.joints.index(one.joint))
-    effect = as_effect({one.joint: one.learned for one in order})
-    arm = base.with_effect(effect, np.ones(len(order)))
+    joints, maps = zip(*((one.joint, one.learned) for one in order), strict=True)
+    arm = base.with_effect(LearnedTorque(joints, maps=maps), np.ones(len(order)))
     return Residual(base, arm, tuple(found))
 
 

@@ -137,27 +137,6 @@ def rigid_body(robot: Robot, added_inertia: FloatArray, weighs: bool = True) -> 
     return _Structure(values, (joints, added))
 
 
-def dynamics(
-    arm: _Structure, q: FloatArray, dq: FloatArray, ddq: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Return what the kernel makes of one pose, to be compared with other engines.
-
-    Returns
-    -------
-    tau : ndarray, shape (n,)
-        Torques of the rigid body, without what is added to its inertia [N m].
-    inertia : ndarray, shape (n, n)
-        Inertia matrix, with it [kg m^2].
-
-    """
-    library, n = kernel(), len(q)
-    assert library is not None
-    arrays = [*map(_array, (q, dq, ddq)), np.empty(n), np.empty((n, n))]
-    library.dynamics(arm.address, *(array.ctypes.data for array in arrays))
-    return arrays[3], arrays[4]
-
-
 class CompiledLoop:
     """
     A plant and its controller, ready for the kernel; `of` returns None where it has no such steps.
@@ -179,7 +158,7 @@ class CompiledLoop:
         far = np.full(n, np.inf)
         lower, upper = (plant.robot.lower, plant.robot.upper) if plant.hard_stops else (-far, far)
         self._law_input, self._law_torque = np.empty(1 + 2 * n), np.empty(n)
-        self._torque, self._failure = plant.torque, list[BaseException]()
+        self._torque, self.failure = plant.torque, list[BaseException]()
         arrays = (
             _array(plant.damping),
             np.zeros(n) if plant.constant is None else _array(plant.constant),
@@ -236,14 +215,9 @@ class CompiledLoop:
         try:
             self._law_torque[:] = self._torque(t, q, dq)
         except BaseException as error:  # Ctrl-C too: nothing passes through C by itself
-            self._failure.append(error)
+            self.failure.append(error)
             return 1
         return 0
-
-    def raise_failure(self) -> None:
-        """Raise what the effects of the plant raised."""
-        if self._failure:
-            raise self._failure.pop()
 
 
 class CompiledRun:
@@ -284,5 +258,6 @@ class CompiledRun:
             self._last,
             *self._addresses,
         )
-        self._loop.raise_failure()
+        if self._loop.failure:
+            raise self._loop.failure.pop()
         return reached

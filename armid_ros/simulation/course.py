@@ -34,16 +34,12 @@ class Course:
     def __init__(self, robot: Robot, dt: float) -> None:
         self._robot = robot
         self._dt = dt
-        self.hold(np.zeros(robot.n_joints), 0)
+        self.follow(Reference(robot.joints, np.zeros(1), np.zeros((1, robot.n_joints))), 0)
 
     @property
     def ends_at(self) -> float:
         """Time at which the trajectory ends, or has ended [s]."""
         return self._start * self._dt + self._reference.duration
-
-    def hold(self, q: FloatArray, steps: int) -> None:
-        """Stay somewhere, (n,) [rad or m], from a step on."""
-        self.follow(Reference(self._robot.joints, np.zeros(1), q[np.newaxis]), steps)
 
     def follow(self, reference: Reference, steps: int) -> None:
         """Do what a reference says from a step on, wherever the arm is."""

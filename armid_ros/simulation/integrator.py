@@ -91,7 +91,10 @@ def _end_velocity(
     directions = contacts.directions
     right = np.empty((1 + len(directions), len(force)))
     right[0], right[1:] = force, directions
-    solution = dt * _solve(plant, inertia, right.T)
+    _, solution, failed = dposv(inertia, right.T, 0, 0, 1)
+    if failed:
+        raise NoBodyError(no_body(plant.robot))
+    solution = dt * solution
     dq_free, response = dq + solution[:, 0], solution[:, 1:]
     taken, modes = solve_box_complementarity(
         contacts.law, directions.dot(response), directions.dot(dq_free), modes
@@ -100,15 +103,6 @@ def _end_velocity(
     if 0 in modes:
         _clear_stuck(dq_next, contacts, modes)
     return dq_next, (dq_next - dq) / dt, modes
-
-
-def _solve(plant: Plant, inertia: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the inverse inertia times columns, which are written over."""
-    solution: FloatArray
-    _, solution, failed = dposv(inertia, right, 0, 0, 1)
-    if failed:
-        raise NoBodyError(no_body(plant.robot))
-    return solution
 
 
 def _clear_stuck(dq: FloatArray, contacts: Contacts, modes: Modes) -> None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects import Action, DryFriction, TorqueLaw
+from armid_ros.effects.action import sum_laws
 from armid_ros.errors import ModelError, TrajectoryError
 from armid_ros.motion import FloatArray, read_only
 from armid_ros.robots import Robot
@@ -175,7 +176,8 @@ class Plant:
         coupling = added - np.diag(np.diag(added))
         model = pin.Model(robot.model)
         model.armature = np.diag(added).copy()
-        springs, torque = None, _both(action.torque, action.link_torque)
+        springs = None
+        torque = sum_laws([law for law in (action.torque, action.link_torque) if law is not None])
         if self.elasticity is not None:
             directions, torque = friction.directions, action.torque
             springs = ElasticJoints.of(self.arm, self.elasticity, directions, mass, self.dt)
@@ -305,26 +307,10 @@ def limit_slack(robot: Robot) -> FloatArray:
     return np.asarray(LIMIT_TOLERANCE * np.where(np.isfinite(span), span, 1.0))
 
 
-def _both(motors: TorqueLaw | None, links: TorqueLaw | None) -> TorqueLaw | None:
-    """Add the torques of two sides that a rigid transmission makes one."""
-    if motors is None or links is None:
-        return motors or links
-
-    def torque(t: FloatArray, q: FloatArray, dq: FloatArray) -> FloatArray:
-        return np.asarray(motors(t, q, dq) + links(t, q, dq))
-
-    return torque
-
-
 def _damping_weight(robot: Robot, inertia: FloatArray, damping: FloatArray, dt: float) -> float:
-    """
-    Return the share of the end of a step in the velocity that damping acts on.
-
-    1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping; between them the
-    value that makes the fastest decay rate of the arm exact: 1 / (1 - exp(-z)) - 1 / z.
-    Source: Liniger and Willoughby 1970, exponential fitting.
-
-    """
+    """Return the share of the end of a step in the velocity that damping acts on."""
+    # 1/2 (second order) for weak damping, 1 (no overshoot) for stiff damping; between them the
+    # value that makes the fastest decay rate of the arm exact (Liniger and Willoughby 1970)
     try:
         rates = eigh((damping + damping.T) / 2, inertia, eigvals_only=True)
     except LinAlgError:

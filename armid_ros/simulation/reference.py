@@ -261,15 +261,7 @@ class Reference:
 def _polynomials(
     t: FloatArray, q: FloatArray, dq: FloatArray | None, ddq: FloatArray | None
 ) -> FloatArray:
-    """
-    Find the polynomials between waypoints, in u = (t - t_k) / (t_k+1 - t_k).
-
-    Returns
-    -------
-    ndarray, shape (6, K - 1, n)
-        Coefficients of u^0 to u^5.
-
-    """
+    """Return coefficients (6, K - 1, n) of u^0 to u^5, u = (t - t_k) / (t_k+1 - t_k)."""
     c = np.zeros((6, len(t) - 1, q.shape[1]))
     span = np.diff(t)[:, np.newaxis]
     way = np.diff(q, axis=0)

@@ -13,8 +13,6 @@ the velocity at the end, as where joints are rigid.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from armid_ros.motion import FloatArray
 from armid_ros.simulation.box_complementarity import Modes, solve_box_complementarity
 from armid_ros.simulation.plant import Plant, Rotors, State
@@ -22,14 +20,6 @@ from armid_ros.simulation.springs import ElasticJoints
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dgesv
-
-
-class _Middle(NamedTuple):
-    """The middle of a substep: links (n,), velocities of motors and links (e + n,), twists."""
-
-    q: FloatArray
-    v: FloatArray
-    twist: FloatArray
 
 
 def spring_substep(
@@ -41,9 +31,17 @@ def spring_substep(
     x = np.concatenate([rotors.twist, rotors.dq, state.dq])
     q = state.q + half * (state.dq + 0.5 * half * state.ddq)
     v = x[e:] + half * np.concatenate([rotors.ddq, state.ddq])
-    middle = _Middle(q, v, rotors.twist + half * springs.to_twists.dot(v))
-    force, memory = _force(plant, springs, state, torque, middle)
-    rates = _rates(plant, springs, middle, force)
+    twist = rotors.twist + half * springs.to_twists.dot(v)
+    force, memory = _force(plant, springs, state, torque, q, v, twist)
+    inertia = springs.rotors.copy()
+    inertia[e:, e:] += pin.crba(plant.robot.model, plant.data, q)
+    pull = springs.pull
+    if springs.loose:
+        pull, offset = springs.meshing(twist)
+        force = force + springs.to_twists.T.dot(offset)
+    # accelerations per twist and velocity, of what acts, and per torque of the dry friction
+    right = np.concatenate([pull.T, force[np.newaxis], springs.friction]).T
+    rates = np.asarray(dgesv(inertia, right, 0, 1)[2])
     after = _propagated(springs, rates, x)
     x_next, modes, rub = after[:, 0], state.modes, np.zeros(len(springs.friction))
     if modes:
@@ -63,24 +61,6 @@ def spring_substep(
     turned = Rotors(x_next[:e], x_next[e : 2 * e], dv[:e])
     q, dq, t = state.q + moved, x_next[2 * e :], state.t + dt
     return State(state.steps, t, q, dq, dv[e:], modes, memory, turned)
-
-
-def _rates(plant: Plant, springs: ElasticJoints, middle: _Middle, force: FloatArray) -> FloatArray:
-    """
-    Return accelerations of motors and links, shape (e + n, e + e + n + 1 + m).
-
-    Per twist and velocity, of what acts on them, and per torque of the dry friction.
-
-    """
-    e = len(springs.joints)
-    inertia = springs.rotors.copy()
-    inertia[e:, e:] += pin.crba(plant.robot.model, plant.data, middle.q)
-    pull = springs.pull
-    if springs.loose:
-        pull, offset = springs.meshing(middle.twist)
-        force = force + springs.to_twists.T.dot(offset)
-    right = np.concatenate([pull.T, force[np.newaxis], springs.friction]).T
-    return np.asarray(dgesv(inertia, right, 0, 1)[2])
 
 
 def _propagated(springs: ElasticJoints, rates: FloatArray, x: FloatArray) -> FloatArray:
@@ -103,10 +83,11 @@ def _force(
     springs: ElasticJoints,
     state: State,
     torque: FloatArray,
-    middle: _Middle,
+    q: FloatArray,
+    v: FloatArray,
+    twist: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return what acts on motors and links at the middle of a substep, and the new memory."""
-    q, v, twist = middle
     robot, action, e = plant.robot, plant.action, len(springs.joints)
     t = state.t + 0.5 * springs.dt
     motor_speed = springs.to_motors.dot(v)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from armid_ros.arm import ArmModel
 from armid_ros.effects import CATALOGUE, make_effect
 from armid_ros.effects.timing import earlier_samples
+from armid_ros.effects.unexplained import Unexplained
 from armid_ros.errors import ModelError
 from armid_ros.model import inverse_dynamics
 from armid_ros.motion import Motion
@@ -150,10 +151,16 @@ def test_below_its_level_a_drive_is_as_it_should_be(robot, motion, added):
     assert not np.any(added(motion, 'actuator_saturation', [0.8, 0.0], [1000.0]))
 
 
+def unexplained(motion):
+    """Return nothing that is left along a motion."""
+    q = motion.q
+    return Unexplained(motion, q, np.zeros_like(q), np.ones_like(q), np.zeros((*q.shape, 0)))
+
+
 def test_the_search_for_a_level_begins_at_the_torques_that_were_measured(robot, motion):
     torque = np.outer(np.linspace(-1.0, 1.0, len(motion)), np.arange(1.0, 7.0))
     effect = make_effect('actuator_saturation', robot)
-    (levels,) = effect.shape_grids(motion.with_torque(torque), ArmModel(robot))
+    (levels,) = effect.shape_starts(unexplained(motion.with_torque(torque)), ArmModel(robot))
     assert np.all(levels.max(axis=1) < np.arange(1.0, 7.0))
     assert np.all(levels.min(axis=1) > 0.25 * np.arange(1.0, 7.0))
 
@@ -179,7 +186,7 @@ def test_times_of_a_drift_go_with_the_length_of_a_recording(robot, sines):
     motion = sines()
     for factor in (1.0, 100.0):
         longer = replace(motion, t=factor * motion.t)
-        (grid,) = drift.shape_grids(longer, ArmModel(robot))
+        (grid,) = drift.shape_starts(unexplained(longer), ArmModel(robot))
         assert grid.shape == (1, 3)
         assert grid.max() == pytest.approx(3.0 * np.ptp(longer.t))
         assert grid.min() >= drift.shapes[0].lower

@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Springs of all kinds: on a joint, between joints, at the ends of the range, to the world."""
 
+from dataclasses import replace
+
 from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
-from armid_ros.model import LinkFrames, point_motion
-from armid_ros.motion import Motion
+from armid_ros.effects.tied import TiedInteraction
+from armid_ros.model import LinkFrames
+from armid_ros.model.spring_ties import Tie
+from armid_ros.motion import Motion, MovingPoints
 import numpy as np
 import pytest
-
-from tests.effects.recorded_point import RecordedPoint
 
 
 def closed_loop_path(robot, points=4000):
@@ -102,19 +104,25 @@ def pull(robot, joint, offset, motion, anchor, stiffness):
         ends = [
             stiffness
             / 2
-            * np.sum((point_motion(robot, joint, offset, q)[0] - anchor) ** 2, axis=1)
+            * np.sum((LinkFrames.of(robot, q).places(joint, offset) - anchor) ** 2, axis=1)
             for q in (motion.q + step, motion.q - step)
         ]
         torque[:, j] = (ends[0] - ends[1]) / 2e-6
     return torque
 
 
+def fixed_at(robot, effect, anchor, stiffness):
+    """Return the values of a spring from the elbow to a fixed point."""
+    middle = LinkFrames.in_the_middle(robot).places('elbow_pitch', effect.shape_values[0])[0]
+    return [stiffness, 0.0, *stiffness * (anchor - middle)]
+
+
 def test_a_spring_to_the_world_is_the_gradient_of_its_energy(robot, motion):
     effect = make_effect('human_interaction@elbow_pitch', robot).with_shape([0.05, 0.0, 0.1])
     anchor = np.array([0.3, 0.2, 0.4])
-    arm = ArmModel(robot).with_effect(effect, effect.fixed_at(robot, anchor, 400.0))
+    arm = ArmModel(robot).with_effect(effect, fixed_at(robot, effect, anchor, 400.0))
     torque = arm.torque(motion) - ArmModel(robot).torque(motion)
-    expected = pull(robot, 'elbow_pitch', [0.05, 0.0, 0.1], motion, anchor, 400.0)
+    expected = pull(robot, 'elbow_pitch', np.array([0.05, 0.0, 0.1]), motion, anchor, 400.0)
     np.testing.assert_allclose(torque, expected, atol=1e-5)
     assert not np.any(torque[:, 4:])
 
@@ -143,21 +151,10 @@ def test_without_slack_an_interface_is_a_spring(robot, motion):
     strap = make_effect('interface_slack@elbow_pitch', robot)
     strap = strap.with_shape([0.05, 0.0, 0.1, *anchor, 0.0])
     arms = (
-        ArmModel(robot).with_effect(spring, spring.fixed_at(robot, anchor, 400.0)),
+        ArmModel(robot).with_effect(spring, fixed_at(robot, spring, anchor, 400.0)),
         ArmModel(robot).with_effect(strap, [400.0]),
     )
     np.testing.assert_allclose(arms[0].torque(motion), arms[1].torque(motion), atol=1e-9)
-
-
-def test_many_straps_from_one_point_pull_as_each_of_them_does(robot, motion):
-    strap = make_effect('interface_slack@elbow_pitch', robot)
-    anchors, slacks = np.array([[0.3, 0.2, 0.4], [-0.5, 0.1, 0.2]]), np.array([0.0, 0.6])
-    together = strap.columns_of_straps(LinkFrames.of(robot, motion.q), anchors, slacks)
-    for k, (anchor, slack) in enumerate(zip(anchors, slacks, strict=True)):
-        own = strap.with_shape([*strap.shape[:3], *anchor, slack])
-        column = ArmModel(robot).columns_of(own, motion)[:, :, 0]
-        np.testing.assert_allclose(together[:, :, k], column, atol=1e-12)
-        assert np.any(column)
 
 
 def test_a_slack_strap_does_not_pull(robot, added, motion):
@@ -166,24 +163,21 @@ def test_a_slack_strap_does_not_pull(robot, added, motion):
 
 
 def test_two_chains_that_move_alike_do_not_pull_each_other(robot, motion):
-    """An anchor on a second arm, recorded; then the same arm a little behind."""
-    offset = [0.05, 0.0, 0.1]
-    effect = make_effect('human_interaction@elbow_pitch', robot).with_shape(offset)
-    other = RecordedPoint(robot, motion, 'elbow_pitch', offset)
-    tied = type(effect)(effect.joints, effect.shape, other)
-    arm = ArmModel(robot).with_effect(tied, [400.0, 10.0, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(arm.torque(motion), ArmModel(robot).torque(motion), atol=1e-9)
+    """A point of a second arm, recorded; then the same arm a little behind."""
+    elbow, offset = 'elbow_pitch', (0.05, 0.0, 0.1)
+    effect = TiedInteraction((elbow,), ties=(Tie('point', elbow, elbow, offset, offset),))
+    places, jacobian = LinkFrames.of(robot, motion.q).points([elbow], np.array([offset]))
+    velocity = np.einsum('nkxj,nj->nkx', jacobian, motion.dq)
+    beside = replace(motion, partner=MovingPoints(('point',), places, velocity))
+    arm = ArmModel(robot).with_effect(effect, [400.0, 10.0])
+    np.testing.assert_allclose(arm.torque(beside), ArmModel(robot).torque(motion), atol=1e-9)
 
-    behind = Motion(robot.joints, motion.t, motion.q - 0.01, motion.dq, motion.ddq)
-    slow = type(effect)(
-        effect.joints, effect.shape, RecordedPoint(robot, behind, 'elbow_pitch', offset)
-    )
-    position, jacobian = point_motion(robot, 'elbow_pitch', offset, motion.q)
-    way = position - point_motion(robot, 'elbow_pitch', offset, behind.q)[0]
-    arm = ArmModel(robot).with_effect(slow, [400.0, 0.0, 0.0, 0.0, 0.0])
-    expected = 400.0 * np.einsum('nxj,nx->nj', jacobian, way)
+    late = LinkFrames.of(robot, motion.q - 0.01).places(elbow, np.array(offset))[:, np.newaxis]
+    behind = replace(motion, partner=MovingPoints(('point',), late, velocity))
+    arm = ArmModel(robot).with_effect(effect, [400.0, 0.0])
+    expected = 400.0 * np.einsum('nkxj,nkx->nj', jacobian, places - late)
     np.testing.assert_allclose(
-        arm.torque(motion) - ArmModel(robot).torque(motion), expected, atol=1e-9
+        arm.torque(behind) - ArmModel(robot).torque(motion), expected, atol=1e-9
     )
 
 

@@ -6,7 +6,7 @@ from armid_ros.arm import ArmModel
 from armid_ros.effects import make_effect
 from armid_ros.robots import load_robot, robot_from_urdf
 from armid_ros.simulation import ComputedTorque, GravityPD, Plant, Reference, simulate
-from armid_ros.simulation.compiled import CompiledLoop, dynamics, kernel, rigid_body
+from armid_ros.simulation.compiled import CompiledLoop, kernel, rigid_body
 from armid_ros.simulation.controller import LinearFeedback
 import numpy as np
 import pinocchio as pin
@@ -68,7 +68,10 @@ def test_body_is_that_of_pinocchio(source):
     added = np.diag(rng.uniform(0.0, 0.1, body.n_joints))
     data, structure = body.model.createData(), rigid_body(body, added)
     for q, dq, ddq in rng.uniform(-2.0, 2.0, (20, 3, body.n_joints)):
-        tau, inertia = dynamics(structure, q, dq, ddq)
+        tau, inertia = np.empty_like(q), np.empty_like(added)
+        kernel().dynamics(
+            structure.address, *(array.ctypes.data for array in (q, dq, ddq, tau, inertia))
+        )
         expected = pin.rnea(body.model, data, q, dq, ddq)
         np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
         expected = pin.crba(body.model, data, q) + added

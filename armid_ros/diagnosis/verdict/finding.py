@@ -121,7 +121,7 @@ class Finding:
             return ''
         rival = self.rivals[0]
         kinds = [CATALOGUE[one] for one in (self.name, rival.name) if one in CATALOGUE]
-        carried = [kind for kind in kinds if kind.traits.comes_and_goes]
+        carried = [kind for kind in kinds if kind.traits.weighs]
         bodies = len(kinds) == 2 and all(kind.changes_body for kind in kinds)
         alike = set(self.joints) == set(rival.joints)
         own, other = (

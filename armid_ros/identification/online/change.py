@@ -137,7 +137,7 @@ def change_candidates(arm: ArmModel, base: BaseParameters) -> tuple[ChangeCandid
     several = {joint: columns for joint, columns in friction.items() if len(columns) > 1}
     found += [_candidate('friction', joint, base, columns) for joint, columns in several.items()]
     # a body that a link may hold; its parameters add to the link's own
-    for body in (kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.comes_and_goes):
+    for body in (kind.on(arm.robot) for kind in CATALOGUE.values() if kind.traits.weighs):
         columns, names = list(body.adds_to(arm.robot)), body.parameters(arm.robot)
         if columns:
             found.append(_candidate(body.name, body.joints[0], base, columns, names))

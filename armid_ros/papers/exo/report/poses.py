@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from armid_ros.model.kinematics import LinkFrames
+from armid_ros.model import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.papers.exo.plant.leg_pair import PairMotion, TiedPair
 from armid_ros.report.arm_drawing import flat, SIDE, Strip, svg_points
