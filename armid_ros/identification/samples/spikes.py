@@ -53,6 +53,8 @@ from scipy import stats
 FIRST = 20
 #: A sample goes on from others that are nearer by this factor than where the line leads.
 _NEARER = 0.5
+#: Periods without a sample after which one waits for the next, which may contradict its stamp.
+_LEAP = 1.5
 #: What is divided by is at least this.
 _TINY = 1e-300
 
@@ -140,10 +142,27 @@ class SpikeGate:
 
         """
         self.left_out = []
+        early, self._early, tail = self._early, None, self._tail
+        good: list[StreamSample] = []
+        if early is not None and tail is not None:
+            if tail.t < t < early.t:  # what goes on from before is kept, for there is more of it
+                self.rejected['out_of_order'] += 1
+            else:
+                good = self._take(early, floor)
+        ahead = 0.0 if self._tail is None else t - self._tail.t
+        if _LEAP * self._period < ahead <= self._max_gap * self._period < math.inf:
+            # something seems to be lost before it
+            self._early = StreamSample(t, x)
+            return good
+        return good + self._take(StreamSample(t, x), floor)
+
+    def _take(self, sample: StreamSample, floor: FloatArray | float) -> list[StreamSample]:
+        """Judge a sample whose stamp the next one does not contradict."""
         if self._known:
             self._last = self._known[1].x
-        x = x if self._last is None else unwrapped(x, self._last, self._turn)
-        sample = StreamSample(t, x)
+        if self._last is not None:
+            x = unwrapped(sample.x, self._last, self._turn)
+            sample = sample if x is sample.x else replace(sample, x=x)
         if not self._in_time(sample):
             return []
         if self._first is None:
@@ -208,6 +227,7 @@ class SpikeGate:
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
         self._off = self._limit = np.zeros(len(self._turn))
         self._stray: StreamSample | None = None
+        self._early: StreamSample | None = None
         self._period = np.inf
         self._quantile = 0.0
 
@@ -244,9 +264,7 @@ class SpikeGate:
         first = all_unwrapped(raw, self._turn)
         self._period = float(np.median(np.diff([s.t for s in first])))
         self._quantile = self._quantile_of(self._period)
-        missed = [
-            missed_by(first[k : k + 2], first[k + 2], self._period) for k in range(len(first) - 2)
-        ]
+        missed = self._lines_through(first)
         self._level.begin(missed, np.diff([s.x for s in first], axis=0), self._period)
         straight = [bool(np.all(self._off_by(m, floor) <= 1.0)) for m in missed]
         if not any(straight):  # or the noise is not what it was: it is learned anew
@@ -258,9 +276,7 @@ class SpikeGate:
         start = straight.index(True)
         first = first[:start] + all_unwrapped(raw[start:], self._turn)  # not from what is damaged
         self._known = first[start], first[start + 1]
-        if start:
-            off, limit = self._off_by(missed[0], floor), self._limits(missed[0], floor)
-            self._leave_out(Excursion(tuple(first[:start]), off, limit))
+        self._leave_out_ahead(first[:start], missed[0], floor)
         good = list(self._known)
         for sample in first[start + 2 :]:
             good += self._judge(sample, floor)
@@ -298,10 +314,28 @@ class SpikeGate:
         if 2 * self._went_on > self._max_gap:
             if len(self._held) > 1 and self._stepped(floor):
                 self._held[0] = replace(self._held[0], begins=True)
-            return self._accept(self._held)
+            return self._go_on(floor)
         self._leave_out(Excursion(tuple(self._held), self._off, self._limit), True)
         self._restart([])
         return []
+
+    def _go_on(self, floor: FloatArray | float) -> list[StreamSample]:
+        """Pass on the held samples, as they are real; damaged ones among them are judged again."""
+        held, self._held = self._held, []
+        missed = self._lines_through(held)
+        steady = ~self._pulsing
+        straight = [bool(np.all(self._off_by(one, floor)[steady] <= 1.0)) for one in missed]
+        if all(straight) or not any(straight):
+            return self._accept(held)
+        start = straight.index(True)
+        self._leave_out_ahead(held[:start], missed[0], floor)
+        held[start] = replace(held[start], begins=held[0].begins)
+        if all(straight[start:]):
+            return self._accept(held[start:])
+        good = self._accept(held[start : start + 2])
+        for sample in held[start + 2 :]:
+            good = good + self._judge(sample, floor)
+        return good
 
     def _goes_on(self, sample: StreamSample, off: FloatArray, floor: FloatArray | float) -> bool:
         """Return whether a sample goes on from what is held, as well as from what was before."""
@@ -362,6 +396,19 @@ class SpikeGate:
             self._known = self._known[1], sample
         self._level.settle(self._period)
         return samples
+
+    def _lines_through(self, samples: Sequence[StreamSample]) -> list[Missed]:
+        """Return the errors of each sample against the line through the two before."""
+        pairs = range(len(samples) - 2)
+        return [missed_by(samples[k : k + 2], samples[k + 2], self._period) for k in pairs]
+
+    def _leave_out_ahead(
+        self, samples: Sequence[StreamSample], missed: Missed, floor: FloatArray | float
+    ) -> None:
+        """Count samples, if any, ahead of the first ones that are in line."""
+        if samples:
+            off, limit = self._off_by(missed, floor), self._limits(missed, floor)
+            self._leave_out(Excursion(tuple(samples), off, limit))
 
     def _leave_out(self, excursion: Excursion, erratic: bool = False) -> None:
         """Count what is left out, by its reason."""

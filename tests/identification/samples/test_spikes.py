@@ -192,6 +192,17 @@ def test_a_stamp_from_elsewhere_costs_one_sample_and_a_new_clock_none():
     assert gate.rejected == {'stamp': 2}
 
 
+@pytest.mark.parametrize('ahead', [2, 5, 9])
+@pytest.mark.parametrize('where', [DAMAGED, COUNT - 3])
+def test_a_stamp_a_little_ahead_costs_its_own_sample_and_none_after_it(ahead, where):
+    t, x = stream(np.random.default_rng(19))
+    stamps = t.copy()
+    stamps[where] = t[where] + (ahead + 0.5) / RATE
+    gate, good = passed(stamps, x)
+    np.testing.assert_array_equal(good, np.delete(t, where))
+    assert gate.rejected.total() == 1
+
+
 def test_what_follows_nothing_is_left_out():
     rng = np.random.default_rng(9)
     t, x = stream(rng)
