@@ -264,7 +264,17 @@ class DiagnosisResult(ShownModel):
             rows,
             [*self._baseline(), *self.extras.sentences(self.core)],
             list(map(printed, self.extras.steps(self.core, model))),
+            self._then(),
         )
+
+    def _then(self) -> str:
+        """Return the command that follows."""
+        if self.verdict in ('bad_data', 'not_repeatable'):
+            return 'inspect'
+        if self.verdict in WORTH_A_MAP and self.residual is None:
+            return 'diagnose'
+        anew = self.core.doubt or self.core.harmful or self.verdict in WORTH_A_MAP
+        return 'identify' if anew else 'simulate'
 
     def _baseline(self) -> list[str]:
         sources = ', '.join(recording.source for recording in self.baseline)

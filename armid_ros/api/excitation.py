@@ -227,6 +227,7 @@ class ExcitationResult(Shown):
             heads=('joint', *(f'{name} used' for name in shares)),
             rows=rows,
             lines=self._of_run(),
+            then='simulate',
         )
 
     def _of_run(self) -> list[str]:

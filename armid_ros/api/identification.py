@@ -277,7 +277,15 @@ class IdentificationResult(ShownModel):
                 *(self._parameters() if every else ()),
             ),
             steps[:1],
+            self._then(steps[:1]),
         )
+
+    def _then(self, steps: Sequence[str]) -> str:
+        """Return the command that the next step names; of a good model that of its links."""
+        if self.grade == 'unusable':
+            return 'inspect'
+        named = (name for name in ('diagnose', 'excite') if f'armid {name}' in ''.join(steps))
+        return next(named, 'check')
 
     def _parameters(self) -> list[str]:
         """Return all parameters beside those of the description, a line each."""

@@ -93,6 +93,7 @@ class InspectionResult(Shown):
         from armid_ros.report.inspection_report import joint_heads, joint_rows, recording_facts
 
         heads, found = joint_heads(self.core), self.core
+        trial = None if found.trial is None or found.trial.refused else found.trial
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -107,6 +108,7 @@ class InspectionResult(Shown):
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),
+            then='identify' if trial and trial.grade != 'unusable' else 'inspect',
         )
 
 
@@ -233,7 +235,10 @@ class CheckResult(Shown):
         first, *others = headline(self.remarks, self.links)
         lines = [' '.join(others), *(one.text for one in self.remarks)]
         heads = HEADS[:3] if rows else ()
-        return Summary(first, '', heads, [row[:3] for row in rows], lines)
+        then = 'excite' if self.links is None else 'inspect' if self.links.fault else 'identify'
+        if any(one.weight == 'bad' for one in self.remarks):
+            then = 'check'
+        return Summary(first, '', heads, [row[:3] for row in rows], lines, then=then)
 
 
 @spelled

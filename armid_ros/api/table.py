@@ -47,6 +47,8 @@ class Summary:
         What stands below.
     steps : sequence of str
         What to do next.
+    then : str
+        Name of the command that does it; empty for none.
 
     """
 
@@ -56,6 +58,7 @@ class Summary:
     rows: Sequence[Sequence[str]] = ()
     lines: Sequence[str] = ()
     steps: Sequence[str] = ()
+    then: str = ''
 
     def text(self) -> str:
         """Return at most ten lines of 80 columns, and below them the next steps."""
@@ -71,10 +74,10 @@ class Summary:
         steps = [piece for line in self._next for piece in textwrap.wrap(line, WIDTH)]
         return '\n'.join([*title, *aligned(self.heads, rows, WIDTH), *below, *steps])
 
-    def full_text(self) -> list[str]:
-        """Return all of it, as the commands print it."""
+    def full_text(self, *below: str) -> list[str]:
+        """Return all of it, as the commands print it, with lines above the next steps."""
         table = aligned(self.heads, self.rows)
-        return [self._headline, *table, *filter(None, self.lines), *self._next]
+        return [self._headline, *table, *filter(None, self.lines), *below, *self._next]
 
     @property
     def _next(self) -> list[str]:

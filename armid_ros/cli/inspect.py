@@ -10,6 +10,9 @@ from armid_ros.cli import columns, parameters
 from armid_ros.cli.terminal import progress
 import click
 
+#: Ends of the names of files that describe a robot.
+_DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
+
 
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
 @click.argument('bag', type=click.Path(path_type=Path))
@@ -80,9 +83,15 @@ def inspect(
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
-@click.argument('robot_source', metavar='R', callback=parameters.with_packages)
+@click.argument('arguments', metavar='[R] [BAG]...', nargs=-1)
+@click.option(
+    '--robot',
+    'robot_source',
+    metavar='R',
+    shell_complete=parameters.completed,
+    help='The description, in place of the first argument.',
+)
 @parameters.packages
-@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     '--out',
     type=parameters.OutPath(file_okay=False, path_type=Path),
@@ -98,8 +107,8 @@ def inspect(
 @parameters.reading
 @parameters.as_json
 def check(
-    robot_source: str,
-    bags: tuple[Path, ...],
+    arguments: tuple[str, ...],
+    robot_source: str | None,
     out: Path | None,
     strict: bool,
     topic: str | None,
@@ -111,7 +120,8 @@ def check(
     """
     Check a URDF: alone, or against recordings.
 
-    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name.
+    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name. It is
+    left out where armid.toml names the robot.
 
     Without a recording: impossible inertias, densities of links with shapes, units of limits. With
     one: mass and centre of each link as described and as measured.
@@ -123,6 +133,9 @@ def check(
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
 
+    context = click.get_current_context()
+    robot_source, bags = _parted(context, robot_source, arguments)
+    context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CHECK, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
@@ -131,4 +144,25 @@ def check(
     origin = ResultOrigin(robot_source, '', provenance(source, seed=seed))
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
-        click.get_current_context().exit(3)
+        context.exit(3)
+
+
+def _parted(
+    context: click.Context, robot: str | None, arguments: tuple[str, ...]
+) -> tuple[str, tuple[Path, ...]]:
+    """Return the description and the recordings; that of armid.toml where none is typed."""
+    from armid_ros.robots import shipped_robots
+
+    typed = context.get_parameter_source('robot_source') is click.core.ParameterSource.COMMANDLINE
+    first = arguments[0] if arguments else ''
+    path = Path(first.split(' ')[0])
+    if (
+        not typed
+        and first
+        and (robot is None or path.suffix in _DESCRIPTIONS or first in shipped_robots())
+    ):
+        robot, arguments = first, arguments[1:]
+    if robot is None:
+        raise click.UsageError("Missing argument 'R', the description.")
+    source = parameters.with_packages(context, robot)
+    return source or '', tuple(map(Path, arguments))

@@ -11,6 +11,7 @@ from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
+from armid_ros.cli.following import following
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.cli.terminal import say
 from armid_ros.effects import make_effect
@@ -115,10 +116,12 @@ def deliver(
     if as_json:
         click.echo(json_text(document or result.document(origin)))
         return
-    for line in (summary or result.summary()).full_text():
+    shown = summary or result.summary()
+    files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
+    for line in shown.full_text(*files):
         say(line)
-    if staged is not None:
-        say(f'{staged.out}: {", ".join(result.files)}')
+    if shown.then:
+        say(f'next: {following(shown.then, result)}')
 
 
 def read_settings() -> ReadSettings:

@@ -136,13 +136,13 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         'robot_source',
         metavar='R',
         shell_complete=completed,
-        callback=with_packages,
+        callback=lambda context, _, source: with_packages(context, source),
         **values,
     )
     return lambda command: source(packages(command))
 
 
-def with_packages(context: click.Context, _: click.Parameter, source: str | None) -> str | None:
+def with_packages(context: click.Context, source: str | None) -> str | None:
     """Write packages behind the path of a description, where any program takes them."""
     written = []
     for text in context.meta.get(PACKAGES, []):
