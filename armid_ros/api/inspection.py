@@ -90,7 +90,12 @@ class InspectionResult(Shown):
 
     def summary(self) -> Summary:
         """Return the verdict, the joints, what was remarked, and how it was sampled."""
-        from armid_ros.report.inspection_report import joint_heads, joint_rows, recording_facts
+        from armid_ros.report.inspection_report import (
+            inspection_word,
+            joint_heads,
+            joint_rows,
+            recording_facts,
+        )
 
         heads, found = joint_heads(self.core), self.core
         trial = None if found.trial is None or found.trial.refused else found.trial
@@ -101,6 +106,7 @@ class InspectionResult(Shown):
         ]
         return Summary(
             f'{found.recording.source}: {found.verdict}',
+            inspection_word(found),
             heads=heads[:4] + heads[7:],
             rows=[row[:4] + row[7:] for row in joint_rows(found)],
             lines=(
@@ -228,17 +234,25 @@ class CheckResult(Shown):
         return description_check_report(name, self.remarks, self.links, origin.provenance)
 
     def summary(self) -> Summary:
-        """Return the finding, and the links."""
-        from armid_ros.report.inspection_report import headline, HEADS, link_rows
+        """Return the finding, and the links: what was measured where any of them is wrong."""
+        from armid_ros.report.inspection_report import check_word, headline, HEADS, link_rows
 
-        rows = [] if self.links is None else link_rows(self.links)
-        first, *others = headline(self.remarks, self.links)
-        lines = [' '.join(others), *(one.text for one in self.remarks)]
-        heads = HEADS[:3] if rows else ()
-        then = 'excite' if self.links is None else 'inspect' if self.links.fault else 'identify'
+        links = self.links
+        wrong = links is not None and not np.isnan(links.measured_mass).all()
+        columns = slice(None) if wrong else slice(0, 4, 2)
+        rows = (
+            []
+            if links is None
+            else [(links.links[k], *row[1:5][columns]) for k, row in enumerate(link_rows(links))]
+        )
+        first, *others = headline(self.remarks, links)
+        lines = [*others, *(one.text for one in self.remarks)]
+        heads = (HEADS[0], *HEADS[1:5][columns]) if rows else ()
+        then = 'excite' if links is None else 'inspect' if links.fault else 'identify'
         if any(one.weight == 'bad' for one in self.remarks):
             then = 'check'
-        return Summary(first, '', heads, [row[:3] for row in rows], lines, then=then)
+        word = check_word(self.remarks, links)
+        return Summary(first, word, heads, rows, lines, then=then)
 
 
 @spelled

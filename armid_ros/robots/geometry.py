@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
@@ -154,6 +154,13 @@ def collision_geometry(
             place = shape.placement * pin.SE3(np.eye(3), np.array([0.0, 0.0, along]))
             geometry.addGeometryObject(pin.GeometryObject(name, joint, shape.frame, place, body))
     return geometry, notes
+
+
+def all_in_one(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return notes on meshes as one, with their count and the first; none for none."""
+    if len(notes) < 2:
+        return tuple(notes)
+    return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:
