@@ -30,6 +30,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.tables import is_table, TablePlan
+from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,
     inertia_doubts,
@@ -118,10 +119,26 @@ def deliver(
         return
     shown = summary or result.summary()
     files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
-    for line in shown.full_text(*files):
-        say(line)
+    show(shown, *files)
     if shown.then:
         say(f'next: {following(shown.then, result)}')
+
+
+def show(summary: Summary, *below: str) -> None:
+    """Print a summary, the verdict first, with lines above the next steps."""
+    for line in summary.full_text(*below):
+        say(line)
+
+
+def show_verdict(
+    verdict: VerdictSection,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *below: str,
+) -> None:
+    """Print the verdict of a page, and a table."""
+    first, *others = verdict.sentences
+    show(Summary(first, verdict.grade, heads, rows, [*others, *verdict.beware]), *below)
 
 
 def read_settings() -> ReadSettings:

@@ -76,12 +76,13 @@ def springs_report(found: Sequence[SpringEstimate], robot: str, provenance: Prov
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [_verdict(found), _springs(found), Origin(provenance)]
+    sections: list[Section] = [verdict(found), _springs(found), Origin(provenance)]
     subtitle = f'{robot} · {counted(len(found), "joint")}, encoders on both sides'
     return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 
 
-def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
+def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
+    """Say how many springs were found, and which is the softest."""
     told = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
     beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
@@ -95,7 +96,7 @@ def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     softest = min(told, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [
-        f'{counted(len(told), "joint")} of {len(found)} show how stiff they are; the softest is '
+        f'Stiffness of {len(told)} of {counted(len(found), "joint")} found; the softest is '
         f'{softest.joint} with {value:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %).'
     ]
     loose = [one.joint for one in told if one.transmission.backlash_seen]
