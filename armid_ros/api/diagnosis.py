@@ -23,7 +23,14 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
+from armid_ros.api.table import (
+    data_frame,
+    DEFAULT_ORIGIN,
+    residual_frame,
+    ResultOrigin,
+    ShownModel,
+    Summary,
+)
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -150,6 +157,32 @@ class DiagnosisResult(ShownModel):
             'with them': (t, shown.measured - shown.after),
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
+
+    def residual_table(self) -> pandas.DataFrame:
+        """
+        Return what the model with the named effects leaves of the torque as a pandas table.
+
+        Columns are recording, t [s], and every joint [N m or N].
+
+        Raises
+        ------
+        IdentificationError
+            If the data were refused, so that there is no residual.
+
+        """
+        if self.core.gap is None:
+            raise IdentificationError(f'no residual: {self.core.summary}')
+        return residual_frame(
+            self.description.robot.joints,
+            [
+                (
+                    one.source,
+                    one.trajectory.motion.t[one.trajectory.rows],
+                    one.measured - one.after,
+                )
+                for one in self.core.gap.overlays
+            ],
+        )
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return what was named as a pandas table, a row a parameter."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
+    describes_robot,
     read_all_joints,
     RecordingLike,
     recordings_of,
@@ -21,6 +22,8 @@ from armid_ros.api.arguments import (
 )
 from armid_ros.api.identification import identify
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.arm import ArmModel
+from armid_ros.errors import RecordingError
 from armid_ros.inspection import (
     check_links,
     description_remarks,
@@ -54,7 +57,7 @@ class InspectionResult(Shown):
     Examples
     --------
     >>> import armid_ros as ar
-    >>> found = ar.inspect('monday', 'my_arm.urdf')
+    >>> found = ar.inspect('my_arm.urdf', 'monday')
     >>> found.report('inspection.html').name
     'inspection.html'
 
@@ -120,8 +123,8 @@ class InspectionResult(Shown):
 
 @spelled
 def inspect(
-    recording: RecordingLike,
-    robot: RobotLike | None = None,
+    robot: RobotLike | RecordingLike | None = None,
+    recording: RecordingLike | RobotLike | None = None,
     *,
     topics: tuple[Topic, ...] | None = None,
     rng: Rng = 0,
@@ -131,10 +134,10 @@ def inspect(
 
     Parameters
     ----------
-    recording : Recording or path
-        A bag or a table.
     robot : model, robot, name or path, optional
         With it limits and units are checked, and an identification is tried.
+    recording : Recording or path
+        A bag or a table; the only argument where there is no robot.
     topics : tuple of Topic, optional
         All topics of the bag; read from it by default where no robot is given.
     rng : int or Generator
@@ -153,10 +156,16 @@ def inspect(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> ar.inspect('monday', 'my_arm.urdf').remarks
+    >>> ar.inspect('my_arm.urdf', 'monday').remarks
     ()
 
     """
+    if recording is None or describes_robot(recording):  # alone, or in the order of before
+        robot, recording = recording, robot
+    if recording is None or isinstance(recording, Robot | ArmModel):
+        raise RecordingError('no recording: give the path of a bag or a table, or a Recording')
+    if isinstance(robot, Recording):
+        raise RecordingError('two recordings: give a robot and a recording')
     described = None if robot is None else robot_of(robot)
     if described is not None:
         (read,) = recordings_of(recording, described)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 import textwrap
@@ -16,8 +16,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text, result_folder, staged, write_file
+from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 from markupsafe import escape
+import numpy as np
 
 if TYPE_CHECKING:
     from armid_ros.report.provenance import Provenance
@@ -114,6 +116,8 @@ class ResultOrigin:
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 
+#: Source of a recording, times [s] and residual torques [N m or N], shapes (M,) and (M, n).
+ResidualPart = tuple[str, FloatArray, FloatArray]
 #: Shipped names and paths, without provenance.
 DEFAULT_ORIGIN = ResultOrigin()
 
@@ -125,6 +129,14 @@ def data_frame(rows: Any) -> pandas.DataFrame:
     except ModuleNotFoundError:
         raise ArmidError('a table needs pandas: pip install pandas') from None
     return DataFrame(rows)
+
+
+def residual_frame(joints: Sequence[str], parts: Iterable[ResidualPart]) -> pandas.DataFrame:
+    """Return residual torques as a pandas table: recording, t, and a column for each joint."""
+    names, times, residuals = zip(*parts, strict=True)
+    columns = dict(zip(joints, np.concatenate(residuals).T, strict=True))
+    sources = np.repeat(names, [len(t) for t in times])
+    return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
 
 
 class Shown(ABC):
@@ -176,8 +188,12 @@ class Shown(ABC):
         return self.summary().text()
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the report, in a frame of its own."""
-        return f'<iframe srcdoc="{escape(self.page())}" width="100%" height="640"></iframe>'
+        """Return what a notebook shows: the report, in a frame of its own; else what prints."""
+        try:
+            page = self.page()
+        except ArmidError:  # a plan without a trajectory has no page
+            return f'<pre>{escape(repr(self))}</pre>'
+        return f'<iframe srcdoc="{escape(page)}" width="100%" height="640"></iframe>'
 
 
 class ShownModel(Shown):

@@ -10,9 +10,6 @@ from armid_ros.cli import columns, parameters
 from armid_ros.cli.terminal import progress
 import click
 
-#: Ends of the names of files that describe a robot.
-_DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
-
 
 @click.command(epilog='Example: armid inspect run.mcap --robot ur10.urdf --out look')
 @click.argument('bag', type=click.Path(path_type=Path))
@@ -77,7 +74,7 @@ def inspect(
         else:
             (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
-        found = run(recording, robot, topics=topics, rng=seed)
+        found = run(robot, recording, topics=topics, rng=seed)
     origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
     options.deliver(found, staged, origin, as_json)
 
@@ -151,17 +148,12 @@ def _parted(
     context: click.Context, robot: str | None, arguments: tuple[str, ...]
 ) -> tuple[str, tuple[Path, ...]]:
     """Return the description and the recordings; that of armid.toml where none is typed."""
-    from armid_ros.robots import shipped_robots
+    from armid_ros.api.arguments import describes_robot
 
     typed = context.get_parameter_source('robot_source') is click.core.ParameterSource.COMMANDLINE
-    first = arguments[0] if arguments else ''
-    path = Path(first.split(' ')[0])
-    if (
-        not typed
-        and first
-        and (robot is None or path.suffix in _DESCRIPTIONS or first in shipped_robots())
-    ):
-        robot, arguments = first, arguments[1:]
+    if arguments and not typed and (robot is None or describes_robot(arguments[0])):
+        robot, *others = arguments
+        arguments = tuple(others)
     if robot is None:
         raise click.UsageError("Missing argument 'R', the description.")
     source = parameters.with_packages(context, robot)

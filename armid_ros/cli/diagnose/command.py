@@ -72,7 +72,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
     help="Share of a joint's torque (rms) below which an effect does not matter.",
 )
 @click.option(
-    '--all', 'everything', is_flag=True, help='Add effects to the model that do not matter, too.'
+    '--everything', is_flag=True, help='Add effects to the model that do not matter, too.'
 )
 @click.option(
     '--prior',
