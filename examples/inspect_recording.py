@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Look at a recording before anything is believed: gaps, units, what identify would refuse."""
+"""Look at a recording before it is used: gaps, units, what identify would refuse."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -15,7 +15,7 @@ URDF = Path(__file__).with_name('arm.urdf')
 
 
 class Identifier(Node):
-    """Says every second what it knows of the friction of each joint."""
+    """Prints the estimate of the friction of each joint every second."""
 
     def __init__(self, urdf=URDF, **settings):
         super().__init__('identifier', **settings)

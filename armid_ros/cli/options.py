@@ -208,7 +208,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     if not np.allclose(asked, own):
         told, known = (','.join(f'{part:g}' for part in vector) for vector in (asked, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, and --gravity says {told}: leave --gravity out, or '
+            f'{path}: its gravity is {known}, and --gravity is {told}: leave --gravity out, or '
             'write that gravity into the file if the arm stands there now'
         )
     return arm

@@ -64,7 +64,7 @@ effects = click.option(
     show_default=True,
     metavar='E,...',
     shell_complete=completed,
-    help="Effects beside the rigid body; 'E@joint+joint' for some joints only.",
+    help="Effects added to the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
     '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'

@@ -21,8 +21,8 @@ from armid_ros.recording import Recording
 import numpy as np
 
 _UNUSABLE = (
-    'The model was unusable when it was identified, as identification.json beside it says: what '
-    'it leaves is no measure of what has changed.'
+    'The model was unusable when it was identified (see its identification.json): its residual is '
+    'no measure of a change.'
 )
 
 

@@ -173,7 +173,7 @@ class BagPlayerNode(ArmidNode):
         NodeParameter(
             'state_timeout',
             0.5,
-            'Age at which a joint state says nothing any more.',
+            'Age at which a joint state is out of date.',
             's',
             lower=0.01,
             upper=60.0,

@@ -130,7 +130,7 @@ class SimulatedArmNode(ArmidNode):
             'real_time_factor',
             1.0,
             'Simulated time per real time, if the computer can; who cannot follow loses '
-            'messages. 0: moves only when told.',
+            'messages. 0: moves only on request.',
             lower=0.0,
             upper=1000.0,
             read_only=False,

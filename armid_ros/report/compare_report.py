@@ -70,7 +70,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
         *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
-        ContentSection('What was asked', [FactList(facts)]),
+        ContentSection('Input', [FactList(facts)]),
         Origin(provenance or Provenance()),
     ]
     robot = robot_label(comparison.after.robot)

@@ -243,7 +243,7 @@ def _asked(
             f'{counted(settings.starts, "start")}, at most {settings.iterations} iterations each',
         ),
     ]
-    return ContentSection('What was asked', [FactList(facts)])
+    return ContentSection('Input', [FactList(facts)])
 
 
 def _numbers(values: FloatArray) -> str:

@@ -64,7 +64,7 @@ print(f'{100 * np.mean(inside):.0f} % of {len(inside)} intervals of 95 % hold th
 # ## When the claim is void
 #
 # The claim takes the model as right. Leave out the Coulomb friction, which is there, and the
-# intervals of the viscous friction miss by far. The residual says so: it goes with the direction
+# intervals of the viscous friction miss by far. The residual shows it: it goes with the direction
 # of motion.
 
 # %%

@@ -136,7 +136,7 @@ def diagnose(
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
-        raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
+        raise click.UsageError('give --baseline or --no-baseline, not both')
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel

@@ -97,7 +97,7 @@ AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
 #: The description says nothing of this arm: friction and drives take all there is.
 WITHOUT_BODY = Hypothesis(
     'body',
-    'the description says nothing of the torques',
+    'the description does not explain the torques',
     body=lambda robot: robot.with_inertias(np.zeros_like(robot.rigid_parameters)),
     values=0,
 )

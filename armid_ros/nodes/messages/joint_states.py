@@ -26,7 +26,7 @@ DISTURBANCES = {
     'impossible': 'joint states with numbers that no arm has are left out',
     'stamp': 'joint states whose stamp alone is off are left out',
     'erratic': 'joint states that follow neither those before nor each other are left out',
-    'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
+    'no_velocity': 'joint states without velocity are left out: measured_velocity requires it',
     'jump_back': 'joint states jump back in time: what is made of them begins anew',
     'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
     'begin anew',

@@ -70,7 +70,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'effects',
         list(USUAL_EFFECTS),
-        'Effects that are to be seen, beside the rigid body.',
+        'Effects to excite, with the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', lower=0.0, upper=1.0),
     NodeParameter(
@@ -111,8 +111,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'action',
         '',
-        'Name of the action; empty: follow_joint_trajectory beside the topic joint_trajectory, '
-        'where that is remapped to.',
+        'Name of the action; empty: follow_joint_trajectory in the namespace of the topic '
+        'joint_trajectory.',
     ),
     NodeParameter(
         'goal_tolerance',

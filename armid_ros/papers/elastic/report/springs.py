@@ -48,8 +48,9 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
     text = (
         'The twist of each motor against its link, over what the rigid body takes there: inertia, '
-        'gravity and the interaction of all links included. Compliance and free play are told '
-        'apart where the load changes sides; a correlation near ±1 says that they are not.'
+        'gravity and the interaction of all links included. Compliance and free play are '
+        'distinguishable where the load changes sides; a correlation near ±1 means they '
+        'are not.'
     )
     hint = (
         'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
