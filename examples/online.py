@@ -38,7 +38,7 @@ class Identifier(Node):
             estimate.parameters, estimate.values, estimate.std, strict=True
         ):
             if not name.rigid:
-                self.get_logger().info(f'{name.name} {name.joint} {value:.3f} +- {std:.3f}')
+                self.get_logger().info(f'{name.name} {name.joint} {value:.3f} ± {std:.3f}')
 
 
 if __name__ == '__main__':

@@ -53,7 +53,7 @@ from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras
-from armid_ros.report.notation import printed
+from armid_ros.report.notation import pretty
 from armid_ros.report.sections.diagnosed import named_rows
 from armid_ros.residual import (
     learn_residual,
@@ -71,6 +71,8 @@ if TYPE_CHECKING:
     import pandas
 
 _Made = TypeVar('_Made')
+#: Rows that a command prints without --all.
+_ROWS = 6
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -287,16 +289,18 @@ class DiagnosisResult(ShownModel):
     def _with_notes(self, *notes: str) -> DiagnosisResult:
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
-    def summary(self, model: str = MODEL) -> Summary:
+    def summary(self, model: str = MODEL, every: bool = True) -> Summary:
         """Return the verdict, values that are not zero, notes, and steps with a model's path."""
-        rows = named_rows(self.core.findings, certain=True)
+        rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
+        if not every and len(rows) > _ROWS + 1:
+            rows[_ROWS:] = [(f'... and {len(rows) - _ROWS} more: --all, or report.html',)]
         return Summary(
-            printed(self.core.summary),
+            pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
             [*self._baseline(), *self.extras.sentences(self.core)],
-            list(map(printed, self.extras.steps(self.core, model))),
+            list(map(pretty, self.extras.steps(self.core, model))),
             self._then(),
         )
 

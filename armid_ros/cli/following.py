@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from itertools import chain, count
 from pathlib import Path
 import shlex
@@ -18,6 +19,7 @@ from armid_ros.api.table import Shown
 from armid_ros.cli import columns
 from armid_ros.cli.commands import TYPED
 from armid_ros.diagnosis import EXPERIMENT_FILE
+from armid_ros.errors import ModelError
 from armid_ros.identification.identified_from import identified_from
 import click
 
@@ -97,13 +99,13 @@ def _subject(
 def _compared(result: ComparisonResult, then: str) -> tuple[str | Path, list[Path], list[Any]]:
     """Return robot, recordings and options of what follows a comparison."""
     before, after = (Path(one.source) for one in (result.core.before, result.core.after))
-    found = [identified_from(after)]
     model = before.with_name('model.yaml')
     more = ['--model', model] if then == 'diagnose' and model.exists() else []
-    if not more:
-        found.insert(0, identified_from(before))
-    bags = list(dict.fromkeys(chain.from_iterable(found)))
-    return result.core.after.robot, bags or [Path('BAG')], more
+    bags: list[Path] = []
+    for source in [after] if more else [before, after]:
+        with suppress(ModelError):  # it does not name its recordings
+            bags += identified_from(source)
+    return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
 
 
 def _each(option: str, values: Iterable[Any]) -> Iterator[Any]:

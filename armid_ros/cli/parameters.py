@@ -115,9 +115,7 @@ seed = click.option(
     show_default=True,
     help='Random seed.',
 )
-every = click.option(
-    '--all', 'every', is_flag=True, help='Print all values, not those of the joints alone.'
-)
+every = click.option('--all', 'every', is_flag=True, help='Print all values.')
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
 

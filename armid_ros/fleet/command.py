@@ -272,7 +272,7 @@ def diagnose(
     from armid_ros.fleet.diagnose import cases, diagnose_fleet
     from armid_ros.fleet.pages import write_pages
     from armid_ros.fleet.watch import watch_fleet, write_watch
-    from armid_ros.report.notation import printed
+    from armid_ros.report.notation import pretty
 
     rows: list[dict[str, Any]] = []
     with _results(out, 'reading results') as (store, tick):
@@ -300,5 +300,5 @@ def diagnose(
         else 'No arm changed; --arm or --all name others.'
     )
     lines = [f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}' for row in rows]
-    _print_shown(list(map(printed, lines)), f'{out}/reports')
+    _print_shown(list(map(pretty, lines)), f'{out}/reports')
     say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')

@@ -111,6 +111,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @parameters.joints
 @parameters.seed
 @parameters.reading
+@parameters.every
 @parameters.as_json
 def diagnose(
     bags: tuple[Path, ...],
@@ -130,6 +131,7 @@ def diagnose(
     partner_topic: str | None,
     ties: tuple[str, ...],
     seed: int,
+    every: bool,
     as_json: bool,
     priors: tuple[str, ...],
     **asked: Any,
@@ -186,7 +188,7 @@ def diagnose(
         staged.keep()
         result = result.with_extras(residual is not None, seed, tick)
         tick(1.0, 'writing')
-        summary = result.summary(str(out / 'model.yaml'))
+        summary = result.summary(str(out / 'model.yaml'), every)
         options.deliver(result, staged, origin, as_json, summary)
     stopped = {'bad_data': 2, **({'unknown': 3, 'not_repeatable': 3} if strict else {})}
     click.get_current_context().exit(stopped.get(result.verdict, 0))

@@ -164,8 +164,8 @@ def _described_friction(arm: ArmModel) -> list[str]:
     if not stated:
         return []
     return [
-        f'the description states friction of {", ".join(stated)} in <dynamics>, which the model '
-        'does not have: it is looked for like any other; give a model that has it'
+        f'friction in <dynamics> of the description is not in the model ({", ".join(stated)}); '
+        'use a model with friction'
     ]
 
 

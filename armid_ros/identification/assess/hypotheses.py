@@ -165,7 +165,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
     return Hypothesis(
         'delay',
         f'the torque seems to come about {1e3 * abs(seconds):.0f} ms {side} than the '
-        f'position (+- {np.ceil(1e3 * half_width):.0f} ms): stamp both alike',
+        f'position (± {np.ceil(1e3 * half_width):.0f} ms): stamp both alike',
         lambda motion: shifted(motion, seconds),
     )
 
