@@ -95,7 +95,7 @@ def _changed(
         return ''
     return (
         f'In the baseline the model leaves {times[worst]:.1f} times as much in '
-        f'{arm.robot.joints[worst]} as when it was identified: it is not what the model was '
+        f'{arm.robot.joints[worst]} as when it was identified. It is not what the model was '
         'identified from, or something had changed by then.'
     )
 

@@ -83,7 +83,7 @@ class KnownPayload:
             payload = None
         if payload is None or not bag or not link or not 0.0 < payload.mass < np.inf:
             raise IdentificationError(
-                f"--payload '{text}' has to be BAG=KG@LINK, or BAG=KG@LINK:X,Y,Z with its centre "
+                f"--payload '{text}' has to be BAG=KG@LINK or BAG=KG@LINK:X,Y,Z, with its centre "
                 'of mass in the frame of the link [m]'
             )
         return bag, payload

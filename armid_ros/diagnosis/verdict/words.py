@@ -246,7 +246,7 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
     text = (
         f'Equal periods differ in {", ".join(joints)} by more than noise, and not with time or '
-        'velocity: something acts that does not repeat, such as contact or a person. '
+        'velocity. Something acts that does not repeat, such as contact or a person. '
     )
     if findings:
         names = ', '.join(finding.name.replace('_', ' ') for finding in findings)

@@ -103,9 +103,9 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'interface',
         'auto',
-        'How trajectories are sent: as goals of the action, which needs the package control_msgs; '
-        'by topic, which no controller answers; auto: by the action where there is one when the '
-        'run begins.',
+        'How trajectories are sent. action: as goals, which needs the package control_msgs. '
+        'topic: no controller answers. auto: by the action where there is one when the run '
+        'begins.',
         choices=('auto', 'topic', 'action'),
     ),
     NodeParameter(
@@ -194,9 +194,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'effort_factor',
         3.0,
-        'The arm is stopped when the effort of a joint is, three times in a row, larger by this '
-        'factor than what is foreseen for the run and than 10 % of its limit; 0: never, the '
-        'default in a simulation.',
+        'Factor over the planned effort of a joint, and over 10 % of its limit, at which the '
+        'arm is stopped after three samples. 0: never, the default in a simulation.',
         lower=0.0,
         upper=1000.0,
         read_only=False,

@@ -114,8 +114,8 @@ def identify_elastic(
     if not planar_pair(robot):
         if data.demo or data.steps:
             raise RobotError(
-                f'{robot.name} is no pair of links that move in a horizontal plane: --demo and '
-                '--steps are for such; without them its springs are found joint by joint'
+                f'{robot.name} is no pair of links that move in a horizontal plane, as --demo and '
+                '--steps need. Without them its springs are found joint by joint'
             )
         identify_springs(data.bags, robot, data.robot, data.model, out, seed, as_json)
         return
