@@ -58,7 +58,7 @@ def inspect(
     staged = None if out is None else options.stage(out, SCHEMA, robot_source or '')
     robot = None
     if robot_source is not None:
-        robot = options.open_robot(robot_source, gravity, joints, [bag])
+        robot = options.open_robot(robot_source, gravity, joints, [bag], tell=False)
     topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:

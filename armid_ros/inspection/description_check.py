@@ -19,10 +19,10 @@ from itertools import product
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import Identification, Score
-from armid_ros.inspection.inspect import Remark, worst_first
+from armid_ros.inspection.inspect import notes_on, Remark, worst_first
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
-from armid_ros.robots import driven_in_words, held_joints, inertia_doubts, NO_MASS, Robot
+from armid_ros.robots import inertia_doubts, NO_MASS, Robot
 from armid_ros.robots.description import MOVABLE, parse_xml
 from armid_ros.robots.geometry import all_in_one, collision_geometry
 import numpy as np
@@ -114,9 +114,7 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
     found = [*(Remark('bad', text) for text in inertia_doubts(robot)), *_of_limits(robot)]
     found += [*_of_axes(robot), *_of_shapes(robot)]
     known = {remark.text for remark in found}
-    known |= {f"joint '{joint.name}'" for joint in held_joints(robot)}  # named together
-    notes = dict.fromkeys([*driven_in_words(robot), *robot.notes])
-    others = [note for note in notes if known.isdisjoint((note, note.partition(': not')[0]))]
+    others = [note for note in notes_on(robot) if note not in known]
     return worst_first([*found, *(Remark('note', note) for note in others)])
 
 

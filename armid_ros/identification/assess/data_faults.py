@@ -163,8 +163,9 @@ def _described_friction(arm: ArmModel) -> list[str]:
     ]
     if not stated:
         return []
+    where = ', '.join(stated) if len(stated) < 4 else f'{len(stated)} joints'
     return [
-        f'friction in <dynamics> of the description is not in the model ({", ".join(stated)}); '
+        f'friction in <dynamics> of the description is not in the model ({where}); '
         'use a model with friction'
     ]
 
