@@ -6,13 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from pathlib import Path
-from typing import Any, Literal, TYPE_CHECKING, TypeGuard, TypeVar
+from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
 from armid_ros.api.arguments import (
     arm_of,
-    is_model,
     Progress,
     RecordingLike,
     recordings_of,
@@ -23,6 +21,7 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
+from armid_ros.api.since import misfit_of, recordings_since
 from armid_ros.api.table import (
     data_frame,
     DEFAULT_ORIGIN,
@@ -47,8 +46,6 @@ from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
-from armid_ros.identification.identified_from import identified_from, require_as_identified
-from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
@@ -403,12 +400,12 @@ def diagnose(
     looked_at = some_recordings_of(recordings, model.robot)
     held_out = recordings_of(validate, model.robot)
     if baseline is None:
-        before = _since(arm, model, [*looked_at, *held_out])
+        before = recordings_since(arm, model, [*looked_at, *held_out])
     else:
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
-    misfit = misfit or _misfit_of(arm, model)
+    misfit = misfit or misfit_of(arm, model)
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
         material=material,
@@ -437,35 +434,6 @@ def diagnose(
     )
     seed = rng if isinstance(rng, int) else 0
     return found if residual is None else found.with_residual(seed)
-
-
-def _misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return what a model left when it was identified, where that is known."""
-    if isinstance(arm, IdentificationResult):
-        return arm.misfit
-    return read_misfit(arm, model) if _is_written(arm) else None
-
-
-def _since(
-    arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
-) -> list[Recording]:
-    """Return what a model was identified from; nothing if some of it is looked at."""
-    if isinstance(arm, IdentificationResult):
-        found = [*arm.recordings, *arm.held_out]
-    elif _is_written(arm):
-        found = recordings_of(identified_from(arm), model.robot)
-    else:
-        return []
-    for one, other in product(found, asked):
-        if np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q):
-            return []
-    if not isinstance(arm, IdentificationResult):
-        require_as_identified(arm)
-    return found
-
-
-def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:
-    return isinstance(arm, (str, Path)) and is_model(arm)
 
 
 def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:
