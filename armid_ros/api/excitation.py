@@ -242,8 +242,8 @@ class ExcitationResult(Shown):
         fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
         parts = zip(robot.joints, self.start, robot.position_units, strict=True)
         pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
-        lines = [str(fit).removeprefix(f'{fit.word}: ').partition('; not checked: ')[0]]
-        lines += ['not checked: ' + '; '.join(fit.unchecked)] if fit.unchecked else []
+        lines = ['not checked: ' + '; '.join(fit.unchecked)] if fit.unchecked else []
+        lines.append(str(fit).removeprefix(f'{fit.word}: ').partition('; not checked: ')[0])
         lines.append(
             f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
             f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
