@@ -94,10 +94,11 @@ golden: $(STAMPS)/armid_ros $(STAMPS)/test  ## write the answers of every comman
 coverage: override PYTEST += --cov=armid_ros --cov-report=term
 coverage: test  ## test, and which lines the tests run; takes half as long again
 
-lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, types
+lint: $(STAMPS)/armid_ros $(STAMPS)/test  ## format, lint, layers, words, types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
+	$(BIN)/pytest -q tests/docsite/test_words.py
 	$(BIN)/mypy
 
 bench: $(STAMPS)/armid_ros $(STAMPS)/bench  ## speed and accuracy, side by side with the peers

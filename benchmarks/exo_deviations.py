@@ -43,7 +43,7 @@ def deviations(repeats: int, first: int = 0, only: int | None = None) -> None:
         ratio, spread, inside = stated(motions, inertias, separate, count, first)
         what = f'{data}, inertias {inertias}, {"four" if separate else "one"} k, {count} times'
         wanted = '0.95-1.05' if motions is poses and not separate else '        -'
-        print(f'  {what:50s}{wanted}  {ratio:.2f} +- {spread:.2f}  {inside:.0f} %', flush=True)
+        print(f'  {what:50s}{wanted}  {ratio:.2f} ± {spread:.2f}  {inside:.0f} %', flush=True)
 
 
 def stated(

@@ -154,7 +154,7 @@ def main():
             wall, processor = seconds[name]
             print(
                 f'{name:7s}{wall:8.1f} s, {processor:6.1f} s of processor; viscous friction of '
-                f'joint 1: {value:.4f} +- {std:.4f} N m s/rad '
+                f'joint 1: {value:.4f} ± {std:.4f} N m s/rad '
                 f'(true {FRICTION["viscous_friction"]})'
             )
         wall, processor = np.divide(seconds['theirs'], seconds['ours'])

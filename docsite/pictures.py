@@ -19,16 +19,26 @@ from tempfile import TemporaryDirectory
 import textwrap
 
 import armid_ros as ar
+from armid_ros.live.belief import LiveDiagnosis, LiveSettings
+from armid_ros.live.request import answer
+from armid_ros.papers.elastic.identification.physical import ideal_response
+from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
+from armid_ros.papers.elastic.plant.run import run_all
+from armid_ros.papers.elastic.plant.signals import EXCITATION_RMS, resonance_experiments, WEAK
+from armid_ros.papers.elastic.work import SENSORS
 from armid_ros.papers.exo.plant.gait import read_gait
 from armid_ros.papers.exo.plant.gait_cycle import check_cycle, gait_cycle
 from armid_ros.papers.exo.plant.walkers import walking_pair
+from armid_ros.robots.two_link import two_link_set
+from armid_ros.simulation.elastic.two_link import two_link_loop, two_link_plant
 from matplotlib.figure import Figure
 import numpy as np
+from PIL import Image
 from scipy import signal, stats
 
 from benchmarks.growth import OUT as GROWTH
 from benchmarks.lived_scoring import reliability as bins
-from docsite.desk import FRICTION, GAIN, lay_out
+from docsite.desk import FRICTION, GAIN, lay_out, LOAD
 
 IMAGES = Path(__file__).parents[1] / 'docs' / 'images'
 RESULTS = Path(__file__).parents[1] / 'benchmarks' / 'results'
@@ -37,8 +47,12 @@ TEXT = {'textcoords': 'offset points', 'va': 'center', 'fontsize': 8}
 BLUE, ORANGE, GREY = '#0072b2', '#e69f00', '#8c9196'
 #: Fit to a column of text, and sharp on a screen of two dots per point.
 WIDTH, DPI = 7.0, 120
+#: More would make the files larger, and nothing to see.
+_COLOURS = 64
 
 _REPEATS = 60
+#: Time of motion that is shown of online identification [s].
+_LEARNED = 8.0
 #: Time that the noise of the torque lasts [s].
 _LASTING = 0.05
 
@@ -279,6 +293,135 @@ def learned() -> Figure:
     return _plain(figure)
 
 
+def limits() -> Figure:
+    """Draw how much of its limits each joint uses in a plan."""
+    plan = ar.design_excitation('my_arm.urdf', duration=20.0)
+    used = plan.core.limits_used(plan.arm)
+    joints = plan.arm.robot.joints
+    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
+    axes = figure.subplots()
+    for place, ((name, share), colour) in enumerate(
+        zip(used.items(), (BLUE, ORANGE, GREY, 'black'), strict=False)
+    ):
+        axes.bar(
+            np.arange(len(joints)) + 0.2 * (place - 1.5), 100.0 * share, 0.18, color=colour,
+            label=name,
+        )  # fmt: skip
+    axes.axhline(100.0, color='black', lw=0.5)
+    axes.set(xticks=range(len(joints)), xticklabels=joints, ylabel='share of the limit [%]')
+    axes.legend(frameon=False, ncols=4, loc='upper center', bbox_to_anchor=(0.5, 1.2))
+    return _plain(figure)
+
+
+def damaged() -> Figure:
+    """Draw what is printed of a bag that ends early."""
+    (bag,) = Path('monday').glob('*.mcap')
+    Path('crashed.mcap').write_bytes(bag.read_bytes()[:300_000])
+    command = ('identify', 'crashed.mcap', '--robot', 'my_arm.urdf', '--out', 'result')
+    return _terminal([f'$ armid {" ".join(command)}', *_answer(*command)])
+
+
+def springs() -> Figure:
+    """Draw the responses of two joints with springs, measured and of the parameters found."""
+    shipped, rng = two_link_set('after'), np.random.default_rng(0)
+    plant, loop = two_link_plant(shipped.parameters), two_link_loop(shipped, WEAK)
+    plans = resonance_experiments(8, rms=EXCITATION_RMS, rng=rng)
+    runs = [SENSORS.measure(run, rng) for run in run_all(plant, loop, plans)]
+    found = identify_two_inertia(runs, shipped.parameters, loop=loop)
+    figure = Figure(figsize=(WIDTH, 2.8), layout='constrained')
+    panels = figure.subplots(1, 2, sharey=True)
+    for k, (axes, joint, own) in enumerate(zip(panels, found.joints, found.measured, strict=True)):
+        seen = (own.frequency > 5.0) & (own.frequency < 80.0)
+        frequency = own.frequency[seen]
+        model = ideal_response(found.parameters, k, frequency)[:, 0, 0]
+        axes.plot(frequency, _decibel(own.decoupled[seen, 0]), '.', color=GREY, label='measured')
+        axes.plot(frequency, _decibel(model), color=BLUE, label='motor, spring and link')
+        axes.set(xscale='log', title=joint.joint, xlabel='frequency [Hz]')
+        axes.set_xticks([10, 20, 40, 80], ['10', '20', '40', '80'])
+        axes.minorticks_off()
+    panels[0].set_ylabel('velocity over torque [dB]')
+    panels[0].legend(frameon=False)
+    return _plain(figure)
+
+
+def _decibel(values: np.ndarray) -> np.ndarray:
+    return np.asarray(20.0 * np.log10(np.abs(values)))
+
+
+def fleet() -> Figure:
+    """Draw what is printed of three arms, one of which holds a load from the fourth day on."""
+    for arm in ('arm_1', 'arm_2', 'arm_3'):
+        for day in range(1, 7):
+            loaded = arm == 'arm_2' and day > 3
+            effects = (*FRICTION, LOAD) if loaded else FRICTION
+            seed = 10 * day + int(arm[-1])
+            model = ar.ArmModel.of('my_arm.urdf', effects=effects)
+            run = ar.simulate(model, 'plan/excitation.yaml', torque_noise=0.05, rng=seed)
+            ar.write_recording(Path('fleet_bags', arm, f'2026-03-0{day}'), run)
+    lines = []
+    for command in (
+        ('identify', 'fleet_bags/*/*', '--robot', 'my_arm.urdf', '--out', 'results'),
+        ('watch', '--out', 'results'),
+        ('diagnose', '--out', 'results'),
+    ):
+        text = ' '.join(f'"{word}"' if '*' in word else word for word in command)
+        lines += [f'$ armid fleet {text}', *_answer('fleet', *command)]
+    return _terminal(lines)
+
+
+def live() -> Figure:
+    """Draw the error of the elbow in windows of a stream, to which a spring comes."""
+    arm = ar.load_model('monday_result/model.yaml')
+    parts = [ar.read_recording(name, 'my_arm.urdf') for name in ('tuesday', 'today_1')]
+    stream, answers = LiveDiagnosis(arm, LiveSettings(learning=12.0)), []
+    came = float(parts[0].t[-1])
+    for begin, part in zip((0.0, came + 0.01), parts, strict=True):
+        for t, q, tau in zip(part.t + begin, part.q, part.tau, strict=True):
+            stream.add(t, q, None, tau)
+            if stream.due:
+                answers.append(answer(stream.request())[0])
+                stream.take(answers[-1])
+    answers = [one for one in answers if one.gap]
+    ends = [one.end for one in answers]
+    rows = [next(row for row in one.gap if row.joint == 'elbow') for one in answers]
+    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
+    axes = figure.subplots()
+    axes.plot(ends, [row.before for row in rows], 'o-', color=ORANGE, label='model as given')
+    axes.plot(ends, [row.after for row in rows], 'o-', color=BLUE, label='with what is named')
+    axes.axvline(came, color=GREY, lw=1)
+    axes.annotate('spring added', (came, axes.get_ylim()[1]), (4, -8), **TEXT)
+    for one, row in zip(answers, rows, strict=True):
+        name = one.named[0][0].replace('_', ' ') if one.named else one.verdict
+        axes.annotate(name, (one.end, row.before), (0, 9), ha='center', **TEXT)
+    axes.set(xlabel='end of the window [s]', ylabel='error of elbow [N m]')
+    axes.margins(0.08, 0.2)
+    axes.legend(frameon=False, loc='center right')
+    return _plain(figure)
+
+
+def online() -> Figure:
+    """Draw the friction of the elbow as it is learned from joint states, with its interval."""
+    run = ar.read_recording('monday', 'my_arm.urdf')
+    arm = ar.ArmModel.of('my_arm.urdf', effects='viscous_friction,coulomb_friction')
+    identifier, times, values = ar.OnlineIdentifier(arm, rng=np.random.default_rng(0)), [], []
+    for k, (t, q, tau) in enumerate(zip(run.t, run.q, run.tau, strict=True)):
+        identifier.update(float(t), q, None, tau)
+        if k % 10 == 9 and t < _LEARNED:
+            found = identifier.estimate()
+            index = found.index('viscous_coefficient', 'elbow')
+            times.append(t)
+            values.append((found.values[index], 1.96 * found.std[index]))
+    value, reach = np.array(values).T
+    figure = Figure(figsize=(WIDTH, 2.6), layout='constrained')
+    axes = figure.subplots()
+    axes.fill_between(times, value - reach, value + reach, color=BLUE, alpha=0.2, label='95 %')
+    axes.plot(times, value, color=BLUE, label='estimate')
+    axes.axhline(0.3, color=GREY, label='true')
+    axes.set(xlabel='time [s]', ylabel='viscous friction, elbow\n[N m s/rad]', ylim=(0.0, 0.6))
+    axes.legend(frameon=False)
+    return _plain(figure)
+
+
 def installed() -> Figure:
     """Draw the answer of the first command after an installation."""
     return _terminal(
@@ -340,18 +483,21 @@ def _boxes(texts: list[str]) -> Figure:
 
 
 def _answer(*command: str) -> list[str]:
-    """Return the lines that a command prints."""
+    """Return the lines that a command prints, but for its progress."""
     run = [sys.executable, '-m', 'armid_ros.cli', *command]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     lines = (done.stdout + done.stderr).rstrip().splitlines()
-    return [part for line in lines for part in textwrap.wrap(line, 105)]
+    lines = [line for line in lines if ' %, ' not in line]
+    return [part for line in lines for part in textwrap.wrap(line, 98)]
 
 
 def _terminal(lines: list[str]) -> Figure:
     """Return lines as a terminal shows them."""
-    figure = Figure(figsize=(WIDTH, 0.18 * len(lines) + 0.2), facecolor='#1f2326')
+    figure = Figure(figsize=(WIDTH, 0.135 * len(lines) + 0.25), facecolor='#1f2326')
     top = {'family': 'monospace', 'fontsize': 7.5, 'color': '#e6e6e6', 'va': 'top'}
-    figure.text(0.02, 0.95, '\n'.join(lines).replace('$', r'\$'), **top)
+    figure.text(
+        0.02, 1.0 - 0.1 / figure.get_figheight(), '\n'.join(lines).replace('$', r'\$'), **top
+    )
     return figure
 
 
@@ -376,17 +522,23 @@ PICTURES = {
     'comparison.png': comparison,
     'control.png': control,
     'currents.png': currents,
+    'damaged.png': damaged,
     'deviations.png': deviations,
     'excitation.png': excitation,
     'exo_cycle.png': exo_cycle,
+    'fleet.png': fleet,
     'growth.png': growth,
     'installed.png': installed,
     'learned.png': learned,
+    'limits.png': limits,
+    'live.png': live,
+    'online.png': online,
     'own_effect.png': own_effect,
     'payload.png': payload,
     'recording.png': recording,
     'refused.png': refused,
     'reliability.png': reliability,
+    'springs.png': springs,
 }
 
 
@@ -396,6 +548,8 @@ def main() -> None:
         os.chdir(lay_out(Path(folder)))
         for name in sys.argv[1:] or PICTURES:
             PICTURES[name]().savefig(IMAGES / name, dpi=DPI)
+            with Image.open(IMAGES / name) as drawn:
+                drawn.convert('RGB').quantize(_COLOURS).save(IMAGES / name, optimize=True)
 
 
 if __name__ == '__main__':

@@ -14,10 +14,10 @@ tilt = np.radians(3.0)
 truth = ar.ArmModel.of(
     URDF, effects=FRICTION, gravity=(9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt))
 )
-believed = ar.ArmModel.of(URDF, effects=FRICTION)
-plan = ar.design_excitation(believed, duration=12.0, starts=1, iterations=10)
+known = ar.ArmModel.of(URDF, effects=FRICTION)
+plan = ar.design_excitation(known, duration=12.0, starts=1, iterations=10)
 runs = [ar.simulate(truth, plan, torque_noise=0.05, rng=seed) for seed in (1, 2)]
 
-found = ar.diagnose(believed, runs[0], validate=runs[1])
+found = ar.diagnose(known, runs[0], validate=runs[1])
 print(found)
 found.report('askew.html')

@@ -24,4 +24,4 @@ def measured(motion, tau=None):
 
 problem = recorded_interaction_problem(pair.machines, measured(machine, tau), measured(wearer))
 found = identify_interaction(problem)
-print(f'{found.stiffness[0]:.0f} +- {found.std[0]:.0f} N/m, true {pair.stiffness[0]:.0f} N/m')
+print(f'{found.stiffness[0]:.0f} ± {found.std[0]:.0f} N/m, true {pair.stiffness[0]:.0f} N/m')

@@ -19,5 +19,5 @@ np.savetxt('log.csv', columns, delimiter=',', header=','.join(names), comments='
 # Units in names are seen ('t_ms', 'angle_deg'); columns that no name tells are named here.
 recording = ar.read_recording('log.csv', URDF, effort='amps_{}', effort_scale=GAIN)
 print(recording)
-print(ar.inspect(recording, URDF))
+print(ar.inspect(URDF, recording))
 print(ar.identify(URDF, recording))

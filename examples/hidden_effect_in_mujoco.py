@@ -32,9 +32,9 @@ def record(plan, seed):
     )
 
 
-believed = ar.ArmModel.of(URDF, effects='viscous_friction:viscous_coefficient=0.3')
+known = ar.ArmModel.of(URDF, effects='viscous_friction:viscous_coefficient=0.3')
 plans = [
-    ar.design_excitation(believed, duration=12.0, starts=1, iterations=10, rng=k) for k in (0, 1)
+    ar.design_excitation(known, duration=12.0, starts=1, iterations=10, rng=k) for k in (0, 1)
 ]
-found = ar.diagnose(believed, record(plans[0], 1), validate=record(plans[1], 2))
+found = ar.diagnose(known, record(plans[0], 1), validate=record(plans[1], 2))
 print(found)

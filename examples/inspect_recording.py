@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Look at a recording before anything is believed: gaps, units, what identify would refuse."""
+"""Look at a recording before it is used: gaps, units, what identify would refuse."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,7 @@ good = ar.simulate(ar.ArmModel.of(URDF), torque_noise=0.05)
 holes = good.select(np.r_[0:800, 1000 : len(good)])
 spoiled = replace(holes, dq=np.degrees(holes.dq), tau=1e3 * holes.tau, source='spoiled')
 
-found = ar.inspect(spoiled, URDF)
+found = ar.inspect(URDF, spoiled)
 print(found)
 for remark in found.remarks:
     print('-', remark)

@@ -15,7 +15,7 @@ URDF = Path(__file__).with_name('arm.urdf')
 
 
 class Identifier(Node):
-    """Says every second what it knows of the friction of each joint."""
+    """Prints the estimate of the friction of each joint every second."""
 
     def __init__(self, urdf=URDF, **settings):
         super().__init__('identifier', **settings)
@@ -38,7 +38,7 @@ class Identifier(Node):
             estimate.parameters, estimate.values, estimate.std, strict=True
         ):
             if not name.rigid:
-                self.get_logger().info(f'{name.name} {name.joint} {value:.3f} +- {std:.3f}')
+                self.get_logger().info(f'{name.name} {name.joint} {value:.3f} ± {std:.3f}')
 
 
 if __name__ == '__main__':

@@ -36,6 +36,6 @@ print(f'without the hose {without.error_percent:.2f} %')
 print(f'with it          {model.error_percent:.2f} %')
 k = model.estimate.index('hose_stiffness', 'elbow')
 print(
-    f'stiffness {model.estimate.values[k]:.3f} +- {model.estimate.std[k]:.3f} N m/rad^3, true 1.5'
+    f'stiffness {model.estimate.values[k]:.3f} ± {model.estimate.std[k]:.3f} N m/rad^3, true 1.5'
 )
 np.testing.assert_allclose(model.estimate.values[k], 1.5, rtol=0.1)

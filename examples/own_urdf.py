@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a URDF to a model that can be believed: excite, record, identify, report."""
+"""From a URDF to a model with intervals: excite, record, identify, report."""
 
 from pathlib import Path
 import sys

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A URDF that a simulator takes: links that are bodies, with a mass that a scale told."""
+"""A URDF that a simulator takes: links that are bodies, with a mass from a scale."""
 
 from pathlib import Path
 

@@ -50,6 +50,10 @@ _Numbers = float | str | Sequence[float]
 _Given = ParamSpec('_Given')
 _Result = TypeVar('_Result')
 
+#: Ends of the names of files that describe a robot.
+_DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
+#: Keywords that are named otherwise than the options of the commands.
+_OPTIONS = {'seed': 'rng', 'payload': 'payloads'}
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
 
@@ -61,9 +65,13 @@ def spelled(function: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     @wraps(function)
     def called(*values: _Given.args, **keywords: _Given.kwargs) -> _Result:
         for name in keywords.keys() - known.keys():
+            near = (
+                f"; did you mean '{_OPTIONS[name]}'?"
+                if _OPTIONS.get(name) in known
+                else meant(name, known)
+            )
             raise TypeError(
-                f"{function.__name__}() has no keyword '{name}'{meant(name, known)}; it takes "
-                f'{", ".join(known)}'
+                f"{function.__name__}() has no keyword '{name}'{near}; it takes {', '.join(known)}"
             )
         return function(*values, **keywords)
 
@@ -82,6 +90,14 @@ def robot_of(robot: RobotLike) -> Robot:
 def is_model(path: str | Path) -> bool:
     """Return whether a path is that of a model.yaml, and not of a description."""
     return Path(path).suffix in ('.yaml', '.yml')
+
+
+def describes_robot(one: RobotLike | RecordingLike) -> bool:
+    """Return whether an argument is a robot rather than a recording, by its type or its name."""
+    if not isinstance(one, str | Path):
+        return not isinstance(one, Recording)
+    path = Path(str(one).split(' ')[0])
+    return path.suffix in _DESCRIPTIONS or is_model(path) or str(one) in shipped_robots()
 
 
 def source_of(robot: Robot) -> str:

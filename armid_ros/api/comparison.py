@@ -71,7 +71,9 @@ class ComparisonResult(Shown):
 
         rows = change_rows(self.core)
         first, *more = tell(self.core)
-        return Summary(first, verdict(self.core)[0], HEADS if rows else (), rows, lines=more)
+        then = 'diagnose' if self.anything else 'identify'
+        heads = HEADS if rows else ()
+        return Summary(first, verdict(self.core)[0], heads, rows, lines=more, then=then)
 
 
 def compare(

@@ -6,13 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from pathlib import Path
-from typing import Any, Literal, TYPE_CHECKING, TypeGuard, TypeVar
+from typing import Any, Literal, TYPE_CHECKING, TypeVar
 
 from armid_ros.api.arguments import (
     arm_of,
-    is_model,
     Progress,
     RecordingLike,
     recordings_of,
@@ -23,7 +21,15 @@ from armid_ros.api.arguments import (
     with_sources_apart,
 )
 from armid_ros.api.identification import IdentificationResult
-from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, ShownModel, Summary
+from armid_ros.api.since import misfit_of, recordings_since
+from armid_ros.api.table import (
+    data_frame,
+    DEFAULT_ORIGIN,
+    residual_frame,
+    ResultOrigin,
+    ShownModel,
+    Summary,
+)
 from armid_ros.arm import ArmModel, Misfit, save_model
 from armid_ros.diagnosis import diagnose as run
 from armid_ros.diagnosis import (
@@ -40,13 +46,11 @@ from armid_ros.excitation import save_excitation
 from armid_ros.files import json_text, write_file
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.assess.verification import ForwardValidation, simulate_held_out
-from armid_ros.identification.identified_from import identified_from, require_as_identified
-from armid_ros.identification.parameters_file import read_misfit
 from armid_ros.identification.rows.signals import conditioning
 from armid_ros.recording import Recording, require_once
 from armid_ros.recording.curves import draw_joints
 from armid_ros.report.diagnosis_report import diagnosis_report, Extras
-from armid_ros.report.notation import printed
+from armid_ros.report.notation import pretty
 from armid_ros.report.sections.diagnosed import named_rows
 from armid_ros.residual import (
     learn_residual,
@@ -64,6 +68,8 @@ if TYPE_CHECKING:
     import pandas
 
 _Made = TypeVar('_Made')
+#: Rows that a command prints without --all.
+_ROWS = 6
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -150,6 +156,32 @@ class DiagnosisResult(ShownModel):
             'with them': (t, shown.measured - shown.after),
         }
         return draw_joints(self.arm.robot.joints, curves, 'residual torque [N m or N]')
+
+    def residual_table(self) -> pandas.DataFrame:
+        """
+        Return what the model with the named effects leaves of the torque as a pandas table.
+
+        Columns are recording, t [s], and every joint [N m or N].
+
+        Raises
+        ------
+        IdentificationError
+            If the data were refused, so that there is no residual.
+
+        """
+        if self.core.gap is None:
+            raise IdentificationError(f'no residual: {self.core.summary}')
+        return residual_frame(
+            self.description.robot.joints,
+            [
+                (
+                    one.source,
+                    one.trajectory.motion.t[one.trajectory.rows],
+                    one.measured - one.after,
+                )
+                for one in self.core.gap.overlays
+            ],
+        )
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return the named effects as a pandas table, one row per parameter."""
@@ -254,17 +286,29 @@ class DiagnosisResult(ShownModel):
     def _with_notes(self, *notes: str) -> DiagnosisResult:
         return replace(self, extras=replace(self.extras, notes=(*self.extras.notes, *notes)))
 
-    def summary(self, model: str = MODEL) -> Summary:
+    def summary(self, model: str = MODEL, every: bool = True) -> Summary:
         """Return the verdict, values that are not zero, notes, and steps with a model's path."""
-        rows = named_rows(self.core.findings, certain=True)
+        rows: list[Sequence[str]] = [*named_rows(self.core.findings, certain=True)]
+        if not every and len(rows) > _ROWS + 1:
+            rows[_ROWS:] = [(f'... and {len(rows) - _ROWS} more: --all, or report.html',)]
         return Summary(
-            printed(self.core.summary),
+            pretty(self.core.summary),
             self.core.verdict.replace('_', ' '),
             ('effect', 'parameter', 'joint', 'value, 95 %') if rows else (),
             rows,
             [*self._baseline(), *self.extras.sentences(self.core)],
-            list(map(printed, self.extras.steps(self.core, model))),
+            list(map(pretty, self.extras.steps(self.core, model))),
+            self._then(),
         )
+
+    def _then(self) -> str:
+        """Return the command that follows."""
+        if self.verdict in ('bad_data', 'not_repeatable'):
+            return 'inspect'
+        if self.verdict in WORTH_A_MAP and self.residual is None:
+            return 'diagnose'
+        anew = self.core.doubt or self.core.harmful or self.verdict in WORTH_A_MAP
+        return 'identify' if anew else 'simulate'
 
     def _baseline(self) -> list[str]:
         sources = ', '.join(recording.source for recording in self.baseline)
@@ -356,12 +400,12 @@ def diagnose(
     looked_at = some_recordings_of(recordings, model.robot)
     held_out = recordings_of(validate, model.robot)
     if baseline is None:
-        before = _since(arm, model, [*looked_at, *held_out])
+        before = recordings_since(arm, model, [*looked_at, *held_out])
     else:
         before = recordings_of(baseline, model.robot)
     looked_at, held_out, before = with_sources_apart(looked_at, held_out, before)
     require_once([*looked_at, *before], held_out)
-    misfit = misfit or _misfit_of(arm, model)
+    misfit = misfit or misfit_of(arm, model)
     settings = DiagnosisSettings(
         signals=SignalSettings(cutoff, decimation),
         material=material,
@@ -390,35 +434,6 @@ def diagnose(
     )
     seed = rng if isinstance(rng, int) else 0
     return found if residual is None else found.with_residual(seed)
-
-
-def _misfit_of(arm: RobotLike | IdentificationResult, model: ArmModel) -> Misfit | None:
-    """Return the misfit of a model at its identification, if it is known."""
-    if isinstance(arm, IdentificationResult):
-        return arm.misfit
-    return read_misfit(arm, model) if _is_written(arm) else None
-
-
-def _since(
-    arm: RobotLike | IdentificationResult, model: ArmModel, asked: Sequence[Recording]
-) -> list[Recording]:
-    """Return the recordings of the identification as baseline; none if one is diagnosed."""
-    if isinstance(arm, IdentificationResult):
-        found = [*arm.recordings, *arm.held_out]
-    elif _is_written(arm):
-        found = recordings_of(identified_from(arm), model.robot)
-    else:
-        return []
-    for one, other in product(found, asked):
-        if np.array_equal(one.t, other.t) and np.array_equal(one.q, other.q):
-            return []
-    if not isinstance(arm, IdentificationResult):
-        require_as_identified(arm)
-    return found
-
-
-def _is_written(arm: RobotLike | IdentificationResult) -> TypeGuard[str | Path]:
-    return isinstance(arm, (str, Path)) and is_model(arm)
 
 
 def _tried(what: str, make: Callable[[], _Made]) -> tuple[_Made | None, tuple[str, ...]]:

@@ -213,40 +213,44 @@ class ExcitationResult(Shown):
         return document
 
     def summary(self) -> Summary:
-        """Return the share of its limits that each joint uses."""
+        """Return the identifiable parameters, and the share of its limits that each joint uses."""
+        from armid_ros.report.excitation_report import identifiable
+
         shares = self.core.limits_used(self.arm)
         rows = [
             (joint, *(f'{100 * share[k]:.0f} %' for share in shares.values()))
             for k, joint in enumerate(self.arm.robot.joints)
         ]
-        information, speed = self.core.information, self.core.settings.speed
-        unseen = int(np.sum(~np.isfinite(information.std)))
+        first, *more = identifiable(self.core, self.arm.robot.links)
+        word, lines = self._of_run()
         return Summary(
-            f'{speed}: condition number {information.condition:.1f}, '
-            f'{len(information.parameters)} parameters' + f', {unseen} not seen' * bool(unseen),
-            heads=('joint', *(f'{name} used' for name in shares)),
-            rows=rows,
-            lines=self._of_run(),
+            first,
+            word,
+            ('joint', *(f'{name} used' for name in shares)),
+            rows,
+            [*lines, *more],
+            then='simulate',
         )
 
-    def _of_run(self) -> list[str]:
-        """Return sentences: is the run fit, where it starts, was the search stopped."""
+    def _of_run(self) -> tuple[str, list[str]]:
+        """Return the fitness of the run in a word, and sentences on its start and its search."""
         try:
             run, fit = self.run, self.fitness
         except TrajectoryError as error:
-            return [f'there is no way to the trajectory: {error}']
+            return 'no trajectory', [f'there is no way to the trajectory: {error}']
         robot = self.arm.robot
         fault = '' if self.given_start is not None else self.planner.fault(robot.zero_pose)
         parts = zip(robot.joints, self.start, robot.position_units, strict=True)
         pose = [f'{joint} {value:.3g} {unit}' for joint, value, unit in parts if value]
-        why = f' (the zero of the description is not free: {fault})' if fault else ''
-        begin = f'starts at rest at {", ".join(pose) or "zero"}{why}'
-        on = f'is on the trajectory after {run.approach.duration:.1f} s'
         lines = ['not checked: ' + '; '.join(fit.unchecked)] if fit.unchecked else []
-        end = f'{begin}, {on} and back after {run.duration:.1f} s'
-        lines += [str(fit).partition('; not checked: ')[0], end]
+        lines.append(str(fit).removeprefix(f'{fit.word}: ').partition('; not checked: ')[0])
+        lines.append(
+            f'starts at rest at {", ".join(pose) or "zero"}, is on the trajectory after '
+            f'{run.approach.duration:.1f} s and back after {run.duration:.1f} s'
+        )
+        lines += [f'the zero of the description is not free: {fault}'] if fault else []
         early = f'stopped early ({self.core.stopped}): not what the seed would give'
-        return [*lines, early] if self.core.stopped else lines
+        return fit.word, [*lines, early] if self.core.stopped else lines
 
 
 def planner_of(arm: ArmModel, settings: DesignSettings, scene: CollisionScene) -> TransferPlanner:

@@ -26,6 +26,7 @@ from armid_ros.api.table import (
     aligned,
     data_frame,
     DEFAULT_ORIGIN,
+    residual_frame,
     ResultOrigin,
     ShownModel,
     Summary,
@@ -47,10 +48,10 @@ from armid_ros.identification import (
     Score,
     SignalSettings,
     Verification,
-    verify,
     write_document,
 )
 from armid_ros.identification import identify as run
+from armid_ros.identification import verify as run_checks
 from armid_ros.identification.fitting.identifiability import excludes_zero
 from armid_ros.identification.fitting.least_squares import Estimator
 from armid_ros.identification.identified_from import with_contents
@@ -194,6 +195,19 @@ class IdentificationResult(ShownModel):
         """Return the parameters as a pandas table: name, joint, value, std, unit."""
         return data_frame(self.document()['parameters'])
 
+    def residual_table(self) -> pandas.DataFrame:
+        """
+        Return measured minus predicted torques [N m or N] as a pandas table.
+
+        Columns are recording, t [s], and every joint; held-out recordings come last.
+
+        """
+        held_out = [fit for fits in self.validation.values() for fit in fits]
+        parts = [
+            (fit.source, fit.motion.t, fit.residual) for fit in (*self.core.training, *held_out)
+        ]
+        return residual_frame(self.arm.robot.joints, parts)
+
     @cached_property
     def exports(self) -> dict[str, Exported]:
         """Return the model for other programs by file name; empty unless links are bodies."""
@@ -277,7 +291,15 @@ class IdentificationResult(ShownModel):
                 *(self._parameters() if every else ()),
             ),
             steps[:1],
+            self._then(steps[:1]),
         )
+
+    def _then(self, steps: Sequence[str]) -> str:
+        """Return the command that the next step names; of a good model that of its links."""
+        if self.grade == 'unusable':
+            return 'inspect'
+        named = (name for name in ('diagnose', 'excite') if f'armid {name}' in ''.join(steps))
+        return next(named, 'check')
 
     def _parameters(self) -> list[str]:
         """Return all parameters beside those of the description, a line each."""
@@ -317,7 +339,7 @@ def identify(
     cutoff: float | None = None,
     decimation: int | None = None,
     physical: bool | PhysicalSettings | None = None,
-    verifies: bool = False,
+    verify: bool = False,
     payloads: Sequence[str] = (),
     rng: Rng = 0,
     progress: Progress | None = None,
@@ -345,7 +367,7 @@ def identify(
     physical : bool or PhysicalSettings, optional
         Fit links that can be bodies, which simulators need; ``urdf`` then describes one. By
         default where that makes the torque error larger by a tenth at most.
-    verifies : bool
+    verify : bool
         Test for encoder noise and simulate along the held-out recordings.
     payloads : sequence of str
         What the arm is known to carry in a recording, as 'BAG=KG@LINK[:X,Y,Z]', which fixes the
@@ -402,8 +424,8 @@ def identify(
     found = IdentificationResult(
         result, model, tuple(training), tuple(held_out), validation, gains=gains
     )
-    if verifies:
+    if verify:
         tick(1.0, 'verifying')
-        verification = verify(result, model, training, held_out, rng=source, progress=tick)
+        verification = run_checks(result, model, training, held_out, rng=source, progress=tick)
         found = replace(found, verification=verification)
     return found

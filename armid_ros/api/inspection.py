@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.api.arguments import (
+    describes_robot,
     read_all_joints,
     RecordingLike,
     recordings_of,
@@ -21,6 +22,8 @@ from armid_ros.api.arguments import (
 )
 from armid_ros.api.identification import identify
 from armid_ros.api.table import data_frame, DEFAULT_ORIGIN, ResultOrigin, Shown, Summary
+from armid_ros.arm import ArmModel
+from armid_ros.errors import RecordingError
 from armid_ros.inspection import (
     check_links,
     description_remarks,
@@ -54,7 +57,7 @@ class InspectionResult(Shown):
     Examples
     --------
     >>> import armid_ros as ar
-    >>> found = ar.inspect('monday', 'my_arm.urdf')
+    >>> found = ar.inspect('my_arm.urdf', 'monday')
     >>> found.report('inspection.html').name
     'inspection.html'
 
@@ -90,9 +93,15 @@ class InspectionResult(Shown):
 
     def summary(self) -> Summary:
         """Return verdict, table of joints, remarks and sampling."""
-        from armid_ros.report.inspection_report import joint_heads, joint_rows, recording_facts
+        from armid_ros.report.inspection_report import (
+            inspection_word,
+            joint_heads,
+            joint_rows,
+            recording_facts,
+        )
 
         heads, found = joint_heads(self.core), self.core
+        trial = None if found.trial is None or found.trial.refused else found.trial
         topics = [
             f'{one.name}: {one.count} x {one.type_name}'
             + ' (read)' * (one.name == found.recording.topic)
@@ -100,6 +109,7 @@ class InspectionResult(Shown):
         ]
         return Summary(
             f'{found.recording.source}: {found.verdict}',
+            inspection_word(found),
             heads=heads[:4] + heads[7:],
             rows=[row[:4] + row[7:] for row in joint_rows(found)],
             lines=(
@@ -107,13 +117,14 @@ class InspectionResult(Shown):
                 *(f'{name}: {value}' for name, value in recording_facts(found)),
                 *topics,
             ),
+            then='identify' if trial and trial.grade != 'unusable' else 'inspect',
         )
 
 
 @spelled
 def inspect(
-    recording: RecordingLike,
-    robot: RobotLike | None = None,
+    robot: RobotLike | RecordingLike | None = None,
+    recording: RecordingLike | RobotLike | None = None,
     *,
     topics: tuple[Topic, ...] | None = None,
     rng: Rng = 0,
@@ -123,10 +134,10 @@ def inspect(
 
     Parameters
     ----------
-    recording : Recording or path
-        A bag or a table.
     robot : model, robot, name or path, optional
         With it limits and units are checked, and an identification is tried.
+    recording : Recording or path
+        A bag or a table; the only argument where there is no robot.
     topics : tuple of Topic, optional
         All topics of the bag; read from it by default where no robot is given.
     rng : int or Generator
@@ -145,10 +156,16 @@ def inspect(
     Examples
     --------
     >>> import armid_ros as ar
-    >>> ar.inspect('monday', 'my_arm.urdf').remarks
+    >>> ar.inspect('my_arm.urdf', 'monday').remarks
     ()
 
     """
+    if recording is None or describes_robot(recording):  # alone, or in the order of before
+        robot, recording = recording, robot
+    if recording is None or isinstance(recording, Robot | ArmModel):
+        raise RecordingError('no recording: give the path of a bag or a table, or a Recording')
+    if isinstance(robot, Recording):
+        raise RecordingError('two recordings: give a robot and a recording')
     described = None if robot is None else robot_of(robot)
     if described is not None:
         (read,) = recordings_of(recording, described)
@@ -226,14 +243,25 @@ class CheckResult(Shown):
         return description_check_report(name, self.remarks, self.links, origin.provenance)
 
     def summary(self) -> Summary:
-        """Return the finding, and the links."""
-        from armid_ros.report.inspection_report import headline, HEADS, link_rows
+        """Return the finding, and the links: what was measured where any of them is wrong."""
+        from armid_ros.report.inspection_report import check_word, headline, HEADS, link_rows
 
-        rows = [] if self.links is None else link_rows(self.links)
-        first, *others = headline(self.remarks, self.links)
-        lines = [' '.join(others), *(one.text for one in self.remarks)]
-        heads = HEADS[:3] if rows else ()
-        return Summary(first, '', heads, [row[:3] for row in rows], lines)
+        links = self.links
+        wrong = links is not None and not np.isnan(links.measured_mass).all()
+        columns = slice(None) if wrong else slice(0, 4, 2)
+        rows = (
+            []
+            if links is None
+            else [(links.links[k], *row[1:5][columns]) for k, row in enumerate(link_rows(links))]
+        )
+        first, *others = headline(self.remarks, links)
+        lines = [*others, *(one.text for one in self.remarks)]
+        heads = (HEADS[0], *HEADS[1:5][columns]) if rows else ()
+        then = 'excite' if links is None else 'inspect' if links.fault else 'identify'
+        if any(one.weight == 'bad' for one in self.remarks):
+            then = 'check'
+        word = check_word(self.remarks, links)
+        return Summary(first, word, heads, rows, lines, then=then)
 
 
 @spelled

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 import textwrap
@@ -16,8 +16,10 @@ from armid_ros.arm import ArmModel
 from armid_ros.arm.export import arm_urdf
 from armid_ros.errors import ArmidError
 from armid_ros.files import json_text, result_folder, staged, write_file
+from armid_ros.motion import FloatArray
 from armid_ros.robots import Robot
 from markupsafe import escape
+import numpy as np
 
 if TYPE_CHECKING:
     from armid_ros.report.provenance import Provenance
@@ -47,6 +49,8 @@ class Summary:
         What stands below.
     steps : sequence of str
         What to do next.
+    then : str
+        Name of the command that does it; empty for none.
 
     """
 
@@ -56,6 +60,7 @@ class Summary:
     rows: Sequence[Sequence[str]] = ()
     lines: Sequence[str] = ()
     steps: Sequence[str] = ()
+    then: str = ''
 
     def text(self) -> str:
         """Return at most ten lines of 80 columns, followed by the next steps."""
@@ -71,10 +76,10 @@ class Summary:
         steps = [piece for line in self._next for piece in textwrap.wrap(line, WIDTH)]
         return '\n'.join([*title, *aligned(self.heads, rows, WIDTH), *below, *steps])
 
-    def full_text(self) -> list[str]:
-        """Return the whole text, as the commands print it."""
+    def full_text(self, *below: str) -> list[str]:
+        """Return the whole text, as the commands print it; `below` comes before the next steps."""
         table = aligned(self.heads, self.rows)
-        return [self._headline, *table, *filter(None, self.lines), *self._next]
+        return [self._headline, *table, *filter(None, self.lines), *below, *self._next]
 
     @property
     def _next(self) -> list[str]:
@@ -111,6 +116,8 @@ class ResultOrigin:
         return replace(self, robot=self.robot or known, source=self.source or known)
 
 
+#: Source of a recording, times [s] and residual torques [N m or N], shapes (M,) and (M, n).
+ResidualPart = tuple[str, FloatArray, FloatArray]
 #: Shipped names and paths, without provenance.
 DEFAULT_ORIGIN = ResultOrigin()
 
@@ -122,6 +129,14 @@ def data_frame(rows: Any) -> pandas.DataFrame:
     except ModuleNotFoundError:
         raise ArmidError('a table needs pandas: pip install pandas') from None
     return DataFrame(rows)
+
+
+def residual_frame(joints: Sequence[str], parts: Iterable[ResidualPart]) -> pandas.DataFrame:
+    """Return residual torques as a pandas table: recording, t, and a column for each joint."""
+    names, times, residuals = zip(*parts, strict=True)
+    columns = dict(zip(joints, np.concatenate(residuals).T, strict=True))
+    sources = np.repeat(names, [len(t) for t in times])
+    return data_frame({'recording': sources, 't': np.concatenate(times), **columns})
 
 
 class Shown(ABC):
@@ -173,8 +188,12 @@ class Shown(ABC):
         return self.summary().text()
 
     def _repr_html_(self) -> str:
-        """Show the report in a notebook, in a frame of its own."""
-        return f'<iframe srcdoc="{escape(self.page())}" width="100%" height="640"></iframe>'
+        """Show the report in a notebook, in a frame of its own; without a report, the text."""
+        try:
+            page = self.page()
+        except ArmidError:  # a plan without a trajectory has no page
+            return f'<pre>{escape(repr(self))}</pre>'
+        return f'<iframe srcdoc="{escape(page)}" width="100%" height="640"></iframe>'
 
 
 class ShownModel(Shown):

@@ -109,8 +109,7 @@ class Misfit:
         missing = [joint for joint in robot.joints if joint not in self.rms]
         if missing:
             raise ModelError(
-                f"the misfit says nothing of joint '{missing[0]}'; its joints are "
-                f'{", ".join(self.rms)}'
+                f"the misfit has no joint '{missing[0]}'; its joints are {', '.join(self.rms)}"
             )
         left = np.array([self.rms[joint] for joint in robot.joints])
         if torque_rms is None or self.torque_rms is None:

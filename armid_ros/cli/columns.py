@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from armid_ros.recording.tables import ColumnSettings
 
 #: Where the context keeps what they say.
-_META = 'armid.columns'
+META = 'armid.columns'
 
 
 def _kept(ctx: click.Context, parameter: click.Parameter, value: Any) -> Any:
     """Store a value for `settings`."""
-    ctx.meta.setdefault(_META, {})[parameter.name] = value
+    ctx.meta.setdefault(META, {})[parameter.name] = value
     return value
 
 
@@ -141,7 +141,7 @@ def settings() -> ColumnSettings:
     """Return the values of the options of the running command."""
     from armid_ros.recording.tables import ColumnSettings
 
-    return ColumnSettings(**click.get_current_context().meta.get(_META, {}))
+    return ColumnSettings(**click.get_current_context().meta.get(META, {}))
 
 
 def _coupling(text: str) -> tuple[str, str, float]:

@@ -47,6 +47,8 @@ INTERRUPTED = 130
 BROKEN_PIPE = 141
 #: Where the context keeps what is said on stderr when the work was done: an error is one line.
 NOTES = 'armid.notes'
+#: Where it keeps the arguments of the command as they were typed.
+TYPED = 'armid.typed'
 
 
 class Commands(click.Group):
@@ -76,6 +78,7 @@ class Commands(click.Group):
         except click.UsageError as error:
             near = meant(args[0], self.list_commands(ctx))
             raise click.UsageError(error.message.rstrip('.') + near, ctx) from error
+        ctx.meta[TYPED] = tuple(rest)
         if name and command and not {'-h', '--help'} & set(rest):
             listed = self.list_commands(ctx)
             others = partial(map, _imported, listed)

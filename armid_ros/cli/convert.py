@@ -51,7 +51,7 @@ def convert(
     from armid_ros.recording.tables import is_table
 
     if out is None and not dry_run:
-        raise click.UsageError('--out says which bag to write; --dry-run writes none')
+        raise click.UsageError('give --out, the bag to write, or --dry-run to write none')
     robot = None
     if robot_source is not None:
         robot = options.open_robot(robot_source, 'earth', joints)

@@ -61,12 +61,11 @@ import click
 )
 @click.option(
     '--verify/--no-verify',
-    'verifies',
     default=True,
     show_default=True,
     help='Test for encoder noise and simulate along the held-out bags.',
 )
-@click.option('--all', 'every', is_flag=True, help='Print all parameters with their intervals.')
+@parameters.every
 @click.option('--strict', is_flag=True, help='End with code 3 if the result is unusable.')
 @columns.options
 @parameters.topic

@@ -58,7 +58,7 @@ def inspect(
     staged = None if out is None else options.stage(out, SCHEMA, robot_source or '')
     robot = None
     if robot_source is not None:
-        robot = options.open_robot(robot_source, gravity, joints, [bag])
+        robot = options.open_robot(robot_source, gravity, joints, [bag], tell=False)
     topics = topics_of(bag, options.read_settings())
     with progress('reading') as tick:
         if robot is None:
@@ -74,15 +74,21 @@ def inspect(
         else:
             (recording,) = options.read([bag], robot, topic)
         tick(0.5, 'trying to identify' if robot else 'looking')
-        found = run(recording, robot, topics=topics, rng=seed)
+        found = run(robot, recording, topics=topics, rng=seed)
     origin = ResultOrigin(robot_source or '', provenance=provenance([bag], seed=seed))
     options.deliver(found, staged, origin, as_json)
 
 
 @click.command(epilog='Example: armid check ur10.urdf run.mcap')
-@click.argument('robot_source', metavar='R', callback=parameters.with_packages)
+@click.argument('arguments', metavar='[R] [BAG]...', nargs=-1)
+@click.option(
+    '--robot',
+    'robot_source',
+    metavar='R',
+    shell_complete=parameters.completed,
+    help='The description, in place of the first argument.',
+)
 @parameters.packages
-@click.argument('bags', nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     '--out',
     type=parameters.OutPath(file_okay=False, path_type=Path),
@@ -98,8 +104,8 @@ def inspect(
 @parameters.reading
 @parameters.as_json
 def check(
-    robot_source: str,
-    bags: tuple[Path, ...],
+    arguments: tuple[str, ...],
+    robot_source: str | None,
     out: Path | None,
     strict: bool,
     topic: str | None,
@@ -111,7 +117,8 @@ def check(
     """
     Check a URDF: alone, or against recordings.
 
-    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name.
+    R is a URDF, MJCF or xacro ('arm.xacro tool:=true' with arguments), or a shipped name. It is
+    left out where armid.toml names the robot.
 
     Without a recording: impossible inertias, densities of links with shapes, units of limits. With
     one: mass and centre of each link as described and as measured.
@@ -123,6 +130,9 @@ def check(
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
 
+    context = click.get_current_context()
+    robot_source, bags = _parted(context, robot_source, arguments)
+    context.params |= {'robot_source': robot_source, 'bags': bags}
     staged = None if out is None else options.stage(out, CHECK, robot_source)
     robot = options.open_robot(robot_source, gravity, joints, bags, tell=False)
     with progress('checking'):
@@ -131,4 +141,20 @@ def check(
     origin = ResultOrigin(robot_source, '', provenance(source, seed=seed))
     options.deliver(found, staged, origin, as_json)
     if strict and found.wrong:
-        click.get_current_context().exit(3)
+        context.exit(3)
+
+
+def _parted(
+    context: click.Context, robot: str | None, arguments: tuple[str, ...]
+) -> tuple[str, tuple[Path, ...]]:
+    """Return the description and the recordings; that of armid.toml where none is typed."""
+    from armid_ros.api.arguments import describes_robot
+
+    typed = context.get_parameter_source('robot_source') is click.core.ParameterSource.COMMANDLINE
+    if arguments and not typed and (robot is None or describes_robot(arguments[0])):
+        robot, *others = arguments
+        arguments = tuple(others)
+    if robot is None:
+        raise click.UsageError("Missing argument 'R', the description.")
+    source = parameters.with_packages(context, robot)
+    return source or '', tuple(map(Path, arguments))

@@ -11,6 +11,7 @@ from armid_ros.api.table import ResultOrigin, Shown, Summary
 from armid_ros.arm import ArmModel, load_model
 from armid_ros.cli import columns
 from armid_ros.cli.commands import NOTES
+from armid_ros.cli.following import following
 from armid_ros.cli.parameters import CRC, FORCE, MEMORY
 from armid_ros.cli.terminal import say
 from armid_ros.effects import make_effect
@@ -29,6 +30,7 @@ from armid_ros.motion import FloatArray
 from armid_ros.recording import read_robot_description, ReadSettings, Recording
 from armid_ros.recording.anything import read_anything
 from armid_ros.recording.tables import is_table, TablePlan
+from armid_ros.report.sections.frame import VerdictSection
 from armid_ros.robots import (
     driven_in_words,
     load_robot,
@@ -114,10 +116,28 @@ def deliver(
     if as_json:
         click.echo(json_text(document or result.document(origin)))
         return
-    for line in (summary or result.summary()).full_text():
+    shown = summary or result.summary()
+    files = [] if staged is None else [f'{staged.out}: {", ".join(result.files)}']
+    show(shown, *files)
+    if shown.then:
+        say(f'next: {following(shown.then, result)}')
+
+
+def show(summary: Summary, *below: str) -> None:
+    """Print a summary, the verdict first, with lines above the next steps."""
+    for line in summary.full_text(*below):
         say(line)
-    if staged is not None:
-        say(f'{staged.out}: {", ".join(result.files)}')
+
+
+def show_verdict(
+    verdict: VerdictSection,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *below: str,
+) -> None:
+    """Print the verdict of a page, and a table."""
+    first, *others = verdict.sentences
+    show(Summary(first, verdict.grade, heads, rows, [*others, *verdict.beware]), *below)
 
 
 def read_settings() -> ReadSettings:
@@ -188,7 +208,7 @@ def model_of(path: Path, robot: Robot | None) -> ArmModel:
     if not np.allclose(asked, own):
         told, known = (','.join(f'{part:g}' for part in vector) for vector in (asked, own))
         raise ModelError(
-            f'{path}: its gravity is {known}, and --gravity says {told}: leave --gravity out, or '
+            f'{path}: its gravity is {known}, and --gravity is {told}: leave --gravity out, or '
             'write that gravity into the file if the arm stands there now'
         )
     return arm

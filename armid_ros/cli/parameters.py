@@ -64,7 +64,7 @@ effects = click.option(
     show_default=True,
     metavar='E,...',
     shell_complete=completed,
-    help="Effects beside the rigid body; 'E@joint+joint' for some joints only.",
+    help="Effects added to the rigid body; 'E@joint+joint' for some joints only.",
 )
 _out = click.option(
     '--out', required=True, type=OutPath(file_okay=False, path_type=Path), help='Folder to fill.'
@@ -115,6 +115,7 @@ seed = click.option(
     show_default=True,
     help='Random seed.',
 )
+every = click.option('--all', 'every', is_flag=True, help='Print all values.')
 as_json = click.option('--json', 'as_json', is_flag=True, help='Print the result as JSON.')
 
 
@@ -136,13 +137,13 @@ def robot_described(**values: Any) -> Callable[[_Command], _Command]:
         'robot_source',
         metavar='R',
         shell_complete=completed,
-        callback=with_packages,
+        callback=lambda context, _, source: with_packages(context, source),
         **values,
     )
     return lambda command: source(packages(command))
 
 
-def with_packages(context: click.Context, _: click.Parameter, source: str | None) -> str | None:
+def with_packages(context: click.Context, source: str | None) -> str | None:
     """Append the packages to the path of the description."""
     written = []
     for text in context.meta.get(PACKAGES, []):

@@ -141,9 +141,9 @@ def _blaming(texts: Sequence[str], robot: Robot) -> Iterator[None]:
             if effect.changes_body and moments:
                 where = ', '.join(effect.joints) or 'the last joint'
                 raise ModelError(
-                    f"--effect '{text}': with it what {where} moves is no body: a mass whose "
+                    f"--effect '{text}': with it what {where} moves is no body. A mass whose "
                     'centre is off the joint has moments of inertia about it, mass times distance '
-                    f'squared; give {moments[0]} and the others too, or a smaller first moment'
+                    f'squared. Give {moments[0]} and the others too, or a smaller first moment'
                 ) from error
         raise
 

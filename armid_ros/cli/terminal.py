@@ -153,24 +153,5 @@ def print_rows(
     console.print(table)
 
 
-def print_parameters(rows: Sequence[dict[str, Any]]) -> None:
-    """Print a table of parameters; a dash for values whose interval includes zero."""
-    from armid_ros.identification.fitting.identifiability import excludes_zero
-
-    shown = [
-        {
-            'parameter': row['name'],
-            'joint': row['joint'],
-            'value': f'{row["value"]:.5g}'
-            if row['std'] is None or excludes_zero(row['value'], row['std'])
-            else 'includes 0',
-            'std': '' if row['std'] is None else f'{row["std"]:.2g}',
-            'unit': row['unit'],
-        }
-        for row in rows
-    ]
-    print_rows(shown, as_json=False, right=('value', 'std'))
-
-
 def _cell(value: Any) -> str:
     return visible(', '.join(map(str, value)) if isinstance(value, list) else str(value))

@@ -52,8 +52,8 @@ _ASSUMED = (
 )
 #: Fault where predicting no torque at all would be better.
 _NO_MODEL = (
-    'the model leaves {:.3g} times the torque of the baseline itself, more than no model would: '
-    'it is that of another arm, or has other units; identify the arm from the baseline, and give '
+    'the model leaves {:.3g} times the torque of the baseline itself, more than no model would. '
+    'It is that of another arm, or has other units. Identify the arm from the baseline, and give '
     'that model'
 )
 #: Time by which the beginning and the end of a span are uncertain [s].

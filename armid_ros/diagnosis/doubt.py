@@ -21,8 +21,8 @@ from armid_ros.recording import Recording
 import numpy as np
 
 _UNUSABLE = (
-    'The model was unusable when it was identified, as identification.json beside it says: what '
-    'it leaves is no measure of what has changed.'
+    'The model was unusable when it was identified (see its identification.json): its residual is '
+    'no measure of a change.'
 )
 
 
@@ -95,7 +95,7 @@ def _changed(
         return ''
     return (
         f'In the baseline the model leaves {times[worst]:.1f} times as much in '
-        f'{arm.robot.joints[worst]} as when it was identified: it is not what the model was '
+        f'{arm.robot.joints[worst]} as when it was identified. It is not what the model was '
         'identified from, or something had changed by then.'
     )
 

@@ -78,7 +78,7 @@ class Payload(_LinkBody):
     """
 
     name = 'payload'
-    summary = 'a body fixed to a link'
+    summary = 'a body fixed to a link; all values are about the frame of the joint that moves it'
     quantities = tuple(
         Quantity(
             f'payload_{name}',
@@ -180,7 +180,7 @@ class LinkInertia(_LinkBody):
     """
 
     name = 'link_inertia'
-    summary = 'mass, centre or inertia of a link other than described'
+    summary = 'mass, centre or inertia of a link other than described, in the frame of its joint'
     quantities = tuple(
         Quantity(f'{name}_difference', unit)
         for name, unit in zip(LINK_PARAMETERS, LINK_UNITS, strict=True)

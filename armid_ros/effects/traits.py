@@ -129,7 +129,7 @@ TRAITS = {
         mjcf_attribute='frictionloss',
     ),
     'asymmetric_friction': Traits(
-        shown_by='static holds beside slow motion in both directions',
+        shown_by='static holds and slow motion in both directions',
         look_at='the brake, the gear, and cables that pull one way',
         friction=True,
     ),
@@ -155,7 +155,7 @@ TRAITS = {
         friction=True,
     ),
     'gravity_magnitude': Traits(
-        shown_by='fast motion beside static holds',
+        shown_by='fast motion and static holds',
         look_at='the gravity in the settings, and the scale of all torques',
     ),
     'base_tilt': Traits(
@@ -188,8 +188,8 @@ TRAITS = {
         weighs=True,
     ),
     'link_inertia': Traits(
-        shown_by='fast motion beside static holds',
-        look_at='the link and what is bolted to it, beside its description',
+        shown_by='fast motion and static holds',
+        look_at='the link and what is bolted to it, against its description',
         corrects=True,
     ),
     'coupled_joint_friction': Traits(

@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
 import time
 from typing import Any, TYPE_CHECKING
 
 from armid_ros.cli import parameters as options
-from armid_ros.cli.terminal import print_rows, progress, say
+from armid_ros.cli.terminal import progress, say
 from armid_ros.errors import FleetError
 from armid_ros.files import json_text
 import click
@@ -19,8 +20,8 @@ import click
 if TYPE_CHECKING:
     from armid_ros.fleet.store import Store
 
-#: Refused bags and changes that are shown; all are among the results.
-_SHOWN = 20
+#: Refused bags, changes and diagnoses that are shown; all are among the results.
+_SHOWN = 8
 
 
 def _out(command: Callable[..., None]) -> Callable[..., None]:
@@ -87,6 +88,14 @@ def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]
             yield store, tick
     except StoreError as error:
         raise FleetError(f'{error}; is --out a folder that can be read and written?') from error
+
+
+def _print_shown(lines: Sequence[str], rest: str) -> None:
+    """Print the first lines, and where the rest is."""
+    for line in lines[:_SHOWN]:
+        say(line)
+    if len(lines) > _SHOWN:
+        say(f'... and {len(lines) - _SHOWN} more, in {rest}')
 
 
 def _print_json(name: str, **document: Any) -> None:
@@ -200,17 +209,15 @@ def identify(
         f'{len(outcome.arms)} arms: {outcome.done} bags done{found}, {len(refused)} refused, '
         f'in {time.monotonic() - start:.0f} s'
     )
-    for robot, filters in outcome.filters.items():
-        say(
-            f'{robot}: as `armid identify --cutoff {filters.cutoff_hz:.6g} '
-            f'--decimation {filters.decimation}`'
-        )
-    for name, problem in without.items():
-        say(f'{name}: no estimate: {problem}')
-    if refused:
-        print_rows(refused[:_SHOWN], as_json=False)
-        if len(refused) > _SHOWN:
-            say(f'... and {len(refused) - _SHOWN} more, in {out}/refused')
+    lines = [f'{name}: no estimate: {problem}' for name, problem in without.items()]
+    lines += [f'{one["arm"]}: {one["what"]}: {one["bag"]}: {one["reason"]}' for one in refused]
+    _print_shown(lines, f'{out}/refused')
+    used = [
+        f'{robot}: as `armid identify --cutoff {filters.cutoff_hz:.6g} '
+        f'--decimation {filters.decimation}`'
+        for robot, filters in outcome.filters.items()
+    ]
+    _print_shown(used, f'{out}/fleet.json')
     say(f'{out}: bags, parameters, arms, refused (Parquet), fleet.json')
 
 
@@ -236,10 +243,7 @@ def watch(out: str, alpha: float, as_json: bool) -> None:
     for arm in found.arms:
         counts[arm.health] += 1
     say(', '.join(f'{count} {word}' for word, count in counts.items() if count))
-    for row in rows[:_SHOWN]:
-        say(f'{row["arm"]}: {row["text"]}')
-    if len(rows) > _SHOWN:
-        say(f'... and {len(rows) - _SHOWN} more, in {out}/alarms.jsonl')
+    _print_shown([f'{row["arm"]}: {row["text"]}' for row in rows], f'{out}/alarms.jsonl')
     say(f'{out}: index.html, pages/, watch/ (Parquet), alarms.jsonl')
 
 
@@ -267,6 +271,7 @@ def diagnose(
     from armid_ros.fleet.diagnose import cases, diagnose_fleet
     from armid_ros.fleet.pages import write_pages
     from armid_ros.fleet.watch import watch_fleet, write_watch
+    from armid_ros.report.notation import pretty
 
     rows: list[dict[str, Any]] = []
     with _results(out, 'reading results') as (store, tick):
@@ -286,8 +291,13 @@ def diagnose(
     if as_json:
         _print_json('fleet-diagnoses', arms=rows)
         return
-    if not rows:
-        say('no arm is named; --arm or --all diagnose others')
-    for row in rows:
-        say(f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}')
+    words = Counter(row['verdict'].replace('_', ' ') for row in rows)
+    counts = ', '.join(f'{count} {word}' for word, count in words.most_common())
+    say(
+        f'{len(rows)} diagnosed: {counts}'
+        if rows
+        else 'No arm changed; --arm or --all name others.'
+    )
+    lines = [f'{row["arm"]}: {row["verdict"].replace("_", " ")}: {row["summary"]}' for row in rows]
+    _print_shown(list(map(pretty, lines)), f'{out}/reports')
     say(f'{out}: index.html, pages/, reports/, watch/diagnoses.parquet')

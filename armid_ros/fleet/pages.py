@@ -36,7 +36,7 @@ from armid_ros.report.blocks import (
     Paragraph,
     SmallMultiples,
 )
-from armid_ros.report.notation import counted, digits, pretty, printed, with_interval
+from armid_ros.report.notation import counted, digits, pretty, with_interval
 from armid_ros.report.page import Page, Section
 from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import escape, Markup
@@ -90,13 +90,13 @@ def _overview(found: Watch, diagnoses: Diagnoses) -> str:
 
 def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
     """Return the page of an arm."""
-    texts = [printed(row['text']) for row in change_rows(arm)]
+    texts = [pretty(row['text']) for row in change_rows(arm)]
     diagnosis = diagnoses.get(arm.arm)
     diagnosed = _diagnosed(arm, diagnosis)
     tone = {'changed': 'bad', 'healthy': 'fair' if diagnosed else 'good'}.get(arm.health, 'fair')
     quiet = 'No parameter has changed more than noise and other bags explain.'
     if diagnosis is not None and diagnosed:
-        quiet = printed(diagnosis['summary'])
+        quiet = pretty(diagnosis['summary'])
     sentence = (texts or [quiet])[0]
     sentence = f'{sentence[0].upper()}{sentence[1:]}'
     beware = [*texts[1:6]]
@@ -110,7 +110,7 @@ def _arm_page(found: Watch, arm: WatchedArm, diagnoses: Diagnoses) -> str:
         report = f'../{quote(diagnosis["report"])}' if diagnosis['report'] else ''
         cells = (
             _link(report, diagnosis['verdict'].replace('_', ' ')),
-            printed(diagnosis['summary']),
+            pretty(diagnosis['summary']),
         )
         sections.append(_table('Diagnosis', ('Verdict', 'Summary'), [cells]))
     order = {change.series.parameter: k for k, change in enumerate(arm.named)}
@@ -189,12 +189,10 @@ def _arm_row(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> list[str]:
     what = Markup('')
     for row in change_rows(arm)[:1]:
         bag = _link(f'{page}#{BagFile(arm.arm, row["bag"]).name}', 'bag')
-        what = Markup('{} {}').format(printed(row['text']), bag)
+        what = Markup('{} {}').format(pretty(row['text']), bag)
     if diagnosis is not None and diagnosis['verdict'] != 'failed':
         report = _link(diagnosis['report'], 'Diagnosis')
-        what += Markup('<br>' * bool(what) + '{}: {}').format(
-            report, printed(diagnosis['summary'])
-        )
+        what += Markup('<br>' * bool(what) + '{}: {}').format(report, pretty(diagnosis['summary']))
     for first in arm.named[:1]:
         series = first.series
         label, last = parameter_label(*series.parameter), digits(series.values[-1], 3)

@@ -87,7 +87,7 @@ def require_as_identified(path: str | Path) -> None:
         if known is not None and _content(place) != known:
             raise ModelError(
                 f'{place}: is not the recording any more that {path} was identified from, its '
-                'content is another; name the baseline (--baseline), ask without one '
+                'content is another. Name the baseline (--baseline), ask without one '
                 '(--no-baseline), or identify the arm again'
             )
 

@@ -371,7 +371,7 @@ def _remarks(fit: FittedValues, theory: BaseParameters) -> tuple[str, ...]:
         remarks.append(f'{fit.solution.outliers} torque samples were weighted down as outliers')
     if not fit.settled:
         remarks.append(
-            f'the fit has not settled after {fit.passes} linearisations: the effects asked for '
+            f'the fit has not settled after {fit.passes} linearisations: the effects '
             'change one another too much in these data; leave some out, or record more'
         )
     return tuple(remarks)

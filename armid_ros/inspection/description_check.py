@@ -14,15 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 from armid_ros.arm import ArmModel
 from armid_ros.effects.load import described_spread
 from armid_ros.identification import Identification, Score
-from armid_ros.inspection.inspect import Remark, worst_first
+from armid_ros.inspection.inspect import notes_on, Remark, worst_first
 from armid_ros.model import LINK_PARAMETERS
 from armid_ros.motion import FloatArray
-from armid_ros.robots import driven_in_words, NO_MASS, Robot
-from armid_ros.robots.geometry import collision_geometry
+from armid_ros.robots import NO_MASS, Robot
+from armid_ros.robots.description import MOVABLE, parse_xml
+from armid_ros.robots.geometry import all_in_one, collision_geometry
 import numpy as np
 
 #: Density of a link [kg/m^3]: shapes contain the link, so steel is the most and foam the least.
@@ -31,6 +33,9 @@ _DENSITIES = 30.0, 8000.0
 _TURNS = 6.0 * np.pi
 #: A velocity limit above this [rad/s] is hardly in rad/s, a shape above this [m] hardly in metres.
 _FASTEST, _LONGEST = 50.0, 10.0
+#: Length of an axis that is not rounding, and how far outside of the box of its shapes a centre of
+#: mass is doubtful, as a share of the box's diagonal.
+_ROUNDED, _OUTSIDE = 0.01, 1.0
 #: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
 _MATERIAL = 1.0
 #: Share of the rest that a further link has to explain; chi-squared per row that may remain.
@@ -107,10 +112,10 @@ def description_remarks(robot: Robot) -> tuple[Remark, ...]:
 
     """
     found = [Remark('bad', text) for text in robot.description.inertia_doubts()]
-    found += [*_of_limits(robot), *_of_shapes(robot)]
+    found += [*_of_limits(robot), *_of_axes(robot), *_of_shapes(robot)]
     known = {remark.text for remark in found}
-    notes = dict.fromkeys([*robot.notes, *driven_in_words(robot)])
-    return worst_first([*found, *(Remark('note', note) for note in notes if note not in known)])
+    others = [note for note in notes_on(robot) if note not in known]
+    return worst_first([*found, *(Remark('note', note) for note in others)])
 
 
 def _of_limits(robot: Robot) -> Iterator[Remark]:
@@ -125,17 +130,38 @@ def _of_limits(robot: Robot) -> Iterator[Remark]:
             yield Remark('doubt', f'{fast}; is it in degrees per second?')
 
 
+def _of_axes(robot: Robot) -> Iterator[Remark]:
+    """Check the length of axes as they are written; a model has them scaled to one."""
+    for joint in parse_xml(robot.urdf).iter('joint'):
+        axis = joint.find('axis')
+        if axis is None or joint.get('type') not in MOVABLE:
+            continue
+        length = float(np.linalg.norm([float(x) for x in axis.get('xyz', '').split()]))
+        if abs(length - 1.0) > _ROUNDED:
+            yield Remark(
+                'doubt', f"joint '{joint.get('name')}': its axis has length {length:.3g}, not 1"
+            )
+
+
 def _of_shapes(robot: Robot) -> Iterator[Remark]:
     """Check size and density of links with shapes; shapes overlap, so volumes are upper bounds."""
     geometry, missing = collision_geometry(robot, other='visual')
     volume = dict.fromkeys(robot.description.links, 0.0)
+    corners: dict[str, list[FloatArray]] = {link: [] for link in volume}
     for one in geometry.geometryObjects:
         one.geometry.computeLocalAABB()
-        box, link = one.geometry.aabb_local, robot.model.frames[one.parentFrame].name
+        box, frame = one.geometry.aabb_local, robot.model.frames[one.parentFrame]
+        link, place = frame.name, frame.placement.inverse() * one.placement
+        corners[link] += [
+            place.act(np.array(corner))
+            for corner in product(*zip(box.min_, box.max_, strict=True))
+        ]
         volume[link] += abs(float(one.geometry.computeVolume()))
         if max(box.width(), box.height(), box.depth()) > _LONGEST:
             yield Remark('bad', f"link '{link}': shape above {_LONGEST:g} m; millimetres?")
     for link, inertial in robot.description.links.items():
+        if inertial is not None and link not in missing:
+            yield from _of_centre(link, np.array(inertial.xyz), corners[link])
         if volume[link] <= 0.0 or link in missing:
             continue
         mass = 0.0 if inertial is None else inertial.mass
@@ -144,7 +170,19 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
             yield Remark('bad', f'{density}; steel has 7850')
         elif mass < _DENSITIES[0] * volume[link] and link != robot.base:
             yield Remark('doubt', f'{density}; foam has 30')
-    yield from (Remark('note', text) for text in missing.values())
+    yield from (Remark('note', text) for text in all_in_one([*missing.values()]))
+
+
+def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> Iterator[Remark]:
+    """Check that a centre of mass is not far from the box of the shapes of its link."""
+    if not corners:
+        if np.linalg.norm(centre) > _LONGEST:
+            yield Remark('bad', f"link '{link}': centre above {_LONGEST:g} m away; millimetres?")
+        return
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    outside = float(np.linalg.norm(centre - np.clip(centre, low, high)))
+    if outside > _OUTSIDE * np.linalg.norm(high - low):
+        yield Remark('doubt', f"link '{link}': centre of mass {outside:.3g} m outside its shape")
 
 
 def check_links(found: Identification, described: ArmModel, grade: str, fault: str) -> LinkCheck:

@@ -15,7 +15,7 @@ from armid_ros.inspection.joints import joint_facts, JointFacts
 from armid_ros.inspection.sampling import Sampling
 from armid_ros.inspection.trial import TrialFit, try_identification
 from armid_ros.recording import Recording, Topic
-from armid_ros.robots import Robot
+from armid_ros.robots import driven_in_words, held_joints, Robot
 import numpy as np
 
 SCHEMA = 'armid/inspection/1'
@@ -150,7 +150,7 @@ def inspect(
         said = {remark.text for remark in found}
         found += [Remark('note', note) for note in trial.notes if note not in said]
     if robot is not None:
-        found += [Remark('note', note) for note in robot.notes]
+        found += [Remark('note', note) for note in notes_on(robot)]
     return Inspection(recording, topics, robot, sampling, joints, trial, worst_first(found))
 
 
@@ -178,6 +178,15 @@ def inspection_document(found: Inspection) -> dict[str, Any]:
         'trial': trial,
         'verdict': found.verdict,
     }
+
+
+def notes_on(robot: Robot) -> list[str]:
+    """Return doubts and notes on a description, those on joints that are not driven as one."""
+    held = {f"joint '{joint.name}'" for joint in held_joints(robot)}
+    others = [note for note in robot.notes if note.partition(': not')[0] not in held]
+    return list(
+        dict.fromkeys([*robot.description.inertia_doubts(), *driven_in_words(robot), *others])
+    )
 
 
 def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:

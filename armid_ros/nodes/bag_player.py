@@ -156,7 +156,7 @@ class BagPlayerNode(ArmidNode):
         NodeParameter(
             'state_timeout',
             0.5,
-            'Age at which a joint state says nothing any more.',
+            'Age at which a joint state is out of date.',
             's',
             limits=(0.01, 60.0),
             read_only=False,

@@ -68,7 +68,9 @@ class IdentificationRunNode(ArmidNode):
         NodeParameter('gravity', 'earth', 'earth, moon, or x,y,z in the base frame [m/s^2].'),
         NodeParameter('joints', [''], 'Driven joints; without names, all but those of grippers.'),
         NodeParameter(
-            'effects', [''], 'Effects beside the rigid body; without names, what armid takes.'
+            'effects',
+            [''],
+            'Effects added to the rigid body; without names, the default of armid.',
         ),
         NodeParameter(
             'save_to',

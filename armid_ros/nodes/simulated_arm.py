@@ -116,7 +116,7 @@ class SimulatedArmNode(ArmidNode):
             'real_time_factor',
             1.0,
             'Simulated time per real time, if the computer can; who cannot follow loses '
-            'messages. 0: moves only when told.',
+            'messages. 0: moves only on request.',
             limits=(0.0, 1000.0),
             read_only=False,
         ),

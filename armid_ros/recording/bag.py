@@ -245,8 +245,8 @@ def _files_of(path: Path) -> BagMetadata:
         raise RecordingError(f'{path}: a directory without {FILE_NAME}, .mcap or .db3{hint}')
     if len({_storage_suffix(file) for file in found}) > 1:
         raise RecordingError(
-            f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that says which are the '
-            f'bag; give one of {", ".join(sorted(file.name for file in found))}'
+            f'{path}: holds both .mcap and .db3 files and no {FILE_NAME} that names those of '
+            f'the bag; give one of {", ".join(sorted(file.name for file in found))}'
         )
     # BAG_2.mcap is before BAG_10.mcap
     found.sort(key=lambda file: re.sub(r'\d+', lambda number: number[0].zfill(20), file.name))

@@ -140,7 +140,7 @@ def read_metadata(bag: Path) -> BagMetadata:
     except RecordingError as error:
         raise RecordingError(
             f'{path}: no valid description of a bag ({str(error).lstrip(": ")}); move it away, '
-            'and the files beside it will be read without it'
+            'and the files of its folder will be read without it'
         ) from error
     # Up to version 3 the paths began with the name of the directory.
     files = tuple(bag / Path(name).name for name in names)

@@ -70,7 +70,7 @@ def compare_report(comparison: Comparison, provenance: Provenance | None) -> str
         VerdictSection(*verdict(comparison), tell(comparison), _beware(comparison)),
         *([ContentSection('What changed', [DataTable(HEADS, rows, kind='both')])] if rows else []),
         changes_section(comparison),
-        ContentSection('What was asked', [FactList(facts)]),
+        ContentSection('Input', [FactList(facts)]),
         Origin(provenance or Provenance()),
     ]
     robot = robot_label(comparison.after.robot)
@@ -127,7 +127,7 @@ def tell_units(before: str, after: str, factors: Mapping[str, float]) -> str:
     named = ', '.join(f'{joint} {factor:.3g}' for joint, factor in factors.items())
     return (
         f'Inertia and friction of {after} are those of {before} times one factor a joint '
-        f'({named}): torques of one of the two are in another unit, or are currents, as drivers '
+        f'({named}). Torques of one of the two are in another unit, or are currents, as drivers '
         'change with their version. Convert them with --current-gain, and identify again.'
     )
 

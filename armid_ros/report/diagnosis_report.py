@@ -19,7 +19,7 @@ from armid_ros.report.notation import (
     counted,
     digits,
     percent,
-    printed,
+    pretty,
     probability,
     robot_label,
     short_names,
@@ -160,7 +160,7 @@ def diagnosis_report(
     recordings = [(one, role) for role, several in read.items() for one in several]
     names = short_names([one.source for one, _ in recordings])
     residual, patched = extras.residual, bool(diagnosis.findings)
-    steps = [*map(printed, extras.steps(diagnosis)), *_of_maps(residual)]
+    steps = [*map(pretty, extras.steps(diagnosis)), *_of_maps(residual)]
     sections: list[Section] = [_verdict(diagnosis, names, extras.worse, ''.join(steps[:1]))]
     curves = whole_overlays(diagnosis, [one for one, _ in recordings])
     if curves is not None and diagnosis.gap is not None:
@@ -227,7 +227,7 @@ def _verdict(
             f'Driven by the recorded torques, the patched model has larger position errors than '
             f'before in {", ".join(worse)}; see Forward validation.'
         )
-    first, stop, more = printed(with_names(diagnosis.summary, names)).partition('. ')
+    first, stop, more = pretty(with_names(diagnosis.summary, names)).partition('. ')
     badge, bars = diagnosis.verdict.replace('_', ' '), None
     if diagnosis.gap is not None and diagnosis.findings:
         bars = share_bars(diagnosis)

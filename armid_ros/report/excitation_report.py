@@ -143,25 +143,13 @@ def _verdict(
     notes: Sequence[str],
 ) -> VerdictSection:
     """Return the verdict: parameters seen, the worst known one, and clearance."""
-    information, settings = design.information, design.settings
-    std, names = information.std, information.parameters
+    settings = design.settings
     unseen = [
-        full_label(name, links) for name, s in zip(names, std, strict=True) if not np.isfinite(s)
+        full_label(name, links)
+        for name, s in zip(design.information.parameters, design.information.std, strict=True)
+        if not np.isfinite(s)
     ]
-    seen = len(names) - len(unseen)
-    sentences = [f'{seen} of {len(names)} parameters can be identified.']
-    if not unseen:
-        sentences = [
-            f'All {len(names)} parameters can be identified (condition number '
-            f'{information.condition:.3g}: {_conditioning(information.condition)}).'
-        ]
-        worst = int(np.argmax(std / information.scale))
-        sure = int(np.sum(std <= 0.1 * np.abs(design.described)))
-        sentences.append(
-            f'{sure} of {len(names)} will be known to 10 % or better. The least accurate will be '
-            f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
-            f'{pretty(names[worst].unit)}.'
-        )
+    sentences = identifiable(design, links)
     found = str(checked).removeprefix(f'{checked.word}: ')
     sentences.insert(0, f'{found[0].upper()}{found[1:]}.')
     quantity, share = max(shares.items(), key=lambda item: float(item[1].max()))
@@ -193,6 +181,24 @@ def _verdict(
     tone = 'good' if checked.word == FIT and not design.stopped else 'fair'
     tone = 'bad' if unseen or checked.word == UNFIT else tone
     return VerdictSection('blind' if unseen else checked.word, tone, sentences, beware)
+
+
+def identifiable(design: Design, links: Sequence[str]) -> list[str]:
+    """Say how many parameters can be identified, and how well those of the best design."""
+    information = design.information
+    std, names = information.std, information.parameters
+    seen = int(np.sum(np.isfinite(std)))
+    if seen < len(names):
+        return [f'{seen} of {len(names)} parameters can be identified.']
+    worst = int(np.argmax(std / information.scale))
+    sure = int(np.sum(std <= 0.1 * np.abs(design.described)))
+    return [
+        f'All {len(names)} parameters can be identified (condition number '
+        f'{information.condition:.3g}: {_conditioning(information.condition)}).',
+        f'{sure} of {len(names)} will be known to 10 % or better. The least accurate will be '
+        f'{full_label(names[worst], links)}: ± {digits(float(std[worst]))} '
+        f'{pretty(names[worst].unit)}.',
+    ]
 
 
 def _conditioning(condition: float) -> str:
@@ -243,7 +249,7 @@ def _asked(
             f'{counted(settings.starts, "start")}, at most {settings.iterations} iterations each',
         ),
     ]
-    return ContentSection('What was asked', [FactList(facts)])
+    return ContentSection('Input', [FactList(facts)])
 
 
 def _numbers(values: FloatArray) -> str:

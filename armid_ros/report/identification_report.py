@@ -185,7 +185,7 @@ def _asked(
         ('Fitted to', ', '.join(training)),
         ('Held out', ', '.join(validation) or 'nothing'),
     ]
-    return ContentSection('What was asked', [FactList(facts)])
+    return ContentSection('Input', [FactList(facts)])
 
 
 def _excitation_section(result: Identification) -> ContentSection:

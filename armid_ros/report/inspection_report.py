@@ -36,6 +36,11 @@ HEADS = (
     'measured [m]',
     'explains',
 )
+#: Tone of each word of a verdict.
+_TONES = {
+    **{'unfit': 'bad', 'doubtful': 'fair', 'ready': 'good'},
+    **{'wrong': 'bad', 'look': 'fair', 'clean': 'good'},
+}
 #: Samples of one curve on the page.
 _MOST = 2000
 #: No encoder of an arm resolves less [rad or m].
@@ -64,15 +69,13 @@ def inspection_report(
 
     """
     recording = found.recording
-    bad = any(remark.weight == 'bad' for remark in found.remarks)
-    doubt = any(remark.weight == 'doubt' for remark in found.remarks)
-    grade, tone = ('unfit', 'bad') if bad else ('doubtful', 'fair') if doubt else ('ready', 'good')
-    first = 2 if bad or doubt else 1
+    grade = inspection_word(found)
+    first = 1 if grade == 'ready' else 2
     texts = [remark.text for remark in found.remarks]
     texts.insert(first - 1, found.verdict)  # below the worst remark
     sentences = [text[0].upper() + text[1:].replace('`', '').rstrip('.') + '.' for text in texts]
     sections: list[Section] = [
-        VerdictSection(grade, tone, sentences[:first], sentences[first:]),
+        VerdictSection(grade, _TONES[grade], sentences[:first], sentences[first:]),
         _contents_section(found),
         _joints_section(found),
         _curves_section(found),
@@ -83,6 +86,20 @@ def inspection_report(
         filter(None, (Path(robot).name, recording.topic, counted(recording.n_joints, 'joint')))
     )
     return Page(f'Inspection of {name}', subtitle, sections, names=recording.joints).html()
+
+
+def inspection_word(found: Inspection) -> str:
+    """Return what a recording is in a word: ready, doubtful or unfit."""
+    weights = {remark.weight for remark in found.remarks}
+    return 'unfit' if 'bad' in weights else 'doubtful' if 'doubt' in weights else 'ready'
+
+
+def check_word(remarks: Sequence[Remark], found: LinkCheck | None) -> str:
+    """Return what a description is in a word: clean, look or wrong."""
+    weights = {remark.weight for remark in remarks}
+    if 'bad' in weights or (found is not None and found.wrong):
+        return 'wrong'
+    return 'look' if 'doubt' in weights else 'clean'
 
 
 def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, ...]:
@@ -99,7 +116,7 @@ def headline(remarks: Sequence[Remark], found: LinkCheck | None) -> tuple[str, .
         f'Torque error: {digits(found.error_percent)} % with the links of the URDF, '
         f'{digits(found.fitted_error_percent)} % with fitted links.'
     )
-    if np.isnan(found.measured_mass).any():
+    if np.isnan(found.measured_mass).any() and not np.isnan(found.measured_mass).all():
         errors += ' A dash is a mass that the recording does not determine.'
     if found.fault:
         first = f'The recording cannot check the links: {found.fault.rstrip(".")}.'
@@ -159,11 +176,9 @@ def description_check_report(
 ) -> str:
     """Return the page of a check, one HTML file that loads nothing."""
     first, *others = headline(remarks, links)
-    wrong = any(one.weight == 'bad' for one in remarks) or (links is not None and links.wrong)
-    doubt = any(one.weight == 'doubt' for one in remarks)
-    grade, tone = ('wrong', 'bad') if wrong else ('look', 'fair') if doubt else ('clean', 'good')
+    grade, texts = check_word(remarks, links), [one.text for one in remarks]
     sections: list[Section] = [
-        VerdictSection(grade, tone, [first, ' '.join(others)], [one.text for one in remarks])
+        VerdictSection(grade, _TONES[grade], [first, ' '.join(others)], texts)
     ]
     if links is not None:
         said = (

@@ -140,7 +140,7 @@ def _of_errors(
 ) -> Iterator[Caution]:
     """Yield statements on the errors of training and held-out data."""
     if held_out is None:
-        yield '', 'Record another motion, and test the model on it: --validate BAG.'
+        yield '', 'Record another motion of armid excite, and test the model on it: --validate.'
     else:
         ratio = held_out.relative_error_percent / max(training.relative_error_percent, 1e-9)
         if ratio > _OVERFIT:

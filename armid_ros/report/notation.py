@@ -31,13 +31,8 @@ _SHORT = 5
 
 
 def pretty(unit: str) -> str:
-    """Return a unit as it is printed: 'kg m²' for 'kg m^2'."""
+    """Return a unit, or a sentence with units, as it is printed: 'kg m²' for 'kg m^2'."""
     return unit.replace('^2', '²').replace('^3', '³')
-
-
-def printed(text: str) -> str:
-    """Replace ASCII notation of a sentence by the printed characters."""
-    return pretty(text.replace('+-', '±'))
 
 
 def digits(value: float, count: int = 2) -> str:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal, NamedTuple
 from xml.etree import ElementTree
@@ -175,6 +175,13 @@ def sticks(model: pin.Model) -> list[tuple[int, FloatArray]]:
             ends = [_BEYOND * np.array(model.inertias[joint].lever)]
         lines += [(joint, end) for end in ends]
     return lines
+
+
+def all_in_one(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return notes on meshes as one, with their count and the first; none for none."""
+    if len(notes) < 2:
+        return tuple(notes)
+    return (f'{len(notes)} meshes not found, such as that of {notes[0]}',)
 
 
 def _bodies(shape: LinkShape, meshes: _Meshes) -> list[tuple[coal.CollisionGeometry, float]]:

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from armid_ros.errors import RobotError
 from armid_ros.files import is_file
@@ -49,6 +50,14 @@ def find_mesh(name: str, urdf: Path | None) -> Path | None:
     return next((path for path in candidates if is_file(path)), None)
 
 
+def load_mesh(path: Path, scale: FloatArray) -> Any:
+    """Return a mesh as coal has it, scaled along its axes; RobotError if the file is none."""
+    try:
+        return coal.MeshLoader().load(str(path), scale)
+    except (RuntimeError, ValueError) as error:
+        raise RobotError(f'{path}: cannot be read as a mesh: {error}') from None
+
+
 def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry, ...]:
     """
     Return convex bodies that together contain a mesh and little else; a flat mesh stays one.
@@ -66,10 +75,7 @@ def convex_bodies(path: Path, scale: FloatArray) -> tuple[coal.CollisionGeometry
         If the file is no mesh.
 
     """
-    try:
-        mesh = coal.MeshLoader().load(str(path), scale)
-    except (RuntimeError, ValueError) as error:
-        raise RobotError(f'{path}: cannot be read as a mesh: {error}') from None
+    mesh = load_mesh(path, scale)
     vertices = np.array(mesh.vertices())
     try:
         whole = _hull(vertices)

@@ -47,7 +47,7 @@ def require_any_mass(robot: Robot) -> None:
     if np.all(np.abs(robot.rigid_parameters[::PER_LINK]) < NO_MASS):
         raise ModelError(
             f'{robot.path or robot.name}: no link has a mass ({", ".join(robot.links)}), so there '
-            'is no model to compare with: give them an <inertial>, or identify the arm first '
+            'is no model to compare with. Give them an <inertial>, or identify the arm first '
             '(armid identify) and name its model.yaml with --model'
         )
 

@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any
 
 from armid_ros.arm import ArmModel
-from armid_ros.errors import ArmidError
+from armid_ros.errors import ArmidError, RobotError
 from armid_ros.identification import SignalSettings
 from armid_ros.identification.rows.regression import predictions
 from armid_ros.identification.rows.signals import conditioning
@@ -29,7 +29,8 @@ from armid_ros.model.kinematics import LinkFrames
 from armid_ros.motion import FloatArray
 from armid_ros.recording import Recording
 from armid_ros.robots import Robot
-from armid_ros.robots.geometry import LinkShape, shapes_of, sticks
+from armid_ros.robots.geometry import all_in_one, LinkShape, shapes_of, sticks
+from armid_ros.robots.meshes import load_mesh
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -200,6 +201,7 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
     """Log what an arm looks like: <visual>, <collision> where a link has none, or bars."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
+    absent: list[str] = []
     stream.log('arm', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def place(joint: int) -> tuple[str, tuple[int, int, int]]:
@@ -209,10 +211,15 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
         return f'arm/{_part(name)}', _MARKED if name in marked else _LINK
 
     for shape in shapes_of(robot, 'visual', 'collision'):
-        if shape.kind == 'mesh' and shape.path is None:
-            notes.append(f"link '{shape.link}': its mesh is not found; it is not drawn")
-            continue
         where, colour = place(int(robot.model.frames[shape.frame].parentJoint))
+        if shape.kind == 'mesh' and shape.path is None:
+            absent.append(f"link '{shape.link}': mesh {shape.mesh} not found; not drawn")
+            continue
+        try:
+            drawing = _drawn(shape, colour)
+        except RobotError as error:
+            notes.append(f"link '{shape.link}': {error}; not drawn")
+            continue
         entity = f'{where}/{_part(shape.link)}_{shape.number}'
         turn = Rotation.from_matrix(np.array(shape.placement.rotation)).as_quat()
         pose = rr.Transform3D(
@@ -221,19 +228,20 @@ def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
             scale=shape.size if shape.kind == 'mesh' else None,
         )
         stream.log(entity, pose, static=True)
-        stream.log(entity, _drawn(shape, colour), static=True)
+        stream.log(entity, drawing, static=True)
         drawn += 1
     for joint, end in [] if drawn else sticks(robot.model):
         where, colour = place(joint)
         bar = rr.LineStrips3D([[np.zeros(3), end]], radii=_BAR, colors=colour)
         stream.log(f'{where}/bar', bar, static=True)
-    return notes
+    return [*all_in_one(absent), *notes]
 
 
 def _drawn(shape: LinkShape, colour: tuple[int, int, int]) -> Any:
-    """Return a shape in its own frame as rerun draws it."""
+    """Return a shape in its own frame as rerun draws it; RobotError for a broken mesh."""
     rr = rerun()
     if shape.path is not None:
+        load_mesh(shape.path, np.ones(3))  # the viewer leaves a broken one out without a word
         return rr.Asset3D(path=shape.path, albedo_factor=colour)
     look = {'colors': colour, 'fill_mode': 'solid'}
     if shape.kind == 'box':

@@ -27,7 +27,7 @@ print(ar.load_robot(URDF).joints)
 # ## A motion that is worth running
 #
 # It stays inside the limits of the URDF, and makes the parameters as visible as it can. The
-# table says how much of each limit it uses.
+# table has how much of each limit it uses.
 
 # %%
 plan = ar.design_excitation(URDF, duration=12.0, starts=1, iterations=10)

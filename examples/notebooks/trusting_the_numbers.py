@@ -64,14 +64,14 @@ print(f'{100 * np.mean(inside):.0f} % of {len(inside)} intervals of 95 % hold th
 # ## When the claim is void
 #
 # The claim takes the model as right. Leave out the Coulomb friction, which is there, and the
-# intervals of the viscous friction miss by far. The residual says so: it goes with the direction
+# intervals of the viscous friction miss by far. The residual shows it: it goes with the direction
 # of motion.
 
 # %%
 recording = ar.simulate(truth, plan, torque_noise=0.05, rng=99)
 wrong = ar.identify(URDF, recording, effects='viscous_friction')
 k = wrong.estimate.index('viscous_coefficient', 'elbow')
-print(f'{wrong.estimate.values[k]:.3f} +- {wrong.estimate.std[k]:.3f} N m s/rad, true 0.3')
+print(f'{wrong.estimate.values[k]:.3f} ± {wrong.estimate.std[k]:.3f} N m s/rad, true 0.3')
 
 # %%
 (fit,) = wrong.predict(recording)

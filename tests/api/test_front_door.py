@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `import armid_ros` offers: late, complete, and readable."""
 
+import dataclasses
 import json
 import os
 from pathlib import Path
@@ -142,7 +143,7 @@ def test_a_diagnosis_and_a_comparison_find_the_load(model, loaded, tmp_path):
 
 
 def test_an_inspection_and_an_excitation_show_themselves(runs, excitation, tmp_path):
-    found = ar.inspect(runs[0], 'humanoid_arm')
+    found = ar.inspect('humanoid_arm', runs[0])
     assert short(found)
     assert 'armid identify' in ' '.join(repr(found).split())
     assert found.report(tmp_path / 'page.html').is_file()
@@ -277,6 +278,32 @@ def test_a_value_has_the_name_of_its_effect_or_parameter(model):
     assert value == estimate['viscous_coefficient', 'elbow_pitch'] == pytest.approx(0.1, abs=0.01)
     with pytest.raises(ar.ArmidError, match='viscous_coefficient'):
         _ = estimate['viscous_friction', 'elbow']
+
+
+def test_a_plan_without_a_trajectory_shows_why(excitation):
+    blocked = dataclasses.replace(excitation, given_start=np.full(6, 3.0))
+    assert 'no way to the trajectory' in blocked._repr_html_()
+
+
+def test_an_inspection_takes_robot_and_recording_in_either_order(runs, tmp_path):
+    path = ar.write_recording(tmp_path / 'run', runs[0]) or tmp_path / 'run'
+    given = [('humanoid_arm', path), (path, 'humanoid_arm'), (path,), (None, path)]
+    found = [ar.inspect(*one).core.robot is None for one in given]
+    assert found == [False, False, True, True]
+    with pytest.raises(ar.ArmidError, match='two recordings'):
+        ar.inspect(runs[0], runs[1])
+    with pytest.raises(TypeError, match="'rng'"):
+        ar.inspect(path, seed=1)
+
+
+def test_residuals_are_a_table_of_every_joint(model, loaded):
+    table = model.residual_table()
+    joints = list(model.arm.robot.joints)
+    assert list(table.columns) == ['recording', 't', *joints]
+    errors = table[joints].std()
+    found = ar.diagnose(model.arm, loaded).residual_table()
+    assert list(found.columns) == list(table.columns)
+    assert (found[joints].std() < 3.0 * errors).all()
 
 
 def test_every_result_is_a_dict(model, excitation, runs):

@@ -62,7 +62,7 @@ def test_springs_on_one_leg_are_named_there(one_leg) -> None:
 def test_report_and_model_name_the_segments(one_leg) -> None:
     folder, document = one_leg
     page = (folder / 'found' / 'report.html').read_text(encoding='utf-8')
-    assert 'at swing_thigh' in page
+    assert 'in swing_thigh' in page
     arm = load_model(folder / 'found' / document['model'])
     ties = [tie.name for effect in arm.effects for tie in effect.ties]
     assert sorted(ties) == ['swing_shank', 'swing_thigh']

@@ -64,7 +64,7 @@ def test_what_is_not_explained_has_the_cause_that_explains_most_of_it(bench):
     assert plain.word == 'unknown' and '2.0 times' in plain.summary
     assert verdict(bench, left=4.0, minor=[finding(bench, 0.001)]) == plain
     text = verdict(bench, left=4.0, minor=[finding(bench)]).summary
-    assert all(fact in text for fact in ('elbow', '0.100 +- 0.020 rad', '5.7 degrees', '30 %'))
+    assert all(fact in text for fact in ('elbow', '0.100 ± 0.020 rad', '5.7 degrees', '30 %'))
 
 
 def test_a_share_has_two_digits_and_its_interval(bench):
@@ -75,7 +75,7 @@ def test_a_share_has_two_digits_and_its_interval(bench):
 @pytest.mark.parametrize(
     ('name', 'values', 'std', 'shown'),
     [
-        ('encoder_offset', (-1e-6,), (0.0007,), '0.0000 +- 0.0014 rad'),
+        ('encoder_offset', (-1e-6,), (0.0007,), '0.0000 ± 0.0014 rad'),
         ('base_tilt', (0.03517, 0.0006), (0.00017, 0.00015), '0.034 degrees'),
     ],
 )
@@ -102,7 +102,7 @@ def test_names_that_are_one_cause_have_one_share(bench):
     )
     text = verdict(bench, tilt, size, delay).summary
     assert text.count('90 %') == text.count('0.1 %') == 1
-    for fact in ('17.2 degrees', '0.300 +- 0.020 m/s^2', '0.300 +- 0.020 s', FLOOR):
+    for fact in ('17.2 degrees', '0.300 ± 0.020 m/s^2', '0.300 ± 0.020 s', FLOOR):
         assert fact in text
 
 

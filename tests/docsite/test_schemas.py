@@ -68,7 +68,7 @@ def test_a_check_of_a_description(at_desk):
 )
 def test_a_diagnosis_and_its_model(recordings, at_desk):
     armid(
-        *('diagnose', *recordings, '--robot', 'my_arm.urdf', '--all'),
+        *('diagnose', *recordings, '--robot', 'my_arm.urdf', '--everything'),
         *('--model', 'monday_result/model.yaml', '--out', 'found'),
     )
     check('diagnosis', read(at_desk / 'found' / 'diagnosis.json'))

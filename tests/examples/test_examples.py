@@ -20,7 +20,7 @@ EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 FOUND = {
     'askew_base': r'tilt|gravity',
     'elastic_joints': r'elbow +(39|40)\d\d N m/rad',
-    'exoskeleton': r'^(99|100)\d\d \+- \d+ N/m',
+    'exoskeleton': r'^(99|100)\d\d ± \d+ N/m',
     'from_csv': r'arm: 0\.\d+ % relative error',
     'gravity_of_the_moon': r'gravity',
     'hidden_effect_in_mujoco': r'elbow.*spring',

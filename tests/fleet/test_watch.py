@@ -112,7 +112,7 @@ def test_an_arm_whose_diagnosis_found_something_is_not_shown_as_healthy(lived):
     store, found, truth = lived
     arm = next(arm.arm for arm in found.arms if arm.arm not in truth['arms'])
     row = dict.fromkeys(DIAGNOSES.names) | {'arm': arm, 'verdict': 'named', 'report': ''}
-    row['summary'] = 'Payload of 0.25 +- 0.01 kg'
+    row['summary'] = 'Payload of 0.25 ± 0.01 kg'
     store.write_table('watch/diagnoses.parquet', pa.Table.from_pylist([row], DIAGNOSES))
     write_pages(store, found)
     page, index = (store.read(name).decode() for name in (f'pages/{arm}.html', 'index.html'))

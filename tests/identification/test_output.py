@@ -68,13 +68,14 @@ def test_what_a_motion_does_not_show_is_listed_with_the_reason(elbow_only):
         if joint != 'elbow_pitch':
             assert lost['viscous_coefficient', joint] == 'this motion does not show it'
     assert lost['m1', 'shoulder_pitch'] == 'no motion of this arm shows it'
-    weak = {key for key, reason in lost.items() if reason == 'not told from zero'}
+    weak = {key for key, reason in lost.items() if reason == 'not distinguishable from zero'}
     assert weak
     assert weak == shown & set(lost)
 
 
 def test_what_is_listed_as_not_told_has_zero_in_its_interval(elbow_only):
     estimate = elbow_only.estimate
-    weak = [u.parameter for u in elbow_only.unidentified if u.reason == 'not told from zero']
+    why = 'not distinguishable from zero'
+    weak = [u.parameter for u in elbow_only.unidentified if u.reason == why]
     for name, value, std in zip(estimate.parameters, estimate.values, estimate.std, strict=True):
         assert (name in weak) == (abs(value) <= 1.96 * std)

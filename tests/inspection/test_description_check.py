@@ -10,6 +10,7 @@ from docsite.desk import ARM, FRICTION, LOAD
 from tests.golden.inputs import recorded
 
 URDF = ARM.read_text()
+NO_MESH = '<collision><geometry><mesh filename="no.stl"/></geometry></collision>'
 BOX = '<collision><geometry><box size="{0} {0} {0}"/></geometry></collision></link>'
 
 
@@ -28,8 +29,23 @@ def with_box(edge):
         (with_box(0.04), 'bad', '1.56e+04 kg/m^3'),
         (with_box(0.5), 'doubt', '8 kg/m^3'),
         (with_box(300), 'bad', 'millimetres'),
+        (with_box(0.05).replace('0 0.01 0.15', '0 0.01 1.5'), 'doubt', 'outside its shape'),
+        (URDF.replace('0 0.01 0.15', '0 0 150'), 'bad', 'millimetres'),
+        (URDF.replace('axis xyz="0 1 0"', 'axis xyz="0 2 0"', 1), 'doubt', "'shoulder': its axis"),
+        (URDF.replace('</inertial>', f'</inertial>{NO_MESH}'), 'note', '3 meshes not found'),
     ],
-    ids=['inertia', 'limit', 'velocity', 'metal', 'feathers', 'millimetres'],
+    ids=[
+        'inertia',
+        'limit',
+        'velocity',
+        'metal',
+        'feathers',
+        'shape in millimetres',
+        'centre outside',
+        'centre in millimetres',
+        'axis',
+        'meshes',
+    ],
 )
 def test_an_impossible_value_is_found(text, weight, fact):
     found = ar.check(ar.load_robot(text))
@@ -48,6 +64,7 @@ def test_a_mass_that_the_description_lacks_is_recovered_with_its_interval():
     assert abs(links.measured_mass[2] - 1.4) < 4.0 * links.mass_std[2] < 0.04
     assert np.all(np.abs(links.measured_centre[2] - centre) < 4.0 * links.centre_std[2])
     assert 'too light at elbow' in found.finding
+    assert '\n'.join(found.summary().full_text()).count('±') == 3  # finding, mass and centre
 
 
 def test_a_description_that_is_right_agrees():

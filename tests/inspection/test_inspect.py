@@ -153,7 +153,7 @@ def test_stamps_that_are_rounded_are_said_with_their_step(clean):
     lost = len(clean) - len(first)
     report = ReadReport(messages=len(clean), samples=len(first), duplicates=lost)
     rounded = replace(clean.select(first), t=t[first], report=report)
-    said = f'rounded to 12.5 ms: all are multiples of that, and {lost} of 2000 samples'
+    said = f'rounded to 12.5 ms: all are multiples of that. {lost} of 2000 samples'
     assert any(said in remark for remark in remarks(rounded))
     twice = replace(clean, report=replace(report, samples=len(clean)))
     jittered = replace(twice, t=clean.t + 1e-3 * np.random.default_rng(1).uniform(size=2000))

@@ -30,7 +30,7 @@ TITLES = [
     'Excitation',
     'Whiteness',
     'Data quality',
-    'What was asked',
+    'Input',
     'Provenance',
 ]
 

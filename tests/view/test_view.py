@@ -102,13 +102,17 @@ def test_bodies_have_the_size_of_the_description(recording, tmp_path):
         </inertial><visual><origin xyz="0 0 1"/><geometry><box size="0.2 0.4 0.6"/></geometry>
         </visual><visual><geometry><cylinder radius="0.1" length="2"/></geometry></visual>
         <visual><geometry><sphere radius="0.3"/></geometry></visual>
-        <visual><geometry><mesh filename="nowhere.stl"/></geometry></visual></link>
+        <visual><geometry><mesh filename="nowhere.stl"/></geometry></visual>
+        <visual><geometry><mesh filename="file://BROKEN"/></geometry></visual></link>
         <joint name="j" type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 0 1"/>
         <limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
-    model = ar.ArmModel(ar.load_robot(text))
+    broken = tmp_path / 'broken.stl'
+    broken.write_text('no mesh')
+    model = ar.ArmModel(ar.load_robot(text.replace('BROKEN', str(broken))))
     run = ar.Recording(joints=('j',), t=np.arange(3.0), q=np.zeros((3, 1)))
-    (note,) = log_recording(open_stream('a run', tmp_path / 'run.rrd'), model, run)
-    assert "'l'" in note and 'not found' in note
+    absent, unread = log_recording(open_stream('a run', tmp_path / 'run.rrd'), model, run)
+    assert "'l'" in absent and 'not found' in absent
+    assert "'l'" in unread and str(broken) in unread
     found = held(tmp_path / 'run.rrd')
 
     def size(number, name):

@@ -20,7 +20,7 @@ from armid_ros.files import load_yaml, read_text, settled
 from armid_ros.motion import FloatArray
 from armid_ros.nodes.lockstep import run_lockstep
 from armid_ros.recording import read_recording, Recording
-from armid_ros.report.notation import digits, pretty, printed
+from armid_ros.report.notation import digits, pretty
 from armid_ros.robots import collision_model, Robot
 from armid_ros.robots.shipped import shipped_path
 from armid_ros.simulation import Sensors, SimulatedArm
@@ -33,7 +33,7 @@ SENSORS = Sensors(
 #: A run with the hidden change: seconds of a period, and harmonics.
 _PERIOD, _HARMONICS = 8.0, 5
 _RUNS = ('after_1', 'after_2', 'unused')
-#: Values of the hidden effect that are printed.
+#: Values of the hidden effect that are pretty.
 _SHOWN = 4
 
 
@@ -209,7 +209,7 @@ def diagnose_hidden(
 def show_hidden(hidden: HiddenChange, found: Diagnosis) -> None:
     """Print the diagnosis, its gain on the held-out run, and the hidden effect."""
     say('Then a change was hidden in the arm, and three runs were recorded. Diagnosis of two:')
-    say(printed(f'{found.verdict.replace("_", " ").upper()}: {found.summary}'))
+    say(pretty(f'{found.verdict.replace("_", " ").upper()}: {found.summary}'))
     gap, arm = found.gap, found.arm
     if gap is not None:
         worst = int(np.argmax(gap.chi2_before))

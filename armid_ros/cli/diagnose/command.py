@@ -72,7 +72,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
     help="Share of a joint's torque (rms) below which an effect does not matter.",
 )
 @click.option(
-    '--all', 'everything', is_flag=True, help='Add effects to the model that do not matter, too.'
+    '--everything', is_flag=True, help='Add effects to the model that do not matter, too.'
 )
 @click.option(
     '--prior',
@@ -111,6 +111,7 @@ class Percent(click.ParamType):  # type: ignore[type-arg]
 @parameters.joints
 @parameters.seed
 @parameters.reading
+@parameters.every
 @parameters.as_json
 def diagnose(
     bags: tuple[Path, ...],
@@ -130,13 +131,14 @@ def diagnose(
     partner_topic: str | None,
     ties: tuple[str, ...],
     seed: int,
+    every: bool,
     as_json: bool,
     priors: tuple[str, ...],
     **asked: Any,
 ) -> None:
     """Find which effect a model lacks, and add it."""
     if baseline and no_baseline:
-        raise click.UsageError('--baseline names bags, --no-baseline asks without: give one')
+        raise click.UsageError('give --baseline or --no-baseline, not both')
     from armid_ros.api.diagnosis import diagnose as run
     from armid_ros.api.table import ResultOrigin
     from armid_ros.arm import ArmModel
@@ -186,7 +188,7 @@ def diagnose(
         staged.keep()
         result = result.with_extras(residual is not None, seed, tick)
         tick(1.0, 'writing')
-        summary = result.summary(str(out / 'model.yaml'))
+        summary = result.summary(str(out / 'model.yaml'), every)
         options.deliver(result, staged, origin, as_json, summary)
     stopped = {'bad_data': 2, **({'unknown': 3, 'not_repeatable': 3} if strict else {})}
     click.get_current_context().exit(stopped.get(result.verdict, 0))

@@ -64,7 +64,7 @@ def open_partner(
 
     if source is None:
         if ties:
-            raise ModelError('--tie says where the arm is tied, --partner to what: give both')
+            raise ModelError('give both --tie, where the arm is tied, and --partner, to what')
         return None
     other = load_robot(source, gravity=gravity)
     kept = str(Path(source).resolve()) if Path(source).is_file() else source

@@ -170,7 +170,8 @@ class Speed(click.ParamType[str | float]):
     multiple=True,
     type=click.Path(path_type=Path),
     metavar='BAG',
-    help='A bag recorded already: add most to what it tells. May be given several times.',
+    help='A bag recorded already, to whose information this trajectory adds. May be given several '
+    'times.',
 )
 @click.option(
     '--starts',

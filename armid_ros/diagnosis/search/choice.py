@@ -52,8 +52,8 @@ WRITTEN_MISFIT = 'the misfit that the model had when it was identified'
 _AS_OFTEN = 1.2
 #: Note where nothing is known of how well a model was identified.
 _AS_EXACT = (
-    'values of the model are taken as exact, as identification.json is not beside it: what they '
-    'are off by is not in the intervals'
+    'values of the model are taken as exact, for want of its identification.json: intervals do '
+    'not include their errors'
 )
 #: What would tell a change from a misfit, where there are no or too few recordings.
 _NO_BASELINE = (

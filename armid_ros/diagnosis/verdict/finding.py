@@ -131,13 +131,13 @@ class Finding:
         names = f'{first}{"" if own == other else own} from {second}{other}'
         one_body = bodies and bool(carried) and alike and bool(self.joints)
         shown = [kind.traits.shown_by for kind in (carried if one_body else kinds)]
-        best = '; or '.join(dict.fromkeys(shown or [Effect.traits.shown_by]))
+        best = '. Or record '.join(dict.fromkeys(shown or [Effect.traits.shown_by]))
         if one_body:
             return (
                 f'No motion tells {names}, as they move as one body. Weigh what the link carries, '
                 f'or record {best}.'
             )
-        return f'To tell {names}, record what shows them best: {best}.'
+        return f'To tell {names}, record {best}.'
 
     def place_of(self, joint: str) -> str:
         """Return where the parameters of a joint act: its tied segment, or the joint itself."""

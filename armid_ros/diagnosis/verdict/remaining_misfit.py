@@ -33,7 +33,7 @@ _HELD = 3.0
 #: Words for a joint that is held, for a table, and for the beginning and the end of a sentence.
 _WHERE = 'at rest or turning round, and more than friction: a stop, a brake or a contact'
 _TURNING = 'where it stands still or turns round'
-_BESIDE = ' beside friction: a stop, a brake or a contact does that'
+_BESIDE = ' in addition to friction: a stop, a brake or a contact does that'
 
 
 @dataclass(frozen=True)

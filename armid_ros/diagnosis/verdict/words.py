@@ -167,7 +167,8 @@ def names_and_places(group: Sequence[Finding]) -> str:
     """Return what names that are one cause are, and where."""
     joints = dict.fromkeys(joint for one in group for joint in one.joints)
     names = ' and '.join(one.name.replace('_', ' ') for one in group)
-    return f'{names} of {", ".join(joints) or "the whole arm"}'
+    where = ', '.join(joints) if len(joints) <= _JOINTS_SAID else f'{len(joints)} joints'
+    return f'{names} of {where or "the whole arm"}'
 
 
 def by_cause(findings: Sequence[Finding]) -> list[list[Finding]]:
@@ -245,7 +246,7 @@ def _with_degrees(value: float, std: float, unit: str) -> str:
 def _strange(joints: Sequence[str], findings: Sequence[Finding]) -> str:
     text = (
         f'Equal periods differ in {", ".join(joints)} by more than noise, and not with time or '
-        'velocity: something acts that does not repeat, such as contact or a person. '
+        'velocity. Something acts that does not repeat, such as contact or a person. '
     )
     if findings:
         names = ', '.join(finding.name.replace('_', ' ') for finding in findings)
@@ -270,4 +271,4 @@ def as_sure(value: float, std: float) -> str:
     if not 0.0 < wide < np.inf:
         return f'{value:.4g}'
     decimals = max(0, 1 - int(np.floor(np.log10(wide))))
-    return f'{value:z.{decimals}f} +- {wide:.{decimals}f}'
+    return f'{value:z.{decimals}f} ± {wide:.{decimals}f}'

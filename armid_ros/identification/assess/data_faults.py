@@ -163,9 +163,10 @@ def _described_friction(arm: ArmModel) -> list[str]:
     ]
     if not stated:
         return []
+    where = ', '.join(stated) if len(stated) < 4 else f'{len(stated)} joints'
     return [
-        f'the description states friction of {", ".join(stated)} in <dynamics>, which the model '
-        'does not have: it is looked for like any other; give a model that has it'
+        f'friction in <dynamics> of the description is not in the model ({where}); '
+        'use a model with friction'
     ]
 
 

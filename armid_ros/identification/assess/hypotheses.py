@@ -97,7 +97,7 @@ AS_RECORDED = Hypothesis('nothing', 'the data are as they should be', values=0)
 #: The description says nothing of this arm: friction and drives take all there is.
 WITHOUT_BODY = Hypothesis(
     'body',
-    'the description says nothing of the torques',
+    'the description does not explain the torques',
     body=lambda robot: robot.with_inertias(np.zeros_like(robot.rigid_parameters)),
     values=0,
 )
@@ -165,7 +165,7 @@ def delayed(seconds: float, half_width: float) -> Hypothesis:
     return Hypothesis(
         'delay',
         f'the torque seems to come about {1e3 * abs(seconds):.0f} ms {side} than the '
-        f'position (+- {np.ceil(1e3 * half_width):.0f} ms): stamp both alike',
+        f'position (± {np.ceil(1e3 * half_width):.0f} ms): stamp both alike',
         lambda motion: shifted(motion, seconds),
     )
 

@@ -74,7 +74,7 @@ def units_beyond_drives(
         yield (
             f'the torque of {robot.joints[joint]} seems to be in another unit than {unit}: '
             f'half of its readings are beyond {usual[joint]:.3g}, its drive gives '
-            f'{limit:.4g} {unit}; convert it, or correct the limit in the description'
+            f'{limit:.4g} {unit}. Convert it, or correct the limit in the description'
         )
 
 

@@ -187,7 +187,7 @@ def encoder_faults(recording: Recording, units: Sequence[str] | None = None) -> 
             yield Fault(
                 f'the velocity of {joint} stays at {recording.dq[0, j] + 0.0:.4g} {unit}/s '
                 f'throughout, while its position goes {moved[j]:.3g} {unit}: one of the two is '
-                'dead; record again, or leave velocities out if the positions are right',
+                'dead. Record again, or leave velocities out if the positions are right',
                 'unusable',
                 recording.source,
             )
@@ -310,9 +310,9 @@ def velocity_faults(recording: Recording) -> Iterator[Fault]:
     if not known and np.all(np.abs(plain / factor - 1.0) <= _ALIKE):
         yield Fault(
             f'velocities of all joints that move are {factor:.3g} times what positions do in the '
-            f'recorded time: time stamps run {factor:.3g} times as long as it took, and inertias '
-            'are off by the square of that, or velocities are in another unit; put right which '
-            'it is',
+            f'recorded time. Either time stamps run {factor:.3g} times as long as it took, and '
+            'inertias are off by the square of that, or velocities are in another unit. Correct '
+            'which it is',
             'poor',
             recording.source,
         )

@@ -22,7 +22,7 @@ Reason = Literal[
     'no motion of this arm shows it',
     'this motion does not show it',
     'this motion shows it only together with others',
-    'not told from zero',
+    'not distinguishable from zero',
 ]
 
 
@@ -83,7 +83,7 @@ def unidentified(
             )
     told = excludes_zero(estimate.values, estimate.std)
     found += [
-        Unidentified(name, 'not told from zero')
+        Unidentified(name, 'not distinguishable from zero')
         for name, sure in zip(estimate.parameters, told, strict=True)
         if not sure
     ]

@@ -139,7 +139,7 @@ class PhysicalProgram:
         ).solve()
         if str(solution.status) not in ('Solved', 'AlmostSolved'):
             raise IdentificationError(
-                f'no physically consistent parameters: the solver says {solution.status}; '
+                f'no physically consistent parameters: the solver ends with {solution.status}; '
                 'check the total mass and the boxes of the links against each other'
             )
         theta = origin + change @ np.array(solution.x[:size])

@@ -237,7 +237,7 @@ def segments(recording: Recording, used: Conditioning) -> Iterator[Motion]:
         lacking = [what for what in recording.report.absent if what.startswith('effort')]
         raise IdentificationError(
             f'{recording.source}: {recording.topic} has no {"".join(lacking) or "effort"} (absent '
-            'or NaN throughout); identification needs the torque of every joint in '
+            'or NaN throughout). Identification needs the torque of every joint in '
             'JointState.effort: fill it in, or leave joints out with --joints'
         )
     positions = recording.q
@@ -282,7 +282,7 @@ def no_stretch(recording: Recording, used: Conditioning) -> IdentificationError:
     return IdentificationError(
         f'{recording.source}: no stretch is long enough to be filtered at {used.cutoff_hz:g} Hz: '
         f'the longest without a gap has {longest:.2f} s, more than {_shortest(used):.2f} s are '
-        'needed; record longer, or without gaps'
+        'needed. Record longer, or without gaps'
         + (', or lower --decimation' if 'decimation' in used.given else '')
     )
 

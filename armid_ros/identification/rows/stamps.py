@@ -75,9 +75,9 @@ def rounded_stamps(recording: Recording) -> str:
     if np.any(np.abs(steps / step - np.round(steps / step)) > _WHOLE):
         return ''
     return (
-        f'time stamps seem to be rounded to {1e3 * step:.4g} ms: all are multiples of that, and '
+        f'time stamps seem to be rounded to {1e3 * step:.4g} ms: all are multiples of that. '
         f'{report.duplicates} of {report.messages} samples had the stamp of another and are left '
-        'out; write stamps with more digits, or record with those of the driver'
+        'out. Write stamps with more digits, or record with those of the driver'
     )
 
 
@@ -133,6 +133,6 @@ def two_senders(recording: Recording) -> str:
         return ''
     return (
         f'{len(rows)} of {len(t)} messages contradict those around them, as of two senders of '
-        f'one topic: the position of {recording.joints[joint]} jumps by {jump:.3g} and back, '
-        f'first at {t[rows[0] + 1] - t[0]:.3f} s; record each sender on a topic of its own'
+        f'one topic. The position of {recording.joints[joint]} jumps by {jump:.3g} and back, '
+        f'first at {t[rows[0] + 1] - t[0]:.3f} s. Record each sender on a topic of its own'
     )

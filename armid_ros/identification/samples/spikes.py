@@ -120,6 +120,7 @@ class SpikeGate:
         self.spikes: Counter[int] = Counter()
         self.rejected: Counter[str] = Counter()
         self.left_out: list[Excursion] = []
+        self._early: StreamSample | None = None
         self._last: FloatArray | None = None  # of the good samples, across stretches
         count = len(self._turn)
         self.lowest, self.highest = np.full(count, np.inf), np.full(count, -np.inf)
@@ -227,7 +228,7 @@ class SpikeGate:
         self._went_on, self._suspect = 0, np.empty(0, dtype=np.intp)
         self._off = self._limit = np.zeros(len(self._turn))
         self._stray: StreamSample | None = None
-        self._early: StreamSample | None = None
+        self._early = None
         self._period = np.inf
         self._quantile = 0.0
 

@@ -27,12 +27,12 @@ DISTURBANCES = {
     'impossible': 'joint states with numbers that no arm has are left out',
     'stamp': 'joint states whose stamp alone is off are left out',
     'erratic': 'joint states that follow neither those before nor each other are left out',
-    'no_velocity': 'joint states without velocity are left out: measured_velocity asks for it',
+    'no_velocity': 'joint states without velocity are left out: measured_velocity requires it',
     'jump_back': 'joint states jump back in time: what is made of them begins anew',
     'position_step': 'positions step, as when a clock is set or an encoder is zeroed: the filters '
     'begin anew',
-    'missing': 'joint states are missing between those that came: a history of the publisher of '
-    'less than a second at their rate, or a computer that has too much to do, loses some',
+    'missing': 'joint states are missing between those that came: the history of the publisher is '
+    'shorter than a second, or the computer has too much to do',
     'dropout': 'joint states are missing for longer than max_gap: the filters begin anew',
     'frozen': 'positions stay at the same numbers while efforts change: look whether the driver '
     'still reads the encoders',

@@ -66,7 +66,9 @@ PUBLISHER_PARAMETERS = (
         choices=tuple(SPEED_CLASSES),
     ),
     NodeParameter(
-        'effects', list(USUAL_EFFECTS), 'Effects that are to be seen, beside the rigid body.'
+        'effects',
+        list(USUAL_EFFECTS),
+        'Effects to excite, with the rigid body.',
     ),
     NodeParameter('clearance', 0.01, 'Distance kept between bodies.', 'm', limits=(0.0, 1.0)),
     NodeParameter(
@@ -93,16 +95,16 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'interface',
         'auto',
-        'How trajectories are sent: as goals of the action, which needs the package control_msgs; '
-        'by topic, which no controller answers; auto: by the action where there is one when the '
-        'run begins.',
+        'How trajectories are sent. action: as goals, which needs the package control_msgs. '
+        'topic: no controller answers. auto: by the action where there is one when the run '
+        'begins.',
         choices=('auto', 'topic', 'action'),
     ),
     NodeParameter(
         'action',
         '',
-        'Name of the action; empty: follow_joint_trajectory beside the topic joint_trajectory, '
-        'where that is remapped to.',
+        'Name of the action; empty: follow_joint_trajectory in the namespace of the topic '
+        'joint_trajectory.',
     ),
     NodeParameter(
         'goal_tolerance',
@@ -177,9 +179,8 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'effort_factor',
         3.0,
-        'The arm is stopped when the effort of a joint is, three times in a row, larger by this '
-        'factor than what is foreseen for the run and than 10 % of its limit; 0: never, the '
-        'default in a simulation.',
+        'Factor over the planned effort of a joint, and over 10 % of its limit, at which the '
+        'arm is stopped after three samples. 0: never, the default in a simulation.',
         limits=(0.0, 1000.0),
         read_only=False,
     ),

@@ -30,7 +30,7 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'effects',
         list(USUAL_EFFECTS),
-        'Effects to estimate beside the rigid body, each as NAME[@joint+joint].',
+        'Effects to estimate with the rigid body, each as NAME[@joint+joint].',
     ),
     NodeParameter('cutoff', 5.0, 'Low-pass on torque and regressor.', 'Hz', limits=(0.01, 1000.0)),
     NodeParameter(

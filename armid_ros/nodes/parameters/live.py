@@ -75,15 +75,15 @@ LIVE_PARAMETERS = (
     NodeParameter(
         'effects',
         [''],
-        'Effects that are known beside it, each as NAME[@joint+joint]:quantity=value.',
+        'Known effects of the arm, each as NAME[@joint+joint]:quantity=value.',
     ),
     NodeParameter('baseline', [''], 'Bags from when nothing was wrong.'),
     NodeParameter(
         'learning',
         20.0,
-        'Motion at the beginning in which nothing is wrong, from which the misfit of the model '
-        'is measured where neither a baseline nor the model file says it; 0: all that the model '
-        'lacks is asked for, not what changes.',
+        'Motion at the beginning in which nothing is wrong. It gives the misfit of the model '
+        'where neither a baseline nor the model file does. 0: find all that the model lacks, not '
+        'changes alone.',
         's',
         limits=(0.0, 600.0),
     ),

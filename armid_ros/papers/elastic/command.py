@@ -45,8 +45,11 @@ import click
 @options.folder
 @options.reading
 @options.seed
+@options.every
 @options.as_json
-def elastic(out: Path, seed: int, as_json: bool, robot_source: str, **given: Any) -> None:
+def elastic(
+    out: Path, seed: int, every: bool, as_json: bool, robot_source: str, **given: Any
+) -> None:
     """
     Identify elastic joints.
 
@@ -57,4 +60,4 @@ def elastic(out: Path, seed: int, as_json: bool, robot_source: str, **given: Any
     """
     from armid_ros.papers.elastic.work import ElasticOptions, identify_elastic
 
-    identify_elastic(ElasticOptions(robot=robot_source, **given), out, seed, as_json)
+    identify_elastic(ElasticOptions(robot=robot_source, **given), out, seed, as_json, every)

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import progress, say
+from armid_ros.cli.terminal import progress
 from armid_ros.errors import RecordingError
 from armid_ros.files import json_text, write_file
 from armid_ros.papers.elastic.identification.files import read_sides
 from armid_ros.papers.elastic.identification.joints import fit_springs, SpringEstimate
 from armid_ros.papers.elastic.identification.output import springs_document, SPRINGS_SCHEMA
-from armid_ros.papers.elastic.report.springs import springs_report
+from armid_ros.papers.elastic.report.springs import springs_report, verdict
 from armid_ros.recording.elastic import LINK
 from armid_ros.robots import Robot
 import click
@@ -54,27 +54,23 @@ def identify_springs(
     if as_json:
         click.echo(json_text(document))
         return
-    for joint in found:
-        say(_line(joint))
-    say(f'{out}: elastic.json, report.html')
+    heads = ('joint', 'stiffness [N m/rad]', '95 %', 'free play', 'rotor', 'resonance')
+    files = f'{out}: elastic.json, report.html'
+    options.show_verdict(verdict(found), heads, [_row(one) for one in found], files)
 
 
-def _line(found: SpringEstimate) -> str:
-    """Return what was found of a joint in words."""
+def _row(found: SpringEstimate) -> tuple[str, ...]:
+    """Return what was found of a joint; dashes for what the recording does not show."""
     if not found.informative:
-        return f'{found.joint}: the twist does not follow the load, so no stiffness is estimated'
+        return (found.joint, *['-'] * 5)
     fit = found.transmission
     stiffness, low, high = fit.stiffness
-    parts = [f'{stiffness:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %)']
-    if fit.backlash_seen:
-        parts.append(f'free play {fit.backlash[0]:.2g} rad')
-    elif not np.isfinite(fit.correlation):
-        parts.append('too few reversals of load to see free play')
-    else:
-        parts.append('no free play seen')
-    if found.motor is not None:
-        parts.append(f'rotor {found.motor[0]:.3g} kg m^2')
-    frequencies = f'antiresonance {found.antiresonance:.1f} Hz'
-    if np.isfinite(found.resonance):
-        frequencies += f', resonance {found.resonance:.1f} Hz'
-    return f'{found.joint}: {"; ".join([*parts, frequencies])}'
+    play = '-' if not np.isfinite(fit.correlation) else 'none seen'
+    return (
+        found.joint,
+        f'{stiffness:.4g}',
+        f'{low:.4g} to {high:.4g}',
+        f'{fit.backlash[0]:.2g} rad' if fit.backlash_seen else play,
+        '-' if found.motor is None else f'{found.motor[0]:.3g} kg m^2',
+        f'{found.resonance:.1f} Hz' if np.isfinite(found.resonance) else '-',
+    )

@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import print_parameters, progress, say, Tick
+from armid_ros.cli.terminal import progress, Tick
 from armid_ros.errors import RecordingError, RobotError
 from armid_ros.files import json_text, Staged, write_file
 from armid_ros.motion import FloatArray
 from armid_ros.papers.elastic.identification.files import read_runs
+from armid_ros.papers.elastic.identification.names import PER_JOINT
 from armid_ros.papers.elastic.identification.output import elastic_document, SCHEMA, tuning_story
 from armid_ros.papers.elastic.identification.three_steps import identify_two_inertia
 from armid_ros.papers.elastic.plant.run import ElasticSensors, run_all
@@ -26,7 +28,7 @@ from armid_ros.papers.elastic.plant.signals import (
     STEPS,
     WEAK,
 )
-from armid_ros.papers.elastic.report.page import elastic_report
+from armid_ros.papers.elastic.report.page import elastic_report, verdict
 from armid_ros.papers.elastic.springs import identify_springs
 from armid_ros.recording.elastic import write_runs
 from armid_ros.recording.writer import require_new
@@ -43,6 +45,8 @@ from armid_ros.simulation.motor_control import VelocityLoop
 import click
 import numpy as np
 
+#: Heads and rows of a table.
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]
 #: Recordings that --demo makes.
 DEMO_BAGS = ('resonances', 'steps')
 #: Noise of the simulated sensors: rates in rad/s, accelerations in rad/s^2, at the joints.
@@ -101,7 +105,9 @@ class ElasticOptions:
         return radius, replace(shipped.parameters, gear=gear), loop
 
 
-def identify_elastic(data: ElasticOptions, out: Path, seed: int, as_json: bool) -> None:
+def identify_elastic(
+    data: ElasticOptions, out: Path, seed: int, as_json: bool, every: bool = False
+) -> None:
     """Identify elastic joints."""
     begin = data.start or ('before' if data.demo else 'found')
     printed = None if begin == 'found' else two_link_set(begin).parameters
@@ -109,8 +115,8 @@ def identify_elastic(data: ElasticOptions, out: Path, seed: int, as_json: bool) 
     if not planar_pair(robot):
         if data.demo or data.steps:
             raise RobotError(
-                f'{robot.name} is no pair of links that move in a horizontal plane: --demo and '
-                '--steps are for such; without them its springs are found joint by joint'
+                f'{robot.name} is no pair of links that move in a horizontal plane, as --demo and '
+                '--steps need. Without them its springs are found joint by joint'
             )
         identify_springs(data.bags, robot, data.robot, data.model, out, seed, as_json)
         return
@@ -151,8 +157,10 @@ def identify_elastic(data: ElasticOptions, out: Path, seed: int, as_json: bool) 
     if as_json:
         click.echo(json_text(document))
         return
-    _tell(document)
-    say(f'{out}: elastic.json, report.html')
+    heads, rows = _values(document) if every else _resonances(document)
+    shown = verdict(result)
+    shown = replace(shown, sentences=[*shown.sentences, *_story(document)])
+    options.show_verdict(shown, heads, rows, f'{out}: elastic.json, report.html')
 
 
 def _two_numbers(data: ElasticOptions, what: str, default: Any) -> FloatArray:
@@ -200,26 +208,40 @@ def _simulate(
     return replace(data, bags=(resonances,), steps=(steps,))
 
 
-def _tell(document: dict[str, Any]) -> None:
-    print_parameters([*document['parameters'], *document.get('total_damping', [])])
-    for joint in document['joints']:
-        say(
-            f'{joint["joint"]}: antiresonance {joint["antiresonance_hz"]:.2f} Hz, resonance '
-            f'{joint["resonance_hz"]:.2f} Hz, Coulomb torque {joint["coulomb_torque"]:.3g} N m; '
-            f'subspaces and physical parameters {joint["subspaces_against_physical_db"]:.3f} dB '
-            'apart'
+def _resonances(document: dict[str, Any]) -> Table:
+    heads = ('joint', 'stiffness [N m/rad]', 'antiresonance', 'resonance', 'Coulomb [N m]')
+    stiffness = {
+        row['joint']: row['value'] for row in document['parameters'] if row['name'] == 'kg'
+    }
+    return heads, [
+        (
+            one['joint'],
+            f'{stiffness[one["joint"]]:.0f}',
+            f'{one["antiresonance_hz"]:.2f} Hz',
+            f'{one["resonance_hz"]:.2f} Hz',
+            f'{one["coulomb_torque"]:.3g}',
         )
-    if 'tuning' in document:
-        tuning = document['tuning']
-        say(
-            f'step responses: {tuning["rms_before"]:.4g} rad/s unexplained before tuning, '
-            f'{tuning["rms_after"]:.4g} after'
+        for one in document['joints']
+    ]
+
+
+def _values(document: dict[str, Any]) -> Table:
+    words = {name: field.replace('_', ' ') for field, name, _ in PER_JOINT}
+    return ('parameter', 'joint', 'value', 'std', 'unit'), [
+        (
+            f'{words[row["name"]]} ({row["name"]})' if row['name'] in words else row['name'],
+            row['joint'],
+            f'{row["value"]:.5g}',
+            '' if row['std'] is None else f'{row["std"]:.2g}',
+            row['unit'],
         )
-    if 'story' in document:
-        story = document['story']
-        say(
-            f'step responses of the true arm: {story["error_before"]:.3g} rad/s rms off before '
-            f'tuning, {story["error_after"]:.2g} after, {story["factor"]:.0f} times smaller; main '
-            f'parameters within {story["main_parameters_percent_before"]:.2g} % before, '
-            f'{story["main_parameters_percent_after"]:.2g} % after'
-        )
+        for row in (*document['parameters'], *document.get('total_damping', []))
+    ]
+
+
+def _story(document: dict[str, Any]) -> list[str]:
+    return [
+        f'Against the true arm tuning made the error {story["factor"]:.0f} times smaller; main '
+        f'parameters are within {story["main_parameters_percent_after"]:.2g} %.'
+        for story in filter(None, [document.get('story')])
+    ]

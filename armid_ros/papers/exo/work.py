@@ -11,7 +11,7 @@ from typing import Any
 
 from armid_ros.cli import options
 from armid_ros.cli.origin import provenance
-from armid_ros.cli.terminal import print_rows, progress, say, Tick
+from armid_ros.cli.terminal import progress, Tick
 from armid_ros.errors import ModelError
 from armid_ros.files import json_text, settled, write_file
 from armid_ros.identification.ties.recorded import recorded_interaction_problem
@@ -30,7 +30,7 @@ from armid_ros.papers.exo.plant.leg_pair import (
 )
 from armid_ros.papers.exo.plant.shares import ground_by_shares
 from armid_ros.papers.exo.plant.walkers import walking_pair
-from armid_ros.papers.exo.report.page import exo_report
+from armid_ros.papers.exo.report.page import exo_report, verdict
 from armid_ros.papers.exo.report.walk import Driven, SimulatedWalk
 from armid_ros.recording import (
     read_recording,
@@ -140,8 +140,12 @@ def identify_pair(
     if as_json:
         click.echo(json_text(document))
         return
-    _tell(document)
-    say(f'{out}: exo.json, report.html')
+    rows = [
+        (row['segment'], f'{row["value"]:.1f}', f'{row["std"]:.1f}')
+        for row in document['stiffness']
+    ]
+    heads = ('spring', 'stiffness [N/m]', 'std')
+    options.show_verdict(verdict(found, walked), heads, rows, f'{out}: exo.json, report.html')
 
 
 def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
@@ -161,29 +165,6 @@ def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Si
     ]
     truth = dict(zip(('all', *pair.segments), [pair.stiffness[0]] * 5, strict=False))
     return SimulatedWalk(truth, cycle, driven, _SOFTER, rate)
-
-
-def _tell(document: dict[str, Any]) -> None:
-    """Print the springs, and how far off joints are that are driven by torque."""
-    print_rows(
-        [
-            {
-                'spring': row['segment'],
-                'stiffness': f'{row["value"]:.1f}',
-                'std': f'{row["std"]:.1f}',
-                'unit': row['unit'],
-            }
-            for row in document['stiffness']
-        ],
-        as_json=False,
-        right=('stiffness', 'std'),
-    )
-    for row in document['cycle']:
-        say(
-            f'{row["joint"]} by its torque over a whole cycle: at most {row["error_deg"]:.2g} deg '
-            f'off (the source: {row["source_deg"]:g}); {row["error_softer_deg"]:.2f} deg with '
-            f'springs {100 * _SOFTER:.0f} % too soft'
-        )
 
 
 def _identify(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import fmean
 
 from armid_ros.cli import parameters
 import click
@@ -20,17 +21,18 @@ _HEADS = {
 
 @click.command(epilog='Example: armid lunar --out result')
 @parameters.folder
+@parameters.every
 @parameters.seed
 @parameters.as_json
-def lunar(out: Path, seed: int, as_json: bool) -> None:
-    """Repeat the lunar paper: its tables, gravity parameters and torques, beside its figures."""
+def lunar(out: Path, seed: int, every: bool, as_json: bool) -> None:
+    """Repeat the lunar paper: tables, gravity parameters and torques, with its figures."""
     from armid_ros.cli import options
     from armid_ros.cli.origin import provenance
-    from armid_ros.cli.terminal import print_rows, progress, say
+    from armid_ros.cli.terminal import progress
     from armid_ros.files import json_text, write_file
     from armid_ros.identification import write_document
     from armid_ros.papers.lunar.output import lunar_document, SCHEMA
-    from armid_ros.papers.lunar.report import lunar_report, sentences
+    from armid_ros.papers.lunar.report import lunar_report, verdict
     from armid_ros.papers.lunar.reproduction import reproduce
 
     staged = options.stage(out, SCHEMA)
@@ -44,18 +46,12 @@ def lunar(out: Path, seed: int, as_json: bool) -> None:
     if as_json:
         click.echo(json_text(document))
         return
+    rows = []
     for table in document['tables']:
         unit = 'of noise' if table['measure'] == 'mae_over_noise' else '% of peak'
-        rows = [
-            {
-                'joint': joint,
-                **{head: f'{table[key][joint]:.3g}' for head, key in _HEADS.items()},
-                'unit': unit,
-            }
-            for joint in table['paper']
-        ]
-        say(f'Table {table["number"]}, {table["title"]}')
-        print_rows(rows, as_json=False, right=tuple(_HEADS))
-    for sentence in sentences(found):
-        say(sentence)
-    say(f'{out}: lunar.json, report.html')
+        names = list(table['paper']) if every else ['mean']
+        for joint in names:
+            values = (table[key].get(joint, fmean(table[key].values())) for key in _HEADS.values())
+            rows.append((f'{table["number"]}', joint, *(f'{value:.3g}' for value in values), unit))
+    heads = ('table', 'joint', *_HEADS, 'unit')
+    options.show_verdict(verdict(found), heads, rows, f'{out}: lunar.json, report.html')

@@ -30,10 +30,8 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
         Files, versions, settings, seed.
 
     """
-    held = all(_as_wanted(one) for one in found.repeated)
-    grade = ('reproduced', 'good') if held else ('in part', 'fair')
     sections: list[Section] = [
-        VerdictSection(*grade, sentences(found)),
+        verdict(found),
         tables_section(found.repeated),
         curves_section(found.repeated),
         gravity_section(found.composites, _load(found)),
@@ -45,34 +43,36 @@ def lunar_report(found: Reproduction, provenance: Provenance) -> str:
     ).html()
 
 
-def sentences(found: Reproduction) -> tuple[str, ...]:
-    """Say in words what was found."""
+def verdict(found: Reproduction) -> VerdictSection:
+    """Say how the errors compare with those of the paper, and what load was found."""
     lines = []
     for one in found.repeated:
         slow, whole = (one.ratio(method.held_out) for method in one.methods)
+        name = f'Table {one.table.number} ({one.table.title})'
         if one.table.uniform:
             low, high = (digits(float(end)) for end in np.sort(one.table.ratio)[[0, -1]])
-            lines.append(
-                f'Table {one.table.number}, {one.table.title}: the error over the noise is at '
-                f'most {digits(float(slow.max()))} with gravity alone and '
-                f'{digits(float(whole.max()))} with the whole dynamics. The paper has '
-                f'{low} to {high}; less is better.'
-            )
+            lines += [
+                f'{name}: error over noise at most {digits(float(slow.max()))} with gravity '
+                f'alone, {digits(float(whole.max()))} with the whole dynamics.',
+                f'The paper has {low} to {high}; less is better.',
+            ]
             continue
         noisy = one.ratio(one.methods[0].noisy)
         paper = 100.0 * float(np.mean(one.table.ratio))
-        lines.append(
-            f'The mean torque error of Table {one.table.number}, {one.table.title}, is '
-            f'{digits(100.0 * float(noisy.mean()))} % of the peak; the paper has {paper:.2f} %'
-            + (f' ({STATED_ERROR:g} % in its abstract).' if one.table.number == 3 else '.')
-            + f' Against the torque without noise it is {digits(100.0 * float(slow.mean()))} % '
-            f'with gravity alone, {digits(100.0 * float(whole.mean()))} % with the whole dynamics.'
-        )
+        stated = f' ({STATED_ERROR:g} % in its abstract)' if one.table.number == 3 else ''
+        lines += [
+            f'{name}: mean torque error {digits(100.0 * float(noisy.mean()))} % of the peak; the '
+            f'paper has {paper:.2f} %{stated}.',
+            f'Without noise it is {digits(100.0 * float(slow.mean()))} % with gravity alone, '
+            f'{digits(100.0 * float(whole.mean()))} % with the whole dynamics.',
+        ]
     lines.append(
         f'The {len(found.composites)} gravity parameters give a load of {_load(found)} in the '
         f'hand; {LOAD:g} kg was simulated.'
     )
-    return tuple(lines)
+    held = all(_as_wanted(one) for one in found.repeated)
+    grade = ('reproduced', 'good') if held else ('in part', 'fair')
+    return VerdictSection(*grade, lines)
 
 
 def _as_wanted(one: Repeated) -> bool:

@@ -345,8 +345,8 @@ def _time_unit(table: Table, column: TableColumn, said: str | None) -> str:
     steps = np.diff(column.finite)
     if len(steps) and np.mean(steps < 0.0) > 0.5:  # sorting would turn the motion round
         raise RecordingError(
-            f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}: '
-            'turn the rows round if the last was measured first, or leave the column out with '
+            f'{where} runs backwards, from {column.values[0]:.6g} to {column.values[-1]:.6g}. '
+            'Turn the rows round if the last was measured first, or leave the column out with '
             '--time none --rate HZ if they are in order'
         )
     if said or column.unit in TIME_UNITS:

@@ -77,10 +77,8 @@ def fit_section(
 
     """
     groups = {'held-out': validation, 'training': training}
-    certainty = ', '.join(
-        f'{name} ±{digits(value)} {unit}'
-        for name, value, unit in zip(robot.joints, reach, robot.torque_units, strict=True)
-    )
+    least = int(np.argmax(reach))
+    certainty = f'±{digits(float(reach[least]))} {robot.torque_units[least]}'
     blocks: list[PageBlock] = []
     errors = [
         (name, role, error)
@@ -126,8 +124,9 @@ def fit_section(
         blocks.append(Fold(f'{counted(len(errors), "recording")} one by one', [table]))
     blocks.append(
         Paragraph(
-            f'Uncertainty of the predicted torque from the parameters (95 %, rms over the '
-            f'motion): {certainty}. A larger residual is noise, or an effect that the model lacks.'
+            f'The parameters make the predicted torque uncertain by at most {certainty}, at '
+            f'{robot.joints[least]} (95 %, rms over the motion). A larger residual is noise, or '
+            'an effect that the model lacks.'
         )
     )
     return ContentSection('Torque', blocks)

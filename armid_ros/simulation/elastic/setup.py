@@ -56,7 +56,7 @@ def no_rotor(joints: Sequence[str]) -> str:
     """Say what becomes of springs whose motors have no inertia."""
     return (
         f'{", ".join(joints)}: joint_elasticity without rotor_inertia, so that no motor moves on '
-        'its own: all joints are simulated as rigid ones whose encoders read the twist under '
+        'its own. All joints are simulated as rigid ones whose encoders read the twist under '
         'load; add rotor_inertia to have vibrations'
     )
 

@@ -246,7 +246,7 @@ def test_exchanged_joints(robot, sound, pair, what):
 def test_torque_that_comes_late_or_early(robot, sound, milliseconds):
     said = mistake_in(robot, late(sound, round(1e-3 * milliseconds * RATE)))
     side = 'later' if milliseconds > 0 else 'earlier'
-    pattern = rf'about (\d+) ms {side} than the position \(\+- (\d+) ms\)'
+    pattern = rf'about (\d+) ms {side} than the position \(± (\d+) ms\)'
     ((found, half),) = re.findall(pattern, said)
     assert int(found) == pytest.approx(abs(milliseconds), abs=int(half))
     assert int(half) < 0.1 * abs(milliseconds)

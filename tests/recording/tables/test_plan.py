@@ -224,7 +224,7 @@ def test_a_time_that_runs_backwards_is_refused_with_what_to_do(said):
     backwards = table(t=np.arange(50)[::-1] / 100.0, q1=np.sin(np.arange(50.0)))
     with pytest.raises(RecordingError, match=r'column t runs backwards, from 0\.49 to 0') as error:
         plan(backwards, ColumnSettings(position='q1', **said))
-    assert 'turn the rows round' in str(error.value)
+    assert 'Turn the rows round' in str(error.value)
     assert '--rate' in str(error.value)
 
 

@@ -108,8 +108,8 @@ def read_runs(
         )
     if not runs:
         raise RecordingError(
-            f'{path}: {REFERENCE} asks for no motion of {_SHORTEST:g} s or more; record what the '
-            'velocity loops are asked for'
+            f'{path}: {REFERENCE} has no motion of {_SHORTEST:g} s or more; record the reference '
+            'of the velocity loops'
         )
     return runs
 

@@ -42,7 +42,7 @@ def elastic_report(
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [_verdict(result), responses_section(result)]
+    sections: list[Section] = [verdict(result), responses_section(result)]
     if result.tuning is not None:
         sections.append(steps_section(result.tuning))
     sections += [
@@ -56,7 +56,7 @@ def elastic_report(
     return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 
 
-def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
+def verdict(result: TwoInertiaIdentification) -> VerdictSection:
     """Say how stiff the springs are, how surely, and what is not known."""
     springs = []
     for k, joint in enumerate(result.joints):
@@ -72,8 +72,8 @@ def _verdict(result: TwoInertiaIdentification) -> VerdictSection:
     ]
     beware = (
         [
-            f'{", ".join(poor)}: what was measured is not the response of a motor and a link on a '
-            f'spring, by more than {_CLOSE_DB:g} dB; look at the frequency responses.'
+            f'{", ".join(poor)}: the measured response differs from that of motor, spring and '
+            f'link by more than {_CLOSE_DB:g} dB; look at the frequency responses.'
         ]
         if poor
         else []

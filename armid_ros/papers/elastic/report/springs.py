@@ -48,8 +48,9 @@ def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
         motors.append((one.joint, f'{one.inertia:.3g}', *own, *both))
     text = (
         'The twist of each motor against its link, over what the rigid body takes there: inertia, '
-        'gravity and the interaction of all links included. Compliance and free play are told '
-        'apart where the load changes sides; a correlation near ±1 says that they are not.'
+        'gravity and the interaction of all links included. Compliance and free play are '
+        'distinguishable where the load changes sides; a correlation near ±1 means they '
+        'are not.'
     )
     hint = (
         'Frequencies are those of each joint alone, the others held, at its mean inertia in the '
@@ -76,12 +77,13 @@ def springs_report(found: Sequence[SpringEstimate], robot: str, provenance: Prov
         Files, versions, settings, seed.
 
     """
-    sections: list[Section] = [_verdict(found), _springs(found), Origin(provenance)]
+    sections: list[Section] = [verdict(found), _springs(found), Origin(provenance)]
     subtitle = f'{robot} · {counted(len(found), "joint")}, encoders on both sides'
     return Page(f'Elastic joints of {robot}', subtitle, sections).html()
 
 
-def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
+def verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
+    """Say how many springs were found, and which is the softest."""
     told = [one for one in found if one.informative]
     lost = [one.joint for one in found if not one.informative]
     beware = ['Inertias are those of the description or model: a stiffness is as right as they.']
@@ -95,7 +97,7 @@ def _verdict(found: Sequence[SpringEstimate]) -> VerdictSection:
     softest = min(told, key=lambda one: one.transmission.stiffness[0])
     value, low, high = softest.transmission.stiffness
     sentences = [
-        f'{counted(len(told), "joint")} of {len(found)} show how stiff they are; the softest is '
+        f'Stiffness of {len(told)} of {counted(len(found), "joint")} found; the softest is '
         f'{softest.joint} with {value:.4g} N m/rad ({low:.4g} to {high:.4g}, 95 %).'
     ]
     loose = [one.joint for one in told if one.transmission.backlash_seen]

@@ -136,7 +136,7 @@ def steps_section(tuning: Tuning) -> ContentSection:
     """Show velocities of the links after steps of the reference, before and after tuning."""
     before, after = tuning.rms
     text = (
-        'Velocities of the links after the loops are asked for a step. Before tuning '
+        'Velocities of the links after steps of the reference. Before tuning '
         f'{digits(before, 3)} rad/s rms is left unexplained, after it {digits(after, 3)} rad/s, '
         'noise included.'
     )
@@ -151,7 +151,7 @@ def steps_section(tuning: Tuning) -> ContentSection:
                     Series('measured', tuning.measured[:, k, 2 + link], 'measured'),
                     Series('before tuning', tuning.before[:, k, 2 + link], 'residual'),
                     Series('after tuning', tuning.after[:, k, 2 + link], 'predicted'),
-                    Series('asked for', tuning.steps.reference[:, k, link], 'faint'),
+                    Series('reference', tuning.steps.reference[:, k, link], 'faint'),
                 ],
                 'time [ms]',
                 f'link {link + 1} [rad/s]',
@@ -160,6 +160,6 @@ def steps_section(tuning: Tuning) -> ContentSection:
             )
             for link in range(2)
         ]
-        name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s asked for'
+        name = f'joint 2 at {pose:.0f}°, {asked[0]:g} and {asked[1]:g} rad/s reference'
         panels.append((name, '', charts))
     return ContentSection('Step responses', [Paragraph(text), Panels(panels)])

@@ -45,7 +45,7 @@ class SimulatedPairNode(ArmidNode):
             'driven',
             [''],
             "Joints of the exoskeleton that follow torques, or 'all'; without names: none, all "
-            'move as the gait says.',
+            'follow the gait.',
         ),
         NodeParameter(
             'torque_rate', 100.0, 'Sample rate of torques.', 'Hz', limits=(10.0, 1000.0)
@@ -59,7 +59,7 @@ class SimulatedPairNode(ArmidNode):
         NodeParameter(
             'real_time_factor',
             1.0,
-            'Simulated time per real time, if the computer can. 0: moves only when told.',
+            'Simulated time per real time, if the computer can. 0: moves only on request.',
             limits=(0.0, 1000.0),
         ),
     )

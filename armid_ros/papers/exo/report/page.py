@@ -60,7 +60,7 @@ def exo_report(
     samples = np.linspace(0, len(abscissa) - 1, _POSES).astype(int).tolist()
     captions = [f'{abscissa[k]:.2f}' for k in samples]
     sections: list[Section] = [
-        _verdict(found, walked),
+        verdict(found, walked),
         stiffness_section(found, walked.truth if walked else {}),
     ]
     if walked is not None:
@@ -79,7 +79,7 @@ def exo_report(
     return Page(title, f'{len(pair.ties)} springs · {len(abscissa)} samples', sections).html()
 
 
-def _verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
+def verdict(found: Sequence[Interaction], walked: SimulatedWalk | None) -> VerdictSection:
     """Say what ties the two, how surely, and whether the torques walk."""
     overall = found[0]
     k, reach = overall.stiffness[0], HALF_WIDTH * overall.std[0]

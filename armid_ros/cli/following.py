@@ -1,0 +1,132 @@
+# Copyright 2026 The armid_ros developers
+# SPDX-License-Identifier: Apache-2.0
+"""The command that follows another one, with its robot, its bags and how they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from itertools import chain, count
+from pathlib import Path
+import shlex
+from typing import Any
+
+from armid_ros.api.comparison import ComparisonResult
+from armid_ros.api.diagnosis import DiagnosisResult
+from armid_ros.api.excitation import ExcitationResult
+from armid_ros.api.inspection import InspectionResult
+from armid_ros.api.table import Shown
+from armid_ros.cli import columns
+from armid_ros.cli.commands import TYPED
+from armid_ros.diagnosis import EXPERIMENT_FILE
+from armid_ros.errors import ModelError
+from armid_ros.identification.identified_from import identified_from
+import click
+
+#: What a command fills, beside the folder of the command before.
+_OUT = {
+    'identify': 'model',
+    'diagnose': 'diagnosis',
+    'excite': 'plan',
+    'simulate': 'run',
+    'inspect': 'inspection',
+}
+#: Commands that take no recordings.
+_ALONE = ('excite', 'simulate')
+#: Options that only this run has.
+_OWN = {'robot_source', 'out', 'as_json', 'strict', 'every'}
+
+
+def following(then: str, result: Shown) -> str:
+    """
+    Return the command line that follows the running command.
+
+    Parameters
+    ----------
+    then : str
+        Name of the command that follows.
+    result : Shown
+        What the running command found.
+
+    """
+    context = click.get_current_context()
+    given, own = context.params, str(context.command.name)
+    if then == 'diagnose' == own and given['residual']:
+        then = 'excite'
+    if then == 'inspect' == own and given['robot_source'] and given['out']:
+        then = 'check'
+    robot, bags, more = _subject(then, result, given)
+    if isinstance(result, DiagnosisResult) and then == 'diagnose':
+        more = ['--residual', 'gp']
+    if then == 'excite' and own != 'check':
+        more = ['--seed', given['seed'] + 1]
+    if then in _OUT:
+        more += ['--out', _free(Path(given.get('out') or '').parent / _OUT[then])]
+    words = ['--robot', robot] if then in _ALONE else [*bags, '--robot', robot]
+    words = [robot, *bags] if then == 'check' else words
+    kept = {'gravity', 'joints'}
+    if then == own:
+        kept = {str(one.name) for one in context.command.params} - _OWN
+    elif then not in _ALONE:
+        kept |= {'topic', *context.meta.get(columns.META, ())}
+    return shlex.join(map(str, ['armid', then, *words, *_typed(context, kept), *more]))
+
+
+def _subject(
+    then: str, result: Shown, given: dict[str, Any]
+) -> tuple[str | Path, list[Path], list[Any]]:
+    """Return the robot, the recordings, and what is known of the arm."""
+    robot, out = given.get('robot_source'), Path(given.get('out') or '')
+    bags = list(given.get('bags') or filter(None, [given.get('bag')]))
+    more: list[Any] = []
+    if isinstance(result, ComparisonResult):
+        return _compared(result, then)
+    if isinstance(result, ExcitationResult):
+        more = ['--trajectory', out / 'excitation.yaml']
+    elif isinstance(result, DiagnosisResult) and then == 'simulate':
+        plans = [out / name for name in result.files if name == EXPERIMENT_FILE]
+        more = [*_each('--trajectory', plans), '--model', out / 'model.yaml']
+    elif then == 'diagnose':
+        more = [*_each('--validate', given['validate']), '--effects', given['effects']]
+    elif isinstance(result, InspectionResult) and robot is None:
+        topics = [topic.name for topic in result.core.topics]
+        robot = '-' if '/robot_description' in topics else 'ROBOT.urdf'
+    if robot == '-' and then in _ALONE:
+        robot = out / 'robot.urdf'
+    return robot or '', bags[:1] if then == 'inspect' else bags, more
+
+
+def _compared(result: ComparisonResult, then: str) -> tuple[str | Path, list[Path], list[Any]]:
+    """Return robot, recordings and options of what follows a comparison."""
+    before, after = (Path(one.source) for one in (result.core.before, result.core.after))
+    model = before.with_name('model.yaml')
+    more = ['--model', model] if then == 'diagnose' and model.exists() else []
+    bags: list[Path] = []
+    for source in [after] if more else [before, after]:
+        with suppress(ModelError):  # it does not name its recordings
+            bags += identified_from(source)
+    return result.core.after.robot, list(dict.fromkeys(bags)) or [Path('BAG')], more
+
+
+def _each(option: str, values: Iterable[Any]) -> Iterator[Any]:
+    return chain.from_iterable((option, value) for value in values)
+
+
+def _typed(context: click.Context, kept: Iterable[str]) -> Iterator[str]:
+    """Yield the options of some names as they were typed."""
+    known = {
+        text: one for one in context.command.params for text in (*one.opts, *one.secondary_opts)
+    }
+    words = iter(context.meta.get(TYPED, ()))
+    for word in words:
+        option = known.get(word.partition('=')[0])
+        if isinstance(option, click.Option):
+            value = [] if option.is_flag or '=' in word else [next(words)]
+            if option.name in kept:
+                yield from (word, *value)
+
+
+def _free(path: Path) -> Path:
+    """Return a path at which nothing is yet."""
+    others = (path.with_name(f'{path.name}_{number}') for number in count(2))
+    return next(one for one in chain([path], others) if not one.exists())
