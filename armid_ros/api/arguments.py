@@ -53,7 +53,7 @@ _Result = TypeVar('_Result')
 #: Ends of the names of files that describe a robot.
 _DESCRIPTIONS = ('.urdf', '.xacro', '.xml')
 #: Keywords that are named otherwise than the options of the commands.
-_OPTIONS = {'seed': 'rng', 'payload': 'payloads'}
+_OPTIONS = {'seed': 'rng'}
 #: Effects that are fitted with the rigid body by default.
 USUAL = ','.join(USUAL_EFFECTS)
 

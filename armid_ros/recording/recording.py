@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from typing import Literal, TYPE_CHECKING
 
 from armid_ros.errors import RecordingError
@@ -366,9 +367,9 @@ class Recording:
 
         """
         # the filters of identification are above this package
-        from armid_ros.api.arguments import motion_of
-
-        return motion_of(self, cutoff)
+        filtered = import_module('armid_ros.api.arguments').motion_of(self, cutoff)
+        assert isinstance(filtered, Motion)
+        return filtered
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Recording:
         """Return the recording at some of its samples, on the same time base."""

@@ -86,7 +86,7 @@ def test_noise_of_the_torque_sensor_alone_makes_a_false_stribeck_friction(bench)
     assert by_floor.count(None) >= 5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_information_criteria_over_pooled_rows_invent_effects(bench):
     invented, named = [], []
     for seed in range(1, 5):
@@ -120,7 +120,7 @@ def drag(motion, tau):
     return on_elbow(0.1 * motion.dq[:, 1] * np.abs(motion.dq[:, 1]))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_surrogate_for_a_name_that_is_not_in_the_library_is_provisional(bench):
     library = tuple(name for name in CATALOGUE if name != 'quadratic_friction')
     found = look(bench, bench.recordings(drag), settings=DiagnosisSettings(library=library))

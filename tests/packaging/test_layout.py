@@ -70,7 +70,11 @@ def test_console_scripts_of_nodes_say_what_is_missing_of_ros(console_scripts):
 def test_nodes_are_those_that_are_installed(root):
     """A node without an executable cannot be run, an executable without a node does not run."""
     files = (root / 'armid_ros').rglob('nodes/*.py')
-    assert {path.stem for path in files if '\ndef main(' in path.read_text()} == NODES
+    assert {
+        path.stem
+        for path in files
+        if re.search(r'^main = |^def main\(', path.read_text(), re.MULTILINE)
+    } == NODES
 
 
 @pytest.mark.parametrize('name', sorted(NODES | {'armid'}))
