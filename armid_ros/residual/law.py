@@ -29,10 +29,7 @@ _LEAST_SHARE = 0.5
 
 
 class Term(NamedTuple):
-    """
-    Text of a function of q, dq and the load w, such as 'dq^3', its factor and its unit.
-
-    """
+    """Text of a function of q, dq and the load w, such as 'dq^3', its factor and its unit."""
 
     text: str
     coefficient: float

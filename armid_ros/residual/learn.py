@@ -102,7 +102,7 @@ class Residual:
             if one.held_out is not None:
                 alone = f' ({percent_of(one.held_out)} of held-out recordings)'
                 if one.held_out < 0.0:
-                    alone = ' (not in held-out recordings, which go beyond its data)'
+                    alone = ' (held-out recordings get worse: they go beyond its data)'
             like = 'no law of few terms'
             if one.law is not None:
                 like = f'{one.law.text} ({percent_of(one.law.share)})'
@@ -186,7 +186,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         validation = [overlay.trajectory for overlay in gap.overlays]
     every = joint_rows(base, diagnosis.data)
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
-    # for thousands of systems of a hundred rows, two threads would wait fifteen times as long as they compute
+    # two threads would spend most of the time waiting, as each system has only a hundred rows
     import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
 
     with threadpool_limits(1):
