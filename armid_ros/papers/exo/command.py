@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A machine and its wearer: what ties them, from the machine's torques and both's angles."""
+"""Identification of the springs between a machine and its wearer, from torques and angles."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _STEP = 0.5
 #: Amplitude of the slow velocity [rad/s], and its lowest and highest frequency [Hz]; each
 #: experiment has its own.
 _SPEED, _SLOW = 0.8, (0.3, 1.0)
-#: How far the links begin from zero at most [rad].
+#: Largest initial position of the links [rad].
 _REACH = np.pi / 3.0
 
 
@@ -77,7 +77,7 @@ def step_experiments(
     Parameters
     ----------
     poses, velocities : sequence of array_like, each of shape (n,)
-        Where each begins [rad], and what it asks for [rad/s].
+        Initial position [rad] and reference velocity [rad/s] of each experiment.
 
     """
     steps = round(_STEP / _DT)
