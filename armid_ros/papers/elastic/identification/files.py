@@ -180,7 +180,7 @@ def _common(
     if len(common) < _SHARED * max(map(len, stamps)):
         counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
         raise RecordingError(
-            f'{path}: of the samples of {counts} only {len(common)} have the same stamps; stamp '
-            'alike what is measured at one time, and record all of it'
+            f'{path}: of the samples of {counts} only {len(common)} have equal timestamps; '
+            'use one timestamp for simultaneous measurements, and record all topics'
         )
     return common

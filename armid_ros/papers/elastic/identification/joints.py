@@ -52,7 +52,7 @@ class SpringEstimate:
         Stiffness and free play.
     motor : ndarray, shape (3,), or None
         Rotor inertia [kg m^2], viscous friction [N m s/rad] and Coulomb torque [N m] of the motor
-        at the joint; None where no torque was recorded.
+        at the joint; None if no torque was recorded.
     inertia : float
         Link inertia about the joint with the other joints held, mean over the recording [kg m^2].
 

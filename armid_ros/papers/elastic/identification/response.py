@@ -4,10 +4,10 @@
 Closed-loop velocity responses of the two-link arm, with exact derivatives by its parameters.
 
 Many runs at once, as arrays; the derivatives come from the complex step, f(x + ih) = f + ih f',
-through every operation of the integration, friction included: what slips and what sticks is
-decided by the real part. The scheme is the plant's: the Pade approximation (2, 2) of the
-exponential for motors, springs and links, the middle of the step for what is not linear. Squire
-and Trapp 1998 for the complex step.
+through every operation of the integration, friction included: the real part decides which joints
+slip and which stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
+for motors, springs and links, the middle of the step for what is not linear. Squire and Trapp 1998
+for the complex step.
 
 """
 
@@ -90,10 +90,10 @@ def sensitivities(
     steps : Steps
         The experiments.
     parameters : TwoLinkParameters
-        Where to differentiate.
+        Parameters at which the derivatives are taken.
     directions : ndarray, shape (D, 15)
-        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques; they
-        should be of the size of these.
+        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques;
+        directions should have the magnitude of the parameters.
 
     Returns
     -------

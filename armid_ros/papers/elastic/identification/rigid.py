@@ -63,8 +63,9 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     """
     Fit the rigid arm to slow motion by least squares, each joint weighted by its own noise.
 
-    Torques and columns pass the same low-pass filter. Accelerations are those of the links'
-    accelerometers, positions those of their encoders, friction follows the motors.
+    Torques and columns pass the same low-pass filter. Accelerations come from accelerometers on
+    the links, positions from encoders at the links. Friction depends on the velocity of the
+    motors.
 
     Parameters
     ----------

@@ -137,7 +137,7 @@ def identify_two_inertia(
     if not (first > 0.0 and beta > 0.0 and first * beta > gamma**2):
         raise IdentificationError(
             f'step 1 found alpha + mm gear^2 = {first:.3g}, beta = {beta:.3g} and gamma = '
-            f'{gamma:.3g} kg m^2, which no two links have; is the slow motion strong enough, and '
+            f'{gamma:.3g} kg m^2, impossible for two links; is the slow motion strong enough, and '
             'do torques and velocities of a joint have the same sign?'
         )
     alpha = max(first - max(rotor, 0.0), 1.01 * gamma**2 / beta)

@@ -38,8 +38,8 @@ def resonance_experiments(
     Return experiments that excite all joints through their resonances, in many poses.
 
     Motors follow a slow sine of velocity under a loop of low gain, so that friction has one sign
-    most of the time, and get a multisine of torque on top. Poses are random, around the arm
-    stretched, where links act on each other most.
+    most of the time, and get a multisine of torque on top. Poses are random, around the stretched
+    arm, in which interaction is largest.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ def parameters_section(
     Parameters
     ----------
     result : TwoInertiaIdentification
-        What was found.
+        Results of the identification.
     known : TwoLinkParameters, or None
         Reference parameters for comparison.
     source : str

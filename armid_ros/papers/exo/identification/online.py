@@ -130,12 +130,12 @@ class OnlineInteraction:
         self._slack_due: float | None = None
 
     def take_other(self, t: float, q: FloatArray) -> None:
-        """Take in positions of the other machine, shape (m,) [rad], at a time [s]."""
+        """Add a sample of positions of the other machine, shape (m,) [rad], at a time [s]."""
         self._far.take(t, q)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
         """
-        Take in positions and torques of the machine.
+        Add a sample of positions and torques of the machine.
 
         Parameters
         ----------
@@ -152,7 +152,8 @@ class OnlineInteraction:
         Raises
         ------
         IdentificationError
-            If the motion of the last seconds shows no springs, or the machines share no time.
+            If the last seconds do not identify the springs, or the times of the machines do not
+            overlap.
 
         """
         self._own.take(t, np.concatenate([q, tau]))

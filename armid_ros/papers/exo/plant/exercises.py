@@ -27,7 +27,7 @@ class Exercise:
     Attributes
     ----------
     what : str
-        What the person does.
+        Description of the motion of the person.
     middle, reach : tuple of float, length 4
         Mean and amplitude of stance hip and knee, swing hip and knee [deg].
     period : float
@@ -41,7 +41,7 @@ class Exercise:
     period: float
 
 
-#: By name; steps are those of the gait, to and fro.
+#: Exercises by name; steps follow the gait, forward and back.
 EXERCISES = {
     'step': Exercise('step forward and back', (0.0,) * 4, (0.0,) * 4, 1.8),
     'quick_step': Exercise('the same, twice as quickly', (0.0,) * 4, (0.0,) * 4, 0.9),

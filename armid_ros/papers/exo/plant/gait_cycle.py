@@ -45,7 +45,7 @@ _PLANE = np.array([0, 2])
 @dataclass(frozen=True)
 class GaitCycle:
     """
-    One cycle of a walking pair, from a right heel strike of the wearer as planned to the next.
+    One cycle of a walking pair, between two planned right heel strikes of the wearer.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class _Course:
     contact: FloatArray  # (2 K, 4, 2)
     contact_speed: FloatArray
     tied: FloatArray  # (2 K, S, 2)
-    pull: FloatArray  # (2 K, 2): weight and what accelerating limbs do [N]
+    pull: FloatArray  # (2 K, 2): weight and inertial force of the limbs [N]
     mass: float
 
 

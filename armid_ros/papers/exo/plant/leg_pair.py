@@ -217,7 +217,7 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = Non
     t : ndarray, shape (N,)
         Time [s].
     start : float, optional
-        Phase of the stance leg at t = 0; by default where single support begins.
+        Phase of the stance leg at t = 0; by default at the beginning of single support.
 
     """
     known = read_assumptions()

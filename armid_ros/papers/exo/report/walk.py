@@ -22,7 +22,7 @@ from markupsafe import Markup
 import numpy as np
 
 _FRAMES = 72
-#: Size of the drawing [px], scale [px/m], and where hips are and ground is in it.
+#: Size of the drawing [px], scale [px/m], and positions of hips and ground [px].
 _WIDTH, _HEIGHT, _SCALE, _HIPS, _GROUND = 640, 420, 260.0, 300.0, 385.0
 #: Magnification of the extension of springs, and scale of forces [px/N].
 _MAGNIFIED, _FORCE = 4.0, 0.16
@@ -105,7 +105,7 @@ class Walk(Section):
     title: ClassVar[str] = 'Walking'
     package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'walk.html'
-    #: Width and height of the drawing, and where the ground is [px].
+    #: Width and height of the drawing, and height of the ground [px].
     size: ClassVar[tuple[int, int, float]] = (_WIDTH, _HEIGHT, _GROUND)
 
     cycle: GaitCycle
