@@ -6,7 +6,7 @@ Diagnosis of the arms that changed, with earlier bags of the same arm as baselin
 The model is identified from the last bags before the change. The diagnosis uses the first bags
 after the change, and a further bag is held out for validation. Results:
 
-    watch/diagnoses.parquet              one row an arm: verdict, summary, causes
+    watch/diagnoses.parquet              one row per arm: verdict, summary, causes
     reports/arm=A/diagnosis/             diagnosis.json, model.yaml, report.html
 
 """

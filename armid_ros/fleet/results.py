@@ -4,8 +4,8 @@
 The tables of results: their columns, and the rows of a bag or an arm.
 
     bags/arm=A/day=D/BAG.parquet         one row: what was recorded, its fit and normal equations
-    parameters/arm=A/day=D/BAG.parquet   one row a parameter: estimate of the bag by itself
-    arms/arm=A/estimate.parquet          one row a parameter: estimate of all bags
+    parameters/arm=A/day=D/BAG.parquet   one row per parameter: estimate of the bag by itself
+    arms/arm=A/estimate.parquet          one row per parameter: estimate of all bags
     refused/arm=A/BAG.parquet            one row: why a bag is not used
 
 A bag has one file in each data set, named after the bag, so a run overwrites only results of the

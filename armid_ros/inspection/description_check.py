@@ -234,7 +234,7 @@ def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Return the wrong links by forward selection, without one that later links make redundant."""
+    """Return the wrong links by forward selection, without a link that became redundant."""
     every = range(len(spread) // len(LINK_PARAMETERS))
     wrong: list[int] = []
     rest = total

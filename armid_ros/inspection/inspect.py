@@ -191,7 +191,7 @@ def _said(text: str, others: Iterable[str]) -> bool:
 
 
 def _of_fit(trial: TrialFit, said: Sequence[str]) -> Iterator[Remark]:
-    """Yield the faults that identify finds, without those that are remarks already."""
+    """Yield the faults that identify finds and that no remark contains already."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*said, *trial.elsewhere]
     yield from (Remark(weight, fault) for fault in trial.faults if not _said(fault, others))
