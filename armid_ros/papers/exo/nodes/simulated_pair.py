@@ -124,7 +124,7 @@ class SimulatedPairNode(ArmidNode):
         self._origin_ns = self.stamp_ns
         self.pair.reset()
         self.real_time.begin()
-        return 'both are where they began'
+        return 'both are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
         """Return whether the pair stands, and whether the simulation keeps up with real time."""
