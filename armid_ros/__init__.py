@@ -13,9 +13,9 @@ An arm model is a rigid body plus a list of effects. With ``import armid_ros as 
     found.report('found.html')
 
 Names are imported when they are used. The packages, from the ground up: ``robots`` (descriptions),
-``model`` (rigid body), ``effects`` (what else acts on a joint), ``arm`` (the two together),
-``recording``, ``simulation``, ``excitation``, ``identification``, ``inspection``, ``diagnosis``,
-``report``, ``api``, ``nodes``, ``cli``.
+``model`` (rigid body), ``effects`` (friction and other torques), ``arm`` (rigid body with
+effects), ``recording``, ``simulation``, ``excitation``, ``identification``, ``inspection``,
+``diagnosis``, ``report``, ``api``, ``nodes``, ``cli``.
 
 """
 
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from armid_ros.recording import Recording, write_recording
     from armid_ros.robots import load_robot, Robot, shipped_robots
 
-#: Public names, and the modules they live in.
+#: Public names, and the modules that they are imported from.
 _HOMES = {
     'load_robot': 'armid_ros.robots',
     'shipped_robots': 'armid_ros.robots',

@@ -1,30 +1,30 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The errors a user can cause; each message says what is wrong, where, and what to do."""
+"""Errors that a user can cause; each message names the fault, its place and the remedy."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-#: Likeness, from 0 to 1, from which a name is meant by another: one letter in four may differ.
+#: Least similarity of a suggested name, 0 to 1: one letter in four may differ.
 _ALIKE = 0.75
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the one of some names that was meant by a name; empty if none is like it."""
+    """Return the most similar of the names; empty if none is similar enough."""
     return next(iter(get_close_matches(name, list(names), 1, _ALIKE)), '')
 
 
 def meant(name: str, names: Iterable[str]) -> str:
-    """Return the question whether the nearest name was meant, to go into a message, or nothing."""
+    """Return the suggestion "; did you mean 'NAME'?"; empty if no name is similar."""
     found = nearest(name, names)
     return f"; did you mean '{found}'?" if found else ''
 
 
 def visible(text: str) -> str:
     """
-    Return a text as it may go to a terminal: control characters are spelled out.
+    Return a text with escaped control characters, safe for a terminal.
 
     Names come from files and messages; an escape sequence in one must not move the cursor.
 
@@ -36,7 +36,7 @@ def visible(text: str) -> str:
 
 class ArmidError(Exception):
     """
-    Base of every error that bad input can cause; the command line prints it and exits 2.
+    Base class of errors from bad input; the command line prints the message and exits with 2.
 
     Examples
     --------
@@ -50,7 +50,7 @@ class ArmidError(Exception):
     """
 
     def __str__(self) -> str:
-        """Return the message, fit for a terminal."""
+        """Return the message with escaped control characters."""
         return visible(super().__str__())
 
 
@@ -71,16 +71,16 @@ class TrajectoryError(ArmidError):
 
 
 class IdentificationError(ArmidError):
-    """The data cannot identify what was asked."""
+    """The data do not determine the parameters."""
 
 
 class RecordingEnded(RecordingError):
-    """A recording cannot go on: its disk is full, or its file is gone."""
+    """Recording has to stop: the disk is full, or the file was removed."""
 
 
 class OutputError(ArmidError):
-    """A result cannot be written, or would take the place of another one."""
+    """A result cannot be written, or would overwrite another one."""
 
 
 class FleetError(ArmidError):
-    """A run over a fleet cannot begin, or cannot go on."""
+    """A run over a fleet cannot start or cannot continue."""

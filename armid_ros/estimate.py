@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an identification says of its parameters: values, and how far to believe them."""
+"""Estimated parameters: names, values and covariance."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armid_ros.errors import ModelError
 from armid_ros.motion import FloatArray, read_only
 import numpy as np
 
-#: A parameter of a body: its symbol, in the name of a load or as a difference.
+#: Name of a parameter of a body: its symbol, with a prefix for a load, or as a difference.
 _OF_BODY = re.compile(r'(?:payload_)?(m[xyz]?|I[xyz]{2})(_difference)?')
 _RIGID = re.compile(r'(m[xyz]?|I[xyz]{2})\d+( |$)')
 
@@ -25,13 +25,13 @@ class ParameterName:
     Attributes
     ----------
     name : str
-        Its name; a grouping of rigid parameters reads as an expression, 'Izz1 + Iyy2'.
+        Name of the parameter; a grouping of rigid parameters is an expression, 'Izz1 + Iyy2'.
     joint : str
-        The joint it belongs to; empty for a parameter of the whole arm.
+        Joint of the parameter; empty for a parameter of the whole arm.
     unit : str
         SI unit, such as 'kg m^2' or 'N m s/rad'.
     effect : str
-        Name of the effect it belongs to; empty for the rigid body.
+        Effect of the parameter; empty for the rigid body.
 
     """
 
@@ -42,7 +42,7 @@ class ParameterName:
 
     @property
     def words(self) -> str:
-        """Return its words without the joint: 'viscous coefficient', 'difference of mass'."""
+        """Return the name in words, without the joint: 'viscous coefficient'."""
         found = _OF_BODY.fullmatch(self.name)
         if found is None:
             return self.name.replace('_', ' ').replace('coulomb', 'Coulomb')
@@ -51,12 +51,12 @@ class ParameterName:
 
     @property
     def rigid(self) -> bool:
-        """Whether it is a mass, moment or inertia of a link, or a grouping led by one."""
+        """Whether the name is, or begins with, a mass, first moment or inertia of a link."""
         return _RIGID.match(self.name) is not None
 
 
 def symbol_in_words(symbol: str) -> str:
-    """Return what a symbol of a rigid body stands for: 'product of inertia xy' for Ixy."""
+    """Return the name of a rigid-body symbol in words: 'product of inertia xy' for Ixy."""
     if symbol == 'm':
         return 'mass'
     if symbol[0] == 'm':
@@ -74,11 +74,11 @@ class Estimate:
     Attributes
     ----------
     parameters : tuple of ParameterName
-        P names.
+        Names of the P parameters.
     values : ndarray, shape (P,)
-        Values, in the unit of each.
+        Values, in the units of the parameters.
     covariance : ndarray, shape (P, P)
-        Covariance of the values, units multiplied.
+        Covariance of the values, in products of the units.
 
     Examples
     --------
@@ -109,7 +109,7 @@ class Estimate:
             )
 
     def __repr__(self) -> str:
-        """Return the first values with their deviations, in ten lines at most."""
+        """Format the first values with standard deviations, in ten lines at most."""
         rows = [
             f'  {(p.joint + " ") if p.joint else ""}{p.name} {value:.4g} ± {std:.2g} {p.unit}'
             for p, value, std in zip(self.parameters, self.values, self.std, strict=True)
@@ -129,7 +129,7 @@ class Estimate:
         return np.column_stack([self.values - reach, self.values + reach])
 
     def __getitem__(self, key: str | tuple[str, str]) -> float:
-        """Return a value by name and joint: of a parameter, or of an effect that has one."""
+        """Return the value of a parameter, or of an effect that has only one parameter."""
         name, joint = (key, '') if isinstance(key, str) else key
         own = [
             k
@@ -139,7 +139,7 @@ class Estimate:
         return float(self.values[own[0] if len(own) == 1 else self.index(name, joint)])
 
     def index(self, name: str, joint: str = '') -> int:
-        """Return the position of a parameter; ModelError lists those that exist."""
+        """Return the index of a parameter; raise ModelError if there is no such parameter."""
         for position, parameter in enumerate(self.parameters):
             if parameter.name == name and parameter.joint == joint:
                 return position

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The motion of an arm on one time base: what every model, effect and simulator speaks."""
+"""Motion of an arm on one time base: the data type of models, effects and simulators."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def read_only(values: npt.ArrayLike) -> FloatArray:
 @dataclass(frozen=True)
 class MovingPoints:
     """
-    Points of another machine or a person that moved with an arm, as of an exoskeleton's wearer.
+    Points of a partner that moves with an arm, such as the wearer of an exoskeleton.
 
     Attributes
     ----------
     names : tuple of str
-        What the S points are called.
+        Names of the S points.
     position, velocity : ndarray, shape (N, S, 3)
-        In the base frame of the arm, at the samples of its motion [m, m/s].
+        Position and velocity in the base frame of the arm, at the samples of its motion [m, m/s].
 
     """
 
@@ -53,7 +53,7 @@ class MovingPoints:
     def select(
         self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]
     ) -> MovingPoints:
-        """Return the points at some of the samples."""
+        """Return the points at selected samples."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples])
 
 
@@ -71,13 +71,13 @@ class Motion:
     q, dq, ddq : ndarray, shape (N, n)
         Position [rad or m], velocity, acceleration.
     tau : ndarray, shape (N, n), or None
-        Actuator torque [N m] or force [N], positive along the URDF joint axis; None when the
-        motion is a reference that nobody measured.
+        Actuator torque [N m] or force [N], positive along the URDF joint axis; None for a
+        reference motion without measurement.
     band_hz : float
-        What positions that were measured have above this frequency is noise, as far as second
-        derivatives of torques go; infinite for a reference.
+        Frequency above which second derivatives of torques along measured positions are mostly
+        noise; infinite for a reference.
     partner : MovingPoints or None
-        Points of its partner that were recorded with the arm.
+        Points of a partner that were recorded with the arm.
 
     Examples
     --------
@@ -111,7 +111,7 @@ class Motion:
             values = getattr(self, name)
             if values is not None and values.shape != expected:
                 raise RecordingError(
-                    f'motion: {name} has shape {values.shape}, but {expected[0]} time stamps of '
+                    f'motion: {name} has shape {values.shape}, but {expected[0]} timestamps of '
                     f'{expected[1]} joints need {expected}'
                 )
 
@@ -119,7 +119,7 @@ class Motion:
     def of_states(
         cls, joints: tuple[str, ...], q: npt.ArrayLike, dq: npt.ArrayLike, ddq: npt.ArrayLike
     ) -> Motion:
-        """Return states as a motion, one a second; arrays of shape (N, n) or (n,), or numbers."""
+        """Return a motion through states, one per second; of shape (N, n) or (n,), or numbers."""
         parts = np.broadcast_arrays(np.atleast_2d(q), dq, ddq)
         return cls(joints, np.arange(len(parts[0]), dtype=float), *map(np.array, parts))
 
@@ -133,7 +133,7 @@ class Motion:
         return len(self.joints)
 
     def select(self, samples: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Motion:
-        """Return the motion at some of its samples."""
+        """Return the motion at selected samples."""
         tau = None if self.tau is None else self.tau[samples]
         return replace(
             self,
@@ -146,7 +146,7 @@ class Motion:
         )
 
     def at_rest(self) -> Motion:
-        """Return the same positions held still: what weight alone takes."""
+        """Return the same positions with zero velocity and acceleration."""
         zero = np.zeros_like(self.q)
         return replace(self, dq=zero, ddq=zero)
 
@@ -158,20 +158,21 @@ class Motion:
 @dataclass(frozen=True, eq=False)
 class ElasticRun:
     """
-    What happened, or what was measured, during one experiment.
+    True or measured signals of one experiment with an elastic arm.
 
     Attributes
     ----------
     motor, link : Motion
-        Motion of either side, that of the motors as seen at the joints. The torque of the motors
-        is the drives' [N m], constant from each sample to the next; the links have none.
+        Motion of the motors, converted to the joints, and of the links. The torque of the motors
+        is that of the drives [N m], constant between samples; the links have no torque.
     reference : ndarray, shape (N, n)
         Reference of the velocity loop [rad/s].
     integral : ndarray, shape (n,), or None
-        What the integral of the loop held at the beginning [rad]; None for nothing. A motor that
-        sticks keeps it from one experiment to the next.
+        Initial value of the integral of the loop [rad]; None for zero. If a motor sticks, the
+        integral stays from one experiment to the next.
     felt : ndarray, shape (n, N, 3), or None
-        What accelerometers on the links read [m/s^2], where it is not what they should read.
+        Readings of the accelerometers on the links [m/s^2]; None for readings computed from the
+        motion of the links.
 
     """
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Entry points that add commands and nodes: those of the fleet, of the papers and of other packages.
+Entry points that add commands and nodes: of the fleet, of the papers and of other packages.
 
 A package names a click command in the group ``armid_ros.commands``, and the module of a node,
 which has a function ``main``, in the group ``armid_ros.nodes``. Effects have a group of their own.
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 @cache
 def plug_ins(kind: str) -> dict[str, EntryPoint]:
     """
-    Find plug-ins by name, without those whose folder was deleted.
+    Return the installed plug-ins by name, without plug-ins whose module does not exist.
 
     Parameters
     ----------
     kind : str
-        Commands or nodes: what the name of the group ends with.
+        'commands' or 'nodes', the last part of the name of the group.
 
     """
-    from importlib.metadata import entry_points  # commands of the core start without it
+    from importlib.metadata import entry_points  # slow import, not needed to start core commands
 
     found = entry_points(group=f'armid_ros.{kind}')
     return {entry.name: entry for entry in found if _is_there(entry.module)}
@@ -39,7 +39,7 @@ def plug_ins(kind: str) -> dict[str, EntryPoint]:
 
 def load_plug_in(entry: EntryPoint) -> Any:
     """
-    Import what an entry point names.
+    Import the object that an entry point names.
 
     Raises
     ------
@@ -53,11 +53,11 @@ def load_plug_in(entry: EntryPoint) -> Any:
         return entry.load()
     except ModuleNotFoundError:
         raise
-    except Exception as error:  # a package of somebody else may fail in any way
+    except Exception as error:  # a package of another author may raise any error
         package = entry.dist.name if entry.dist else entry.module
         raise ArmidError(
-            f'{package}: {entry.value} cannot be loaded: {type(error).__name__}: {error}; mend or '
-            'uninstall it'
+            f'{package}: {entry.value} cannot be loaded: {type(error).__name__}: {error}; repair '
+            'or uninstall the package'
         ) from error
 
 
@@ -66,5 +66,5 @@ def _is_there(module: str) -> bool:
         return find_spec(module) is not None
     except ModuleNotFoundError:
         return False
-    except Exception:  # the package of a module fails: loading it reports how
+    except Exception:  # importing the parent package fails: load_plug_in reports the error
         return True

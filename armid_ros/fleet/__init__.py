@@ -3,8 +3,8 @@
 """
 Many arms and many bags: identified, watched over time and diagnosed on a cluster.
 
-Dask schedules, repeats and moves; fsspec opens stores; pyarrow keeps tables. Here is
-their work: a bag becomes normal equations of fixed size, those of one arm become its estimate, and
-estimates over time become changes and alarms. Needs the extra ``fleet``.
+Dask schedules tasks, fsspec opens stores, and pyarrow reads and writes tables. A task compresses a
+bag to normal equations of fixed size. The normal equations of an arm give its estimate, and
+estimates over time give changes and alarms. The package needs the extra ``fleet``.
 
 """

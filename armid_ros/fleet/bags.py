@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which bags there are, and which arm and day each belongs to."""
+"""The list of bags, and the arm and day of each."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from armid_ros.fleet.store import opened
 SUFFIXES = ('.mcap', '.db3', '.mcap.zstd', '.db3.zstd')
 #: A date in a path: 2026-01-31, 2026_01_31 or 20260131.
 _DATE = re.compile(r'(?<!\d)(20\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)')
-#: A day [ns].
+#: Length of a day [ns].
 DAY_NS = 86_400 * 10**9
-#: Bytes of an arm in the name of a folder or page; file systems take 255 together.
+#: Largest length of an arm's name in a file name [bytes]; file systems allow 255 in total.
 LONGEST_NAME = 240
 _WILD = re.compile(r'[*?\[]')
-#: What stores call the version of a file, the surest first.
+#: Keys of stores for the version of a file, the most reliable first.
 _VERSIONS = ('ETag', 'etag', 'md5Hash', 'mtime', 'LastModified', 'updated', 'created')
 
 
@@ -36,15 +36,15 @@ class BagFile:
     Attributes
     ----------
     arm : str
-        Whose it is.
+        Name of the arm.
     url : str
-        Where it is.
+        URL of the bag.
     day : str
-        As 2026-01-31, of its path; empty where the path has none.
+        Date in the path, such as 2026-01-31; empty without a date.
     size : int
-        Bytes.
+        Size of the bag [bytes].
     version : str
-        Changes when its content does.
+        Text that changes when the content of the bag changes.
 
     """
 
@@ -56,49 +56,49 @@ class BagFile:
 
     @property
     def name(self) -> str:
-        """Name of its files among the results: that of the bag, and a digest of where it is."""
+        """Name of the files of the bag in the results: name and digest of the URL."""
         last = self.url.rstrip('/').rsplit('/', 1)[-1]
         return f'{re.sub(r"[^A-Za-z0-9_.-]", "_", last)}-{digest(self.url, size=10)}'
 
 
 def digest(*parts: str, size: int = 16) -> str:
-    """Return a name for texts, of so many hexadecimal digits."""
+    """Return the first ``size`` hexadecimal digits of a hash of texts."""
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()[:size]
 
 
 def part_of(data_set: str, bag: BagFile, day: str) -> str:
-    """Return the file of a bag in a data set that is partitioned by arm and day."""
+    """Return the path of the file of a bag in a data set with partitions by arm and day."""
     return f'{data_set}/{folder_of(bag.arm)}/day={day}/{bag.name}.parquet'
 
 
 def folder_of(arm: str) -> str:
-    """Return the partition of an arm."""
+    """Return the folder of an arm's partition."""
     return f'arm={file_name(arm)}'
 
 
 def file_name(arm: str) -> str:
-    """Return the name of an arm as part of a path; letters and digits of any script stay."""
+    """Return the name of an arm as a file name; other than letters and digits are escaped."""
     return ''.join(char if char.isalnum() else quote(char, safe='') for char in arm)
 
 
 def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[BagFile]:
     """
-    List the bags that URLs with wildcards stand for.
+    List the bags that match URLs with wildcards.
 
-    The arm of a bag is what the first wildcard stands for, unless that is the bag itself: then it
-    is the folder that the bag lies in.
+    The arm of a bag is the part of the path that the first wildcard matches. If this part is the
+    bag itself, the arm is the folder of the bag.
 
     Parameters
     ----------
     patterns : sequence of str
-        URLs or paths with wildcards; they name .mcap and .db3 files or rosbag2 directories.
+        URLs or paths with wildcards of .mcap and .db3 files or rosbag2 directories.
     arm_pattern : str, optional
-        A regular expression whose first group is the arm, searched for in the URL.
+        Regular expression to search for in the URL; its first group is the name of the arm.
 
     Raises
     ------
     FleetError
-        There is no bag, or a bag has no arm, or one whose name is empty or too long.
+        If there is no bag, or if the name of an arm is missing, empty or too long.
 
     """
     try:
@@ -112,12 +112,12 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
         filesystem, path = opened(pattern)
         try:
             listed = filesystem.glob(path, detail=True)
-        except Exception as error:  # every store has errors of its own
+        except Exception as error:  # every store raises errors of its own
             raise FleetError(f'{pattern}: cannot be listed: {error}') from error
         bags = list(_bags(filesystem, listed))
         if not bags:
             raise FleetError(
-                f'{pattern}: no bag there; a bag is a .mcap or .db3 file or a rosbag2 directory'
+                f'{pattern}: there is no bag; a bag is a .mcap or .db3 file or a rosbag2 directory'
                 + ('' if _WILD.search(pattern) else f', as in "{pattern.rstrip("/")}/*/*"')
             )
         for at, size, version in bags:
@@ -126,7 +126,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
             if regular is not None:
                 match = regular.search(url)
                 if match is None:
-                    raise FleetError(f'{url}: --arm {arm_pattern} finds no arm in it')
+                    raise FleetError(f'{url}: --arm {arm_pattern} does not match this URL')
                 arm = match.group(1) or ''
             length = len(file_name(arm).encode())
             if not 0 < length <= LONGEST_NAME:
@@ -142,7 +142,7 @@ def find_bags(patterns: Sequence[str], arm_pattern: str | None = None) -> list[B
 def _bags(
     filesystem: Any, listed: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[tuple[str, int, str]]:
-    """Yield path, size and version of all bags; files of a bag that is there too are parts."""
+    """Yield path, size and version of all bags; files of a listed directory are parts of it."""
     whole: list[str] = []
     for path, info in sorted(listed.items()):
         path = path.rstrip('/')
@@ -167,7 +167,7 @@ def _version(info: Mapping[str, Any]) -> str:
 
 
 def _arm(pattern: str, path: str) -> str:
-    """Return what the first wildcard stands for; where that is the bag, its folder."""
+    """Return the part that the first wildcard matches; the folder if that part is the bag."""
     wild = [k for k, part in enumerate(pattern.split('/')) if _WILD.search(part)]
     parts = path.rstrip('/').split('/')
     last = len(parts) - 1

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Where the work is done: processes of this machine, or a Dask cluster by its address."""
+"""Workers: processes of this machine, or a Dask cluster with a given address."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from armid_ros.version import __version__
 import dask
 from distributed import Client, LocalCluster
 
-#: What a worker of this machine may take before Dask moves results to the disk [bytes].
+#: Memory limit of a worker of this machine; Dask then moves results to the disk [bytes].
 WORKER_MEMORY = 1_200_000_000
-#: How long a cluster may take to answer [s].
+#: Timeout of the connection to a cluster [s].
 ANSWER = 30.0
-#: How often is looked whether all workers of this machine are there.
+#: Period of the check whether all workers of this machine run.
 _LOOK_EVERY = '2s'
 
-#: What Dask does all the time but the work, for pages that nobody looks at here.
+#: Settings that reduce the work of Dask for its dashboard, which is not used here.
 _QUIET = {
     'distributed.worker.profile.enabled': False,
     'distributed.admin.tick.interval': '1s',
     'distributed.admin.system-monitor.interval': '2s',
     'distributed.worker.memory.monitor-interval': '500ms',
     'distributed.scheduler.active-memory-manager.start': False,
-    # without MALLOC_TRIM_THRESHOLD_, for which every array is fetched from the kernel anew
+    # MALLOC_TRIM_THRESHOLD_ is left out: with it, every array is allocated by the kernel anew
     'distributed.nanny.pre-spawn-environ': dict.fromkeys(
         ('OMP_NUM_THREADS', 'MKL_NUM_THREADS', 'OPENBLAS_NUM_THREADS'), '1'
     ),
@@ -39,19 +39,19 @@ _QUIET = {
 @contextmanager
 def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Client]:
     """
-    Hold a connection to a cluster.
+    Connect to a cluster while the context is open.
 
     Parameters
     ----------
     scheduler : str or None
-        Address of a scheduler, as tcp://host:8786; None for processes of this machine.
+        Address of a scheduler, such as tcp://host:8786; None for processes of this machine.
     workers : int, optional
-        How many, where they are of this machine; one a core by default.
+        Number of processes of this machine; one per core by default.
 
     Raises
     ------
     FleetError
-        No scheduler answers, or its workers have another version of this package or none.
+        If no scheduler answers, or workers lack this version of the package.
 
     """
     logging.getLogger('distributed').setLevel(logging.CRITICAL)
@@ -69,7 +69,7 @@ def connected(scheduler: str | None, workers: int | None = None) -> Iterator[Cli
         if other:
             raise FleetError(
                 f'--scheduler {scheduler}: its workers have armid_ros {", ".join(sorted(other))}, '
-                f'here it is {__version__}; install the same one'
+                f'here it is {__version__}; install the same version'
             )
         yield client
 
@@ -93,9 +93,8 @@ def _embedded(workers: int | None) -> Iterator[Client]:
                 ) as cluster,
                 Client(cluster) as client,
             ):
-                # Dask starts a worker again that has ended, but not one that ended while it was
-                # being started, and gives up one that takes long: with no worker left, tasks
-                # would wait for ever
+                # Dask restarts a worker that ends, but not if it ends or is slow during its start.
+                # Without workers, tasks would wait for ever, so the number of workers is adapted.
                 cluster.adapt(minimum=count, maximum=count, interval=_LOOK_EVERY)
                 yield client
     finally:

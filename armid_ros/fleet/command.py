@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Many arms and many bags: identified on a cluster, watched over time, diagnosed."""
+"""The command ``armid fleet``: identify, watch and diagnose many arms on a cluster."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SHOWN = 8
 
 
 def _out(command: Callable[..., None]) -> Callable[..., None]:
-    """Add --out, a place of results, and --force, to write over files of others."""
+    """Add the options --out, the folder of results, and --force, to overwrite other files."""
     where = click.option(
         '--out', required=True, metavar='URL', help='Folder of the results: a path, or s3://...'
     )
@@ -52,7 +52,7 @@ _alpha = click.option(
 
 
 class _Fleet(click.Group):
-    """Names missing packages before they are needed."""
+    """Command group that first checks for missing packages."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command of the group."""
@@ -75,7 +75,7 @@ def fleet() -> None:
 
 @contextmanager
 def _results(out: str, doing: str) -> Iterator[tuple[Store, Callable[..., None]]]:
-    """Hold a folder of results while a command runs, and show how far it is."""
+    """Lock a folder of results while a command runs, and show the progress."""
     from armid_ros.cli.options import hold
     from armid_ros.fleet.plan import SCHEMA
     from armid_ros.fleet.store import Store, StoreError
@@ -99,7 +99,7 @@ def _print_shown(lines: Sequence[str], rest: str) -> None:
 
 
 def _print_json(name: str, **document: Any) -> None:
-    """Print what a command found for programs to read."""
+    """Print the result of a command as a JSON document."""
     click.echo(json_text({'schema': f'armid/{name}/1', **document}, indent=1))
 
 

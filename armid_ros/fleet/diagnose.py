@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What has happened to the arms that are named: the diagnosis, with the arm's own past as baseline.
+Diagnosis of the arms that changed, with earlier bags of the same arm as baseline.
 
-The model is what the arm was before its change, identified from its last bags then; the diagnosis
-looks at the first bags after it and is judged by one more that it only predicts. Results:
+The model is identified from the last bags before the change. The diagnosis uses the first bags
+after the change, and a further bag is held out for validation. Results:
 
-    watch/diagnoses.parquet              one row an arm: verdict, summary, causes
+    watch/diagnoses.parquet              one row per arm: verdict, summary, causes
     reports/arm=A/diagnosis/             diagnosis.json, model.yaml, report.html
 
 """
@@ -32,9 +32,9 @@ from armid_ros.recording import read_recording
 from distributed import as_completed, Client
 import pyarrow as pa
 
-#: An arm to be diagnosed, as of ``cases``.
+#: An arm to be diagnosed, with its bags: an entry of ``cases``.
 Case = dict[str, Any]
-#: Bags before a change that the arm is identified from, and bags after it that are diagnosed.
+#: Number of bags before a change for the identification, and after it for the diagnosis.
 BEFORE, AFTER = 3, 3
 
 DIAGNOSES = pa.schema(
@@ -53,27 +53,27 @@ DIAGNOSES = pa.schema(
 
 def cases(found: Watch, arms: Sequence[str] = (), everyone: bool = False) -> list[Case]:
     """
-    Choose the bags by which arms are diagnosed.
+    Choose the bags for the diagnosis of each arm.
 
     Parameters
     ----------
     found : Watch
         The fleet over time.
     arms : sequence of str
-        Which arms; by default those that are named.
+        Names of the arms; by default the arms with a change.
     everyone : bool
-        Whether all arms are.
+        Whether all arms are diagnosed.
 
     Returns
     -------
     list of dict
-        ``arm``, and as ``baseline`` and ``bags`` the URLs of its bags before and after its
-        change; of the latter the last one is only predicted.
+        ``arm``, and ``baseline`` and ``bags``: the URLs of its bags before and after its change.
+        The last bag is held out for validation.
 
     Raises
     ------
     FleetError
-        An arm is not there.
+        If there is no arm of one of these names.
 
     """
     chosen = [arm_of(found, name) for name in arms]
@@ -102,9 +102,9 @@ def diagnose_fleet(
     tell: Callable[[int, int], None] = lambda ended, of: None,
 ) -> list[dict[str, Any]]:
     """
-    Diagnose arms on a cluster; a row of ``watch/diagnoses.parquet`` each.
+    Diagnose arms on a cluster; return a row of ``watch/diagnoses.parquet`` for each.
 
-    Rows of other arms stay.
+    Rows of other arms in the table are kept.
 
     """
     kinds = document(store)['kinds']
@@ -137,7 +137,7 @@ def diagnose_fleet(
 def one_arm(
     case: Case, model: ArmModel, filters: Conditioning, topic: str | None, out: str
 ) -> dict[str, Any]:
-    """Task: identify what an arm was, and diagnose what it is; return what is found of it."""
+    """Task: identify an arm from its baseline, diagnose its later bags, and return the result."""
     store = Store(out)
     try:
         with ExitStack() as stack:
@@ -161,7 +161,7 @@ def one_arm(
             )
             report = f'reports/{folder_of(str(case["arm"]))}/diagnosis'
             folder = result.save(stack.enter_context(TemporaryDirectory(prefix='armid-report-')))
-            # report.html last: it is what the pages link
+            # report.html last, because the pages link to it
             for file in sorted(folder.iterdir(), key=lambda file: file.name == 'report.html'):
                 store.write(f'{report}/{file.name}', file.read_bytes())
     except ArmidError as error:

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The job of the bags of one kind of arm: model, filters, settings, and place of results."""
+"""The job for bags of one kind of arm: model, filters, settings and URL of the results."""
 
 from __future__ import annotations
 
@@ -19,39 +19,39 @@ from armid_ros.model import BaseParameters, random_motion
 from armid_ros.recording import ReadSettings
 import numpy as np
 
-#: Rates that differ by less than this share are one rate.
+#: Sampling rates that differ by less than this share are treated as equal.
 _SAME_RATE = 0.02
-#: Numbers of the columns of one piece of a bag; larger ones are read in several pieces.
+#: Largest number of elements of the columns of a piece; larger bags are read in pieces.
 _MOST_NUMBERS = 16_000_000
-#: Full-rate samples of a piece, times joints.
+#: Largest number of full-rate samples of a piece, times joints.
 _MOST_SAMPLES = 1_400_000
 
 
 @dataclass(frozen=True)
 class FleetSettings:
     """
-    How a fleet is identified.
+    Settings of the identification of a fleet.
 
     Attributes
     ----------
     effects : str
-        Of all arms, unless the table of robots has others.
+        Effects of all arms, unless the table of robots has others.
     gravity : str
-        'earth', 'moon' or a vector, unless the table of robots has another.
+        'earth', 'moon' or a vector, unless the table of robots has another value.
     joints : str
-        Driven joints with commas; empty for all but grippers.
+        Driven joints, separated by commas; empty for all joints except grippers.
     weighted : bool
-        Whether joints are weighted by their residuals.
+        Whether joints are weighted by the standard deviations of their residuals.
     signals : SignalSettings
-        Filters; what is None is chosen from a few bags of each kind of arm, once for all days.
+        Filters; a value of None is chosen from a few bags of each kind of arm, for all days.
     topic : str or None
-        JointState topic.
+        Name of the JointState topic.
     resume : bool
-        Whether results of earlier runs count where bag and settings are the same.
+        Whether results of earlier runs are reused if bag and settings are the same.
     seed : int
-        Of the states over which base parameters are found.
+        Seed of the random states with which base parameters are computed.
     reading : ReadSettings
-        Checksums and memory.
+        Settings for checksums and memory.
 
     """
 
@@ -68,18 +68,18 @@ class FleetSettings:
 
 def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioning:
     """
-    Return the filters of a kind of arm for a recording of some rate, with rows as often.
+    Adapt the filters of a kind of arm to the sampling rate of a recording.
 
     Raises
     ------
     FleetError
-        The rate is too low for the cut-off.
+        If the rate is too low for the cut-off.
 
     """
     if filters.cutoff_hz >= 0.5 * rate_hz:
         raise FleetError(
             f'{source}: {rate_hz:.4g} samples/s are too few for the cut-off of '
-            f'{filters.cutoff_hz:.4g} Hz of its arm; name a lower one with --cutoff'
+            f'{filters.cutoff_hz:.4g} Hz of its arm; set a lower one with --cutoff'
         )
     decimation = filters.decimation
     if abs(rate_hz / filters.rate_hz - 1.0) > _SAME_RATE:
@@ -88,29 +88,29 @@ def filters_at(filters: Conditioning, rate_hz: float, source: str) -> Conditioni
 
 
 def filter_facts(filters: Conditioning) -> dict[str, Any]:
-    """Return filters as fleet.json has them; they are the arguments of a ``Conditioning``."""
+    """Return filters as an entry of fleet.json: the arguments of a ``Conditioning``."""
     return {name: getattr(filters, name) for name in ('cutoff_hz', 'decimation', 'rate_hz')}
 
 
 @dataclass(frozen=True)
 class Job:
     """
-    How bags of one kind of arm are treated.
+    Model, filters and settings for bags of one kind of arm.
 
     Attributes
     ----------
     arm : ArmModel
         Rigid body and effects.
     theory : BaseParameters
-        What is identifiable with any motion.
+        Parameters that are identifiable with a suitable motion.
     filters : Conditioning
-        Of all its bags, whenever they were recorded; one row for so many samples of its rate.
+        Filters of all bags of this kind, with cut-off, decimation and sampling rate.
     out : str
         URL of the results.
     run : str
-        Name of the run; what it has written itself it does not make again.
+        Name of the run; results of the same run are not computed again.
     settings : FleetSettings
-        Of the fleet.
+        Settings of the fleet.
 
     """
 
@@ -123,7 +123,7 @@ class Job:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """Return what results depend on, other than the bag."""
+        """Return the facts on which results depend, except the bag."""
         robot = self.arm.robot
         return {
             'robot': robot.name,
@@ -138,12 +138,12 @@ class Job:
 
     @cached_property
     def digest(self) -> str:
-        """Return a name for the settings."""
+        """Return a hash of the facts."""
         return digest(json.dumps(self.facts, sort_keys=True))
 
     @property
     def samples(self) -> int:
-        """Return the samples of a bag that are in memory at once."""
+        """Return the number of samples of a bag that are in memory at once."""
         joints = self.arm.robot.n_joints
         rows = _MOST_NUMBERS // (joints * self.theory.rank)
         return min(rows * self.filters.decimation, _MOST_SAMPLES // joints)
@@ -151,12 +151,12 @@ class Job:
 
 def require_linear(arm: ArmModel, rng: np.random.Generator) -> None:
     """
-    Refuse effects that make the torque not linear in the parameters.
+    Check that the torque is linear in the parameters of all effects.
 
     Raises
     ------
     FleetError
-        Naming them, and what to do.
+        If an effect is nonlinear in its parameters.
 
     """
     motion = random_motion(arm.robot, rng, 200)
@@ -171,5 +171,5 @@ def require_linear(arm: ArmModel, rng: np.random.Generator) -> None:
         if not linear:
             raise FleetError(
                 f'--effects {effect.name}: the torque is not linear in its parameters, so bags '
-                'cannot be merged with it; name others, and look for it with `armid diagnose`'
+                'cannot be merged; name other effects, and use `armid diagnose` for this one'
             )

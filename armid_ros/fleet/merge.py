@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-From bags to estimates: normal equations added up, a fit, and its deviations.
+From bags to estimates: sums of normal equations, a fit, and its standard deviations.
 
-The deviations of a fit come from the spectrum of its residuals, which no summary of fixed size
-has; so bags are read a second time, for the noise products at the values of their arm. These add
-up over bags, and what comes out is that of one identification of all bags.
+Standard deviations follow from the spectrum of the residuals, which normal equations do not
+contain. A second pass over the bags therefore computes the noise products at the estimate of the
+arm. Noise products add up over bags, so the result equals one identification of all bags.
 
 """
 
@@ -38,11 +38,11 @@ class Refused:
     Attributes
     ----------
     bag : BagFile
-        Which one.
+        The bag.
     reason : str
-        Why, and what to do.
+        Why the bag is not used, and the remedy.
     failed : bool
-        Whether it was not the bag's fault: a store, or a worker, that was lost too often.
+        Whether a store or a worker failed repeatedly, so the bag itself may be good.
 
     """
 
@@ -51,19 +51,19 @@ class Refused:
     failed: bool = False
 
     def merged(self) -> MergedBags:
-        """Return it as a group of one bag."""
+        """Return a group that consists of this bag."""
         return MergedBags(refused=(self,))
 
 
 @dataclass(frozen=True, eq=False)
 class FleetEstimate:
     """
-    The estimate of a bag by itself, or of all bags of an arm together.
+    The estimate from one bag, or from all bags of an arm.
 
     Attributes
     ----------
     parameters : tuple of ParameterName
-        Base parameters and those of the effects.
+        Base parameters and parameters of the effects.
     values, std : ndarray, shape (r,)
         Values and standard deviations.
     joint_std : ndarray, shape (n,)
@@ -71,7 +71,7 @@ class FleetEstimate:
     relative_error_percent : float
         100 |tau - tau_hat| / |tau| over all joints and rows.
     condition_number : float
-        Of the weighted regressor.
+        Condition number of the weighted regressor.
 
     """
 
@@ -86,16 +86,16 @@ class FleetEstimate:
 @dataclass(frozen=True, eq=False)
 class FleetFit:
     """
-    The values that fit rows, before their deviations.
+    A fit of the parameters, before its standard deviations are known.
 
     Attributes
     ----------
     base : BaseParameters
         The identifiable parameters.
     kept : sequence of int
-        Columns of the theory that they keep.
+        Columns of the theoretically identifiable parameters that the data identify.
     fit : WeightedFit
-        The fit in these.
+        The weighted fit of these columns.
 
     """
 
@@ -105,7 +105,7 @@ class FleetFit:
 
     @classmethod
     def of(cls, normal: NormalEquations, job: Job) -> FleetFit | None:
-        """Fit normal equations; None where there are too few rows."""
+        """Fit normal equations; return None if there are too few rows."""
         base, kept = identifiable_base(job.theory, normal)
         if normal.counts.sum() < 2 * base.rank:
             return None
@@ -140,20 +140,20 @@ class FleetFit:
 @dataclass(frozen=True, eq=False)
 class MergedBags:
     """
-    Bags of one arm, merged.
+    Merged bags of one arm.
 
     Attributes
     ----------
     normal : NormalEquations or None
-        Of all their rows; None if all were refused.
+        Normal equations of all rows; None if all bags were refused.
     seconds : float
-        Motion in them [s].
+        Total time of motion [s].
     versions : tuple of (str, str)
         URL and version of every bag.
     found : int
-        Bags that an earlier run had read.
+        Number of bags that an earlier run had read.
     refused : tuple of Refused
-        Bags that are not among them.
+        Bags that are not used.
 
     """
 

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The pages of a fleet: index.html with all arms by their health, and one page an arm.
+The pages of a fleet: index.html with the health of all arms, and one page per arm.
 
-Pages load nothing and are linked by relative addresses, so a folder of them can be put anywhere.
+Pages load no other files and use relative links, so the folder can be moved.
 
 """
 
@@ -42,9 +42,9 @@ from armid_ros.report.sections.frame import VerdictSection
 from markupsafe import escape, Markup
 import numpy as np
 
-#: Characters of the names of arms that the first sentence lists.
+#: Largest length of the list of arms in the first sentence [characters].
 _LISTED = 60
-#: Refused bags that the overview lists.
+#: Number of refused bags that the overview lists.
 _SHOWN = 50
 #: Size of a small curve, and of a larger one with intervals [px].
 _SMALL, _LARGE = (84, 20), (250, 74)
@@ -62,7 +62,7 @@ def write_pages(store: Store, found: Watch) -> None:
 
 
 def _overview(found: Watch, diagnoses: Diagnoses) -> str:
-    """Return the page with all arms, and the diagnoses of some."""
+    """Return the overview page with all arms and their diagnoses."""
     heads = ('Arm', 'Health', 'What', 'Bags', 'Refused', 'Error')
     rows = [_arm_row(arm, diagnoses.get(arm.arm)) for arm in found.arms]
     hint = (
@@ -177,7 +177,7 @@ def _verdict(found: Watch, diagnoses: Diagnoses) -> VerdictSection:
 
 
 def _diagnosed(arm: WatchedArm, diagnosis: Mapping[str, Any] | None) -> str:
-    """Return the verdict of a diagnosis that found more than the tests of parameters, or ''."""
+    """Return the verdict of a diagnosis if it found a fault without a named change, else ''."""
     if arm.named or diagnosis is None or diagnosis['verdict'] in ('consistent', 'failed'):
         return ''
     return str(diagnosis['verdict']).replace('_', ' ')
@@ -220,7 +220,7 @@ def _curve(arm: WatchedArm, series: ParameterHistory) -> tuple[str, str, Markup,
     cuts = [one.index for one in arm.named if one.series.parameter == series.parameter]
     svg, ends = _drawing(series.days, series.values, series.std, sum(cuts), links)
     unit = pretty(series.unit)
-    if series.name == RESIDUAL:  # of which the series has the logarithm
+    if series.name == RESIDUAL:  # the series contains logarithms
         ends, unit = (math.exp(ends[0]), math.exp(ends[1])), 'N m'
     shown = f'{digits(ends[0], 3)} to {digits(ends[1], 3)} {unit}'.rstrip()
     return parameter_label(*series.parameter), shown, svg, 'changed' if cuts else ''
@@ -262,14 +262,14 @@ def _table(
     numbers: Sequence[int] = (),
     hint: str = '',
 ) -> ContentSection:
-    """Return a table whose cells may have links and curves; some columns are numbers."""
+    """Return a table with links and curves in its cells, and with numeric columns."""
     words = [k for k in range(len(heads)) if k not in numbers]
     table = DataTable(heads, rows, words, 'fleet')
     return ContentSection(title, [table, *([Paragraph(hint, 'hint')] if hint else [])])
 
 
 def _link(target: str, text: str) -> Markup:
-    """Return a text that leads to a page, or the text alone where there is none."""
+    """Return a text with a link to a page; without a page, the text alone."""
     return Markup('<a href="{}">{}</a>').format(target, text) if target else escape(text)
 
 
@@ -281,7 +281,7 @@ def _drawing(
     links: Sequence[str] = (),
     title: str = '',
 ) -> tuple[Markup, tuple[float, float]]:
-    """Draw a series, as a line or as points with links; return it and the ends of its ordinate."""
+    """Draw a series as a line, or as points with links; return drawing and range of ordinate."""
     (width, height), wide = (_LARGE, HALF_WIDTH) if links else (_SMALL, 0.0)
     low, high = float(np.min(values - wide * std)), float(np.max(values + wide * std))
     least = max(6.0 * float(np.median(std)), 1e-3 * float(np.max(np.abs(values))), 1e-12)

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The plan of a fleet: which robot each arm is, and the filters of all bags of one kind of robot.
+The plan of a fleet: the robot of each arm, and the filters of each kind of arm.
 
-fleet.json keeps them, so that later runs have the same.
+fleet.json stores the plan, so that later runs use the same filters.
 
 """
 
@@ -37,11 +37,11 @@ from armid_ros.robots import load_robot, robot_from_urdf
 import numpy as np
 
 SCHEMA = 'armid/fleet/1'
-#: Bags that the filters are chosen by, of as many arms where there are.
+#: Number of bags from which the filters are chosen, of different arms if possible.
 _CHOSEN_BY = 4
-#: Bags that are tried for that, where some cannot be read.
+#: Largest number of bags that are tried if some cannot be read.
 _TRIED = 24
-#: Samples of each that are looked at.
+#: Number of samples of each of these bags that are read.
 _LOOKED_AT = 100_000
 
 
@@ -55,7 +55,7 @@ class Entry:
     robot : str
         Shipped name, or path of a URDF or xacro.
     gravity, joints, effects : str
-        As of `armid identify`; empty where the table has none.
+        As the options of `armid identify`; empty if the table has no value.
 
     """
 
@@ -67,12 +67,12 @@ class Entry:
 
 def read_table(url: str) -> dict[str, Entry]:
     """
-    Read a CSV with the columns arm and robot, and if wanted gravity, joints and effects.
+    Read a CSV with the columns arm and robot; gravity, joints and effects are optional.
 
     Raises
     ------
     FleetError
-        It cannot be read, or a line has no arm or robot.
+        If the file cannot be read, or a line has no arm or robot.
 
     """
     filesystem, path = opened(url)
@@ -93,7 +93,7 @@ def read_table(url: str) -> dict[str, Entry]:
             if not arm or not robot:
                 raise FleetError(f'line {number}: has no arm or no robot')
             if arm in table:
-                raise FleetError(f'line {number}: arm {arm} is there twice')
+                raise FleetError(f'line {number}: arm {arm} appears twice')
             rest = (str(row.get(n) or '').strip() for n in ('gravity', 'joints', 'effects'))
             table[arm] = Entry(robot, *rest)
     return table
@@ -106,14 +106,14 @@ def plan_fleet(
     settings: FleetSettings,
 ) -> dict[str, Job]:
     """
-    Plan what is to be done for every arm, and write it to fleet.json.
+    Plan the job of every arm, and write the plan to fleet.json.
 
     Parameters
     ----------
     bags : sequence of BagFile
         All bags.
     robots : str or mapping of str to Entry
-        The robot of all arms, or that of each.
+        The robot of all arms, or a mapping from arms to robots.
     out : str
         URL of the results.
     settings : FleetSettings
@@ -122,12 +122,12 @@ def plan_fleet(
     Returns
     -------
     dict of str to Job
-        That of each arm; arms of one kind share it.
+        The job of each arm; arms of one kind share a job.
 
     Raises
     ------
     FleetError
-        An arm has no robot, an effect cannot be merged, or no bag of a kind can be read.
+        If an arm has no robot, an effect cannot be merged, or no bag of a kind can be read.
 
     """
     bags_of: dict[Entry, list[BagFile]] = {}
@@ -174,7 +174,7 @@ def plan_fleet(
 
 
 def kind_arm(store: Store, facts: Mapping[str, Any], key: str) -> ArmModel:
-    """Return the arm model of a kind that fleet.json has."""
+    """Return the arm model of a kind of arm in fleet.json."""
     urdf = store.read(f'robots/{key}.urdf')
     if urdf is None:
         raise FleetError(f'{store.url}/robots/{key}.urdf: there is no such description')
@@ -191,7 +191,7 @@ def document(store: Store) -> dict[str, Any]:
     Raises
     ------
     FleetError
-        It is none of this program.
+        If another program or version wrote the file.
 
     """
     data = store.read('fleet.json')
@@ -208,22 +208,22 @@ def choose_filters(
     arm: ArmModel, theory: BaseParameters, bags: Sequence[BagFile], settings: FleetSettings
 ) -> Conditioning:
     """
-    Choose the filters for a kind of arm by a few of its bags.
+    Choose the filters for a kind of arm from a few of its bags.
 
-    They are then those of all bags of all days: estimates through other filters differ by more
-    than noise.
+    All bags of all days use these filters: with different filters, estimates differ by more than
+    noise.
 
     Raises
     ------
     FleetError
-        No bag can be read; with the reason of the last one.
+        If no bag can be read; the message gives the reason for the last bag.
 
     """
     recordings: list[Recording] = []
     problem, wanted = 'there is none', settings.signals
     turns: Counter[str] = Counter()
     order = []
-    for bag in bags:  # one of each arm before a second one of any
+    for bag in bags:  # one bag of each arm before a second bag of any arm
         turns[bag.arm] += 1
         order.append((turns[bag.arm], bag))
     for _, bag in sorted(order)[:_TRIED]:

@@ -1,15 +1,15 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The tables of results: what is in them, and how a bag or an arm becomes rows.
+The tables of results: their columns, and the rows of a bag or an arm.
 
     bags/arm=A/day=D/BAG.parquet         one row: what was recorded, its fit and normal equations
-    parameters/arm=A/day=D/BAG.parquet   one row a parameter: estimate of the bag by itself
-    arms/arm=A/estimate.parquet          one row a parameter: estimate of all bags
+    parameters/arm=A/day=D/BAG.parquet   one row per parameter: estimate of the bag by itself
+    arms/arm=A/estimate.parquet          one row per parameter: estimate of all bags
     refused/arm=A/BAG.parquet            one row: why a bag is not used
 
-A bag has one file in each, named after it, so a run writes over what it made of the same bag and
-over nothing else. ``bags`` is written last: what is there is complete.
+A bag has one file in each data set, named after the bag, so a run overwrites only results of the
+same bag. The file in ``bags`` is written last: if it exists, the results of the bag are complete.
 
 """
 
@@ -90,7 +90,7 @@ REFUSED = pa.schema(
 
 
 def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
-    """Write what is kept of a bag."""
+    """Write the summary of a bag to the tables."""
     bag, own = summary.bag, summary.own
     start = datetime.datetime.fromtimestamp(summary.start_ns * 1e-9, datetime.UTC)
     robot = job.arm.robot
@@ -117,7 +117,7 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
     }
     store.write_table(part_of('bags', bag, summary.day), pa.Table.from_pylist([row], BAGS))
     for day in [] if bag.day else _days(store, bag):
-        if day != summary.day:  # the same bag, recorded anew
+        if day != summary.day:  # the same bag, recorded again on another day
             store.remove(part_of('bags', bag, day))
             store.remove(part_of('parameters', bag, day))
     store.remove(_refused(bag))
@@ -125,9 +125,9 @@ def write_summary(store: Store, summary: BagSummary, job: Job) -> None:
 
 def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused | None:
     """
-    Return what is among the results of a bag, if it is of the same bag and settings.
+    Return the stored result of a bag, if bag and settings are the same.
 
-    That of an earlier run counts where the job resumes.
+    Results of an earlier run are used only if the job resumes.
 
     """
     refused = store.read_table(_refused(bag))
@@ -152,7 +152,7 @@ def find_summary(store: Store, bag: BagFile, job: Job) -> BagSummary | Refused |
 
 
 def write_refused(store: Store, refused: Refused, job: Job) -> None:
-    """Write why a bag is not used."""
+    """Write the reason why a bag is not used."""
     row = {
         'bag': refused.bag.url,
         'version': refused.bag.version,
@@ -162,7 +162,7 @@ def write_refused(store: Store, refused: Refused, job: Job) -> None:
         'reason': refused.reason,
     }
     store.write_table(_refused(refused.bag), pa.Table.from_pylist([row], REFUSED))
-    for data_set in ('bags', 'parameters'):  # of a version that was whole
+    for data_set in ('bags', 'parameters'):  # results of an earlier version of the bag
         for day in _days(store, refused.bag, data_set):
             store.remove(part_of(data_set, refused.bag, day))
 
@@ -185,12 +185,12 @@ def write_arm(
 
 def arm_is_done(store: Store, arm: str, bags: Sequence[BagFile], job: Job) -> list[Refused] | None:
     """
-    Tell whether the estimate of an arm is of exactly these bags, less those refused.
+    Check whether the stored estimate of an arm is from exactly these bags, except refused ones.
 
     Returns
     -------
     list of Refused or None
-        Those refused; None if the arm has to be done.
+        The refused bags; None if the arm has to be identified again.
 
     """
     table = store.read_table(_estimate(arm))
@@ -217,7 +217,7 @@ def table_of(store: Store, data_set: str) -> pa.Table:
     Raises
     ------
     FleetError
-        It is not there.
+        If there is no such data set.
 
     """
     table = store.data_set(data_set)
@@ -227,7 +227,7 @@ def table_of(store: Store, data_set: str) -> pa.Table:
 
 
 def _versions(versions: Sequence[tuple[str, str]]) -> str:
-    """Return a name for a set of bags as they are now."""
+    """Return a hash of the versions of a set of bags."""
     return digest(*sorted('\t'.join(pair) for pair in versions))
 
 
@@ -255,6 +255,6 @@ def _estimate(arm: str) -> str:
 
 
 def _days(store: Store, bag: BagFile, data_set: str = 'bags') -> list[str]:
-    """Return the days under which a bag is among the results."""
+    """Return the days for which the results contain a bag."""
     pattern = f'{data_set}/{folder_of(bag.arm)}/day=*/{bag.name}.parquet'
     return [name.split('/')[2].removeprefix('day=') for name in store.names(pattern)]

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A run over a fleet: which tasks there are, and what becomes of every bag."""
+"""A run over a fleet: the tasks of every arm, and the outcome for every bag."""
 
 from __future__ import annotations
 
@@ -28,36 +28,36 @@ from armid_ros.motion import FloatArray
 from distributed import as_completed, Client, Future, KilledWorker
 import numpy as np
 
-#: Times that an arm is begun again whose tasks were on workers that others ended.
+#: Number of times that an arm is repeated if its workers ended because of other tasks.
 _HIT = 3
-#: Times that Dask repeats a task whose store failed.
+#: Number of times that Dask repeats a task if its store failed.
 RETRIES = 3
-#: Bags of an arm are read together until they are so large [bytes], or so many: about a second of
-#: work, of which what Dask does for a task is a small part.
+#: Largest size [bytes] and number of bags of one task. A task then takes about a second, so that
+#: the overhead of Dask is small.
 TASK_BYTES, TASK_BAGS = 16_000_000, 16
-#: Groups of bags under way: so many, and so many more for every thread of the cluster.
+#: Number of groups of bags in progress: a constant, and a number per thread of the cluster.
 _UNDER_WAY, _MORE = 2, 3
-#: What tasks are called whose scheduler is gone.
+#: Status of tasks if the scheduler was lost.
 _BROKEN = ('cancelled', 'lost')
 
 
 @dataclass(frozen=True)
 class ArmOutcome:
     """
-    What became of the bags of an arm.
+    Outcome of the identification of an arm.
 
     Attributes
     ----------
     arm : str
-        Which one.
+        Name of the arm.
     done : int
-        Bags that its estimate is made of.
+        Number of bags in the estimate.
     found : int
-        Of these, those that an earlier run had read.
+        Number of these bags that an earlier run had read.
     refused : tuple of Refused
-        The others.
+        Bags that are not used.
     problem : str
-        Why there is no estimate; empty where there is one.
+        Why there is no estimate; empty if there is an estimate.
 
     """
 
@@ -71,14 +71,14 @@ class ArmOutcome:
 @dataclass(frozen=True)
 class FleetOutcome:
     """
-    What became of a fleet.
+    Outcome of the identification of a fleet.
 
     Attributes
     ----------
     arms : tuple of ArmOutcome
-        Every arm.
+        Outcomes of all arms.
     filters : dict of str to Conditioning
-        Of every kind of arm, by the name of its robot.
+        Filters of every kind of arm, by the name of its robot.
 
     """
 
@@ -87,12 +87,12 @@ class FleetOutcome:
 
     @property
     def done(self) -> int:
-        """Bags that estimates are made of."""
+        """Number of bags in the estimates."""
         return sum(arm.done for arm in self.arms)
 
     @property
     def found(self) -> int:
-        """Of these, those that an earlier run had read."""
+        """Number of these bags that an earlier run had read."""
         return sum(arm.found for arm in self.arms)
 
     @property
@@ -103,12 +103,12 @@ class FleetOutcome:
 
 #: Bags of an arm that are read by one task.
 Group = tuple[BagFile, ...]
-#: All bags of an arm, and the fit of them; None where they have too few rows.
+#: All bags of an arm, and their fit; None instead of the fit if there are too few rows.
 Fitted = tuple[MergedBags, FleetFit | None]
 
 
 def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused, ...]:
-    """Task: find bags among the results, or read them and write them there."""
+    """Task: find the summaries of bags in the results, or read the bags and write summaries."""
     store, taken = Store(job.out), []
     for bag in bags:
         one = find_summary(store, bag, job)
@@ -123,12 +123,12 @@ def take(bags: Group, job: Job, bags_of_arm: int) -> tuple[BagSummary | Refused,
 
 
 def same(job: Job) -> Job:
-    """Task: hold a job on a worker; unlike scattered data it can be made again."""
+    """Task: keep a job on a worker; unlike scattered data, a lost job can be created again."""
     return job
 
 
 def merge(taken: Sequence[BagSummary | Refused]) -> MergedBags:
-    """Task: merge the bags of a group, and leave their rows where they are."""
+    """Task: merge the normal equations of a group; the rows of its bags stay on their worker."""
     return MergedBags.of([one.merged() for one in taken])
 
 
@@ -155,7 +155,7 @@ def finish(
     merged, known = fitted
     problem = ''
     if known is None or merged.normal is None:
-        problem = 'no bag of it can be used'
+        problem = 'none of its bags can be used'
     else:
         total = np.sum([one for one in products if one is not None], axis=0)
         write_arm(Store(job.out), arm, known.estimate(merged.normal, total), merged, job)
@@ -164,10 +164,10 @@ def finish(
 
 def grouped(bags: Sequence[BagFile]) -> tuple[Group, ...]:
     """
-    Share the bags of an arm out to tasks, in order.
+    Divide the bags of an arm into groups for tasks, in order.
 
-    By their sizes alone, so that the order of merges, and with it the last digit, is the same on
-    every cluster. A bag of unknown size is alone.
+    Groups depend on sizes alone, so the order of sums, and so the last digit, is the same on every
+    cluster. A bag of unknown size is a group of its own.
 
     """
     groups: list[list[BagFile]] = []
@@ -194,18 +194,18 @@ def identify_fleet(
     Parameters
     ----------
     client : distributed.Client
-        A cluster.
+        Client of a cluster.
     bags : sequence of BagFile
         All bags.
     job_of : mapping of str to Job
         Model and filters of every arm.
     tell : callable
-        Called with how many bags have ended, and how many there are.
+        Callback with the number of finished bags and the number of all bags.
 
     Raises
     ------
     FleetError
-        The scheduler was lost; what is done is kept for a run with `resume`.
+        If the scheduler was lost; finished results are kept for a run with `resume`.
 
     """
     run = _Run(client, bags, job_of, tell)
@@ -217,12 +217,12 @@ def identify_fleet(
 
 @dataclass(frozen=True)
 class _Waiting:
-    """An arm that is to be done: its bags, and those of which it is known that they fail."""
+    """An arm that waits for its tasks: its bags, and the bags that failed."""
 
     arm: str
     groups: tuple[Group, ...]
     refused: tuple[Refused, ...] = ()
-    hit: int = 0  # times that tasks of it were on workers that others ended
+    hit: int = 0  # number of times that its workers ended because of other tasks
 
 
 @dataclass
@@ -237,7 +237,7 @@ class _UnderWay:
 
 
 class _Run:
-    """Arms that wait, and what became of the others."""
+    """Arms that wait, and the outcomes of finished arms."""
 
     def __init__(
         self,
@@ -263,7 +263,7 @@ class _Run:
                 self._count(own)
 
     def work(self) -> None:
-        """Keep so many arms under way that no worker waits, until all have ended."""
+        """Keep enough arms in progress that no worker is idle, until all arms are finished."""
         limit = _UNDER_WAY + _MORE * sum(self._client.nthreads().values())
         under_way: dict[Any, _UnderWay] = {}
         ended = as_completed(raise_errors=False)
@@ -276,13 +276,13 @@ class _Run:
             try:
                 outcome = future.result()
             except Exception:
-                # Also of an arm that had finished, where its worker ended and it could not be
-                # done again.
+                # An arm that had finished also fails if its worker ends and its tasks cannot be
+                # repeated.
                 outcome = None
             if future.status in _BROKEN:
                 raise FleetError(
-                    'the scheduler was lost, and with it the tasks; what is done is kept: run '
-                    'the same command again with --resume'
+                    'the scheduler was lost, and with it the tasks; finished results are kept: '
+                    'run the same command again with --resume'
                 )
             tasks = under_way.pop(future.key)
             if outcome is None:
@@ -292,7 +292,7 @@ class _Run:
                 self.outcomes.append(replace(outcome, refused=refused))
 
     def _count(self, bags: Sequence[BagFile]) -> None:
-        """Count bags that have ended."""
+        """Count finished bags and report the progress."""
         self._ended.update(bag.url for bag in bags)
         self._tell(len(self._ended), self._bags)
 
@@ -306,7 +306,7 @@ class _Run:
         return self._jobs[job.digest]
 
     def _submitted(self, arm: _Waiting) -> _UnderWay:
-        """Submit the tasks of an arm: groups of bags, its fit, their noise, the end."""
+        """Submit the tasks of an arm: reading groups of bags, fit, noise products, and writing."""
         job, count = self._job(arm.arm), sum(len(group) for group in arm.groups)
         prepared = []
         for group in arm.groups:
@@ -314,7 +314,7 @@ class _Run:
             prepared.append(future)
 
             def ended(future: Future, group: Group = group) -> None:
-                # those that are lost or shared out will come again
+                # groups that are lost or divided will be submitted again
                 if future.status == 'finished' or (future.status == 'error' and len(group) == 1):
                     self._count(group)
 
@@ -325,10 +325,10 @@ class _Run:
         return _UnderWay(arm, prepared, fitted, products, last)
 
     def _begin_again(self, tasks: _UnderWay) -> None:
-        """Let what is left of an arm wait whose tasks have failed; give up the bags at fault."""
-        # A group that has failed is shared out, bag by bag, to find the one to blame. What waits
-        # for a task fails with it, so the noise is looked at only where all bags were read. A bag
-        # whose worker another bag may have ended is read once more by itself.
+        """Queue a failed arm again, without the bags that caused the failure."""
+        # A failed group is divided into single bags, to find the bag that fails. Tasks that depend
+        # on a failed task fail too, so the noise tasks are checked only if all bags were read. If
+        # another bag may have ended the worker, the bag is read once more alone.
         arm = tasks.arm
         job, futures = self._job_of[arm.arm], tasks.prepared
         if tasks.fitted.status == 'finished' and all(one.status != 'error' for one in futures):
@@ -358,11 +358,11 @@ class _Run:
         if left.groups and left != arm:
             self._waiting.appendleft(left)
         else:
-            problem = 'no bag of it can be used' if failed else _reason(error)
+            problem = 'none of its bags can be used' if failed else _reason(error)
             self.outcomes.append(ArmOutcome(left.arm, refused=left.refused, problem=problem))
 
     def _read(self, group: Group, arm: str) -> bool:
-        """Return whether a group can be read while nothing else of its arm is."""
+        """Return whether a group can be read while no other task of its arm runs."""
         future = self._submit(take, group, self._job(arm), 1, retries=RETRIES)
         ended: Future = next(as_completed([future], raise_errors=False))
         return bool(ended.status != 'error')
@@ -371,8 +371,8 @@ class _Run:
 def _reason(error: BaseException | None) -> str:
     if isinstance(error, KilledWorker):
         return (
-            f'{error.allowed_failures + 1} workers ended while they read it, of too little '
-            'memory or by its content'
+            f'{error.allowed_failures + 1} workers ended while they read the bag: too little '
+            'memory, or damaged content'
         )
     if isinstance(error, ArmidError):
         return str(error)

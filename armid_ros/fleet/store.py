@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Bags and results where they lie: a folder, an object store, or what else fsspec opens."""
+"""Access to bags and results in a folder, an object store, or any store of fsspec."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from pyarrow import parquet
 
 
 class StoreError(Exception):
-    """A store did not answer, or not as it should: to be tried again."""
+    """A store failed or gave a wrong answer; the operation can be repeated."""
 
 
 def opened(url: str) -> tuple[Any, str]:
     """
-    Return the file system of a URL, and the path in it.
+    Return the file system of a URL, and the path in this file system.
 
     Raises
     ------
     FleetError
-        No file system goes by that name, or what opens it is not installed.
+        If the file system is unknown, or its package is not installed.
 
     """
     try:
@@ -44,14 +44,14 @@ def opened(url: str) -> tuple[Any, str]:
 @contextmanager
 def fetched(url: str) -> Iterator[str]:
     """
-    Hold a bag as a path on this machine; a copy that is removed afterwards if it lies elsewhere.
+    Yield a local path of a bag; a remote bag is copied, and the copy is removed at the end.
 
     Raises
     ------
     RecordingError
-        There is no such bag, or it must not be read.
+        If there is no such bag, or the permission to read it is missing.
     StoreError
-        The store failed to deliver it.
+        If the store did not deliver the bag.
 
     """
     filesystem, path = opened(url)
@@ -65,8 +65,8 @@ def fetched(url: str) -> Iterator[str]:
         except FileNotFoundError as error:
             raise RecordingError(f'{url}: there is no such bag') from error
         except PermissionError as error:
-            raise RecordingError(f'{url}: must not be read: {error}') from error
-        except Exception as error:  # every store has errors of its own
+            raise RecordingError(f'{url}: no permission to read: {error}') from error
+        except Exception as error:  # every store raises errors of its own
             raise StoreError(f'{url}: {type(error).__name__}: {error}') from error
         yield here
 
@@ -79,7 +79,7 @@ class Store:
     Attributes
     ----------
     url : str
-        As fsspec takes it.
+        URL of the folder, in the syntax of fsspec.
 
     """
 
@@ -92,16 +92,16 @@ class Store:
 
     @property
     def local(self) -> Path | None:
-        """Return the folder, where it is one of this machine."""
+        """Return the path of a local folder; None for other stores."""
         filesystem, path = self._place
         return Path(path) if isinstance(filesystem, LocalFileSystem) else None
 
     def write(self, name: str, content: bytes | str) -> None:
         """
-        Put a file in its place, whole or not at all.
+        Write a file, completely or not at all.
 
-        A local file is written next to its place and moved there; an object store shows an object
-        when all of it has arrived.
+        A local file is written under a temporary name and then renamed. An object store shows an
+        object only when its upload is complete.
 
         """
         filesystem, root = self._place
@@ -117,7 +117,7 @@ class Store:
             raise StoreError(f'{self.url}/{name}: {type(error).__name__}: {error}') from error
 
     def read(self, name: str) -> bytes | None:
-        """Return a file; None if there is none."""
+        """Return the content of a file; None if there is no such file."""
         filesystem, root = self._place
         try:
             return bytes(filesystem.cat_file(f'{root}/{name}'))
@@ -133,7 +133,7 @@ class Store:
             filesystem.rm_file(f'{root}/{name}')
 
     def names(self, pattern: str) -> list[str]:
-        """Return the files below the folder that a pattern fits, sorted."""
+        """Return the sorted names of the files below the folder that match a pattern."""
         filesystem, root = self._place
         found = filesystem.glob(f'{root}/{pattern}')
         return sorted(path[len(root) + 1 :] for path in found)
@@ -145,7 +145,7 @@ class Store:
         self.write(name, buffer.getvalue())
 
     def read_table(self, name: str) -> pyarrow.Table | None:
-        """Return a table; None if there is none."""
+        """Return the table of a Parquet file; None if there is no such file."""
         data = self.read(name)
         return None if data is None else parquet.read_table(io.BytesIO(data))
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""One bag as a summary of fixed size: normal equations, own estimate, and how the arm moved."""
+"""Summary of a bag of fixed size: normal equations, estimate, and ranges of motion."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from armid_ros.identification.rows.streaming import streamed
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Rows of an arm's bags that are kept until its estimate is known [bytes]; others are read again.
+#: Memory for rows of the bags of an arm until the fit [bytes]; other rows are read again.
 KEPT_BYTES = 48_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class BagSummary:
     """
-    What is kept of a bag.
+    The summary of a bag.
 
     Attributes
     ----------
     bag : BagFile
-        Which one.
+        The bag.
     day : str
-        As 2026-01-31: that of its path, or of its first stamp.
+        Day of the path, or of the first timestamp, such as 2026-01-31.
     start_ns : int
-        Its first stamp [ns], put on `day` where it is more than a day away.
+        First timestamp [ns]; shifted to `day` if more than a day from it.
     seconds : float
-        From the first sample to the last [s].
+        Time from the first sample to the last [s].
     normal : NormalEquations
-        Its rows in the columns that the arm's theory keeps.
+        Normal equations of the rows, for the theoretically identifiable parameters.
     own : FleetEstimate or None
-        Its estimate by itself; None where it is too short for that, or among the results.
+        Estimate from this bag; None if the bag is too short, or was found in the results.
     motion : dict
-        Further columns of the table ``bags``; empty where it was found among the results.
+        Further columns of the table ``bags``; empty if the bag was found in the results.
     computed : bool
-        False where it was found among the results.
+        False if the bag was found in the results of an earlier run.
     rows : tuple of Regression or None
-        Its rows, while they fit into the memory; None where the bag is read again for them.
+        Rows of the bag, if they fit into the memory; None if the bag has to be read again.
 
     """
 
@@ -63,12 +63,12 @@ class BagSummary:
     rows: tuple[Regression, ...] | None = None
 
     def merged(self) -> MergedBags:
-        """Return it as a group of one bag."""
+        """Return a group that consists of this bag."""
         version = self.bag.url, self.bag.version
         return MergedBags(self.normal, self.seconds, (version,), 0 if self.computed else 1)
 
     def rows_again(self, job: Job) -> Iterator[Regression]:
-        """Yield the rows of the bag, as they were kept or read again."""
+        """Yield the rows of the bag from memory, or read the bag again."""
         if self.rows is not None:
             yield from self.rows
             return
@@ -79,7 +79,7 @@ class BagSummary:
 
 def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refused:
     """
-    Read a bag and compress it, or say why it is not used.
+    Read a bag and compress it; return the reason if the bag cannot be used.
 
     Parameters
     ----------
@@ -88,12 +88,12 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refuse
     job : Job
         Model and filters.
     bags_of_arm : int
-        How many bags share the memory for rows that are kept.
+        Number of bags that share the memory for rows.
 
     Raises
     ------
     StoreError
-        The store did not deliver it.
+        If the store did not deliver the bag.
 
     """
     path = bag.url
@@ -101,12 +101,12 @@ def prepare(bag: BagFile, job: Job, bags_of_arm: int = 1) -> BagSummary | Refuse
         with fetched(bag.url) as path:
             return _prepared(bag, path, job, KEPT_BYTES // max(1, bags_of_arm))
     except ArmidError as error:
-        # a message names the bag by where it lies, not by where its copy was
+        # the message names the URL of the bag, not the path of its copy
         return Refused(bag, str(error).replace(path, bag.url))
 
 
 def pieces(path: str, job: Job) -> Iterator[tuple[Recording, Sequence[Regression]]]:
-    """Yield the rows of a bag piece by piece."""
+    """Yield the pieces of a bag, each with its rows."""
     yield from streamed(
         path,
         job.arm,
@@ -163,7 +163,9 @@ def _prepared(bag: BagFile, path: str, job: Job, budget: int) -> BagSummary:
     stamped = datetime.datetime.fromtimestamp(start_ns * 1e-9, datetime.UTC)
     day = bag.day or stamped.date().isoformat()
     apart = datetime.date.fromisoformat(day) - stamped.date()
-    if abs(apart.days) > 1:  # the clock counts from its start; one day off is a time zone
+    if (
+        abs(apart.days) > 1
+    ):  # a clock that counts from its start; a difference of one day is a time zone
         start_ns += apart.days * DAY_NS
     held = None if kept is None else tuple(kept)
     return BagSummary(bag, day, start_ns, seconds, normal, own, motion, rows=held)

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A fleet over time: series of its results, changes and alarms.
+A fleet over time: histories of its results, changes and alarms.
 
-    watch/arms.parquet      one row an arm: its health, and how sure that is
-    watch/changes.parquet   one row a change that an arm is named for
-    watch/wear.parquet      one row a parameter of friction and the like: its slope in a month
-    alarms.jsonl            one line a change, the same for programs
+    watch/arms.parquet      one row per arm: health and adjusted p-value
+    watch/changes.parquet   one row per significant change of an arm
+    watch/wear.parquet      one row per parameter of an effect: its slope per month
+    alarms.jsonl            one line per change, as JSON
 
 """
 
@@ -40,7 +40,7 @@ import pyarrow.compute as pc
 
 #: Share of healthy arms among those named, in the long run.
 ALPHA = 0.05
-#: What the series of residuals is called; it is the logarithm of their deviation.
+#: Name of the series of residuals: logarithms of their standard deviations.
 RESIDUAL = 'residual'
 
 CHANGES = pa.schema(
@@ -87,22 +87,22 @@ ARMS = pa.schema(
 @dataclass(frozen=True, eq=False)
 class WatchedArm:
     """
-    An arm over time.
+    The history of an arm.
 
     Attributes
     ----------
     arm : str
-        Its name.
+        Name of the arm.
     kind : str
-        That of its robot.
+        Kind of the arm, a key of fleet.json.
     series : tuple of ParameterHistory
-        Its parameters, and the logarithm of its residuals.
+        Histories of the parameters, and of the logarithms of the residuals.
     bags : tuple of dict
-        A row of the table ``bags`` each, in order of time, without normal equations.
+        Rows of the table ``bags`` in order of time, without normal equations.
     judged : Judged
         Results of the tests.
     named : tuple of HistoryChange
-        What it is named for.
+        Significant changes of the arm.
     refused : tuple of dict
         Rows of the table ``refused``.
     wear : tuple of dict
@@ -121,19 +121,19 @@ class WatchedArm:
 
     @property
     def health(self) -> str:
-        """One word or two."""
+        """Return the health of the arm: changed, wearing, healthy or too few bags."""
         if self.named:
             return 'changed' if self.named[0].kind == 'step' else 'wearing'
         return 'healthy' if self.judged.changes else 'too few bags'
 
     @property
     def error(self) -> float | None:
-        """Median of the relative errors of its bags [%]; None where none was fitted."""
+        """Median of the relative errors of the bags [%]; None if no bag was fitted."""
         errors = [e for row in self.bags if (e := row['relative_error_percent']) is not None]
         return float(np.median(errors)) if errors else None
 
     def bag_at(self, change: HistoryChange) -> dict[str, Any]:
-        """Return the row of the bag at a change: the first one after a step, or the last one."""
+        """Return the row of the bag at a change: the first after a step, the last for a trend."""
         day = change.series.days[change.index if change.kind == 'step' else -1]
         return min(self.bags, key=lambda row: abs(row['start_ns'] / DAY_NS - day))
 
@@ -141,12 +141,12 @@ class WatchedArm:
 @dataclass(frozen=True, eq=False)
 class Watch:
     """
-    A fleet over time.
+    The histories of all arms of a fleet.
 
     Attributes
     ----------
     arms : tuple of WatchedArm
-        Those named first.
+        All arms; arms with a significant change first.
     alpha : float
         False discovery rate.
 
@@ -158,12 +158,12 @@ class Watch:
 
 def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     """
-    Look at the results of a fleet over time.
+    Test the results of a fleet for changes over time.
 
     Raises
     ------
     FleetError
-        There are no results.
+        If there are no results.
 
     """
     facts = document(store)
@@ -185,7 +185,7 @@ def watch_fleet(store: Store, alpha: float = ALPHA) -> Watch:
     own: dict[str, list[ParameterHistory]] = {}
     worn: dict[str, list[dict[str, Any]]] = {}
     for group in by_kind.values():
-        # without what siblings share on a day, which is no change of an arm's own
+        # deviations that arms of one kind share on a day are removed
         without = without_days(group)
         spread = spreads(without)
         kinds.append((without, spread))
@@ -217,7 +217,7 @@ def arm_of(found: Watch, name: str) -> WatchedArm:
     Raises
     ------
     FleetError
-        There is none of this name.
+        If there is no arm of this name.
 
     """
     by_name = {arm.arm: arm for arm in found.arms}
@@ -228,7 +228,7 @@ def arm_of(found: Watch, name: str) -> WatchedArm:
 
 
 def write_watch(store: Store, found: Watch) -> None:
-    """Write tables and alarms."""
+    """Write the tables of changes, wear and arms, and the alarms."""
     changes = [row for arm in found.arms for row in change_rows(arm)]
     arms = [
         {
@@ -252,7 +252,7 @@ def write_watch(store: Store, found: Watch) -> None:
 
 
 def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
-    """Return the changes that an arm is named for, the least probable first."""
+    """Return the significant changes of an arm as rows, the smallest p-value first."""
     rows = []
     for change in arm.named:
         series = change.series
@@ -281,7 +281,7 @@ def change_rows(arm: WatchedArm) -> list[dict[str, Any]]:
 def _wear_row(
     series: ParameterHistory, spread: Mapping[tuple[str, str], Spread]
 ) -> Iterator[dict[str, Any]]:
-    """Yield the slope of a parameter as a row, where there is one."""
+    """Yield the slope of a parameter as a row, if its standard deviation is finite."""
     if len(series.values) < 2:
         return
     slope, std = wear(series, spread[series.parameter])
@@ -298,7 +298,7 @@ def _wear_row(
 
 
 def sentence(change: HistoryChange) -> str:
-    """Say what has changed, when, and by how much with a 95 % interval."""
+    """Return a sentence on a change: parameter, size with 95 % interval, and date."""
     series = change.series
     what = parameter_label(*series.parameter)
     if series.name == RESIDUAL:
@@ -315,13 +315,13 @@ def sentence(change: HistoryChange) -> str:
 
 
 def day_text(days: float) -> str:
-    """Return days of the epoch as a date."""
+    """Return the date of a number of days since 1970."""
     moment = datetime.datetime.fromtimestamp(86_400.0 * days, datetime.UTC)
     return moment.date().isoformat()
 
 
 def parameter_label(name: str, joint: str) -> str:
-    """Return what a series is of, as in 'viscous coefficient of elbow'."""
+    """Return the label of a series, such as 'viscous coefficient of elbow'."""
     if name == RESIDUAL:
         return f'residual torque of {joint}'
     if name.isidentifier() and '_' in name:
@@ -340,7 +340,7 @@ def _by_arm(table: pa.Table | None) -> dict[str, list[dict[str, Any]]]:
 def _series(
     parameters: pa.Table, bags: Mapping[str, list[dict[str, Any]]]
 ) -> list[ParameterHistory]:
-    """Return every parameter of every arm over time, and the logarithm of its residuals."""
+    """Return the histories of all parameters and of the logarithms of residuals of all arms."""
     found = []
     for arm, own in sorted(bags.items()):
         fitted = [row for row in own if row['residual_std']]

@@ -1,9 +1,9 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Inspection: what a recording holds, what is odd about it, and whether a model can be fitted to it.
+Inspection of a recording: contents, faults, and whether a model can be fitted.
 
-Nothing is changed and nothing is hidden: the curves are those of the file.
+Inspection does not change the data: the curves are those of the file.
 
 """
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether a description can be that of an arm, and which of its links a recording contradicts.
+Checks of a robot description: implausible values, and links that a recording contradicts.
 
 A recording determines base parameters: combinations of masses, first moments and inertias of
-several links. A mass alone is determined under the hypothesis that few links are wrong. Links are
-added by forward selection, each with its ten parameters, a prior of the size of the description's
-spread and the covariance of the base parameters; those of effects are nuisance parameters.
+several links. A mass alone is determined under the hypothesis that few links are wrong. Forward
+selection adds wrong links one by one. The ten parameters of each link have a prior around the
+description. The parameters of effects are nuisance parameters.
 
 """
 
@@ -27,22 +27,22 @@ from armid_ros.robots.description import MOVABLE, parse_xml
 from armid_ros.robots.geometry import all_in_one, collision_geometry
 import numpy as np
 
-#: Density of a link [kg/m^3]: shapes contain the link, so steel is the most and foam the least.
+#: Least and largest plausible density of a link within its shape [kg/m^3]: foam and steel.
 _DENSITIES = 30.0, 8000.0
-#: Three turns to either side [rad]: a limit beyond is hardly in rad.
+#: A position limit beyond three turns [rad] is probably not in rad.
 _TURNS = 6.0 * np.pi
-#: A velocity limit above this [rad/s] is hardly in rad/s, a shape above this [m] hardly in metres.
+#: A velocity limit above this [rad/s], or a shape above this [m], has probably another unit.
 _FASTEST, _LONGEST = 50.0, 10.0
 #: Length of an axis that is not rounding, and how far outside of the box of its shapes a centre of
 #: mass is doubtful, as a share of the box's diagonal.
 _ROUNDED, _OUTSIDE = 0.01, 1.0
 #: A fitted model whose torque error is smaller by less than this shows no wrong link [%].
 _MATERIAL = 1.0
-#: Share of the rest that a further link has to explain; chi-squared per row that may remain.
+#: Share of the residual that a further link has to explain; chi-squared per row that may remain.
 _FURTHER, _REMAINS = 0.5, 10.0
-#: More wrong links than this cannot be told from a wrong model.
+#: More wrong links than this cannot be distinguished from a wrong model.
 _MOST = 3
-#: A standard deviation above this share of the prior's is no measurement.
+#: A mass is determined if its standard deviation is below this share of the prior's.
 _DETERMINED = 0.1
 
 
@@ -56,25 +56,27 @@ class LinkCheck:
     links, joints : tuple of str
         The links, and the joints that move them.
     mass, centre : ndarray, shape (n,) and (n, 3)
-        As described [kg], [m] in the frame of the joint; centres are NaN without mass.
+        Described mass [kg] and centre of mass in the frame of the joint [m]; the centre of a link
+        without mass is NaN.
     measured_mass, mass_std : ndarray, shape (n,)
-        [kg]; NaN where a link agrees or the motion does not determine its mass.
+        Estimated mass and its standard deviation [kg]; NaN if the link agrees or the motion does
+        not determine its mass.
     measured_centre, centre_std : ndarray, shape (n, 3)
-        [m]; NaN alike.
+        Estimated centre of mass and its standard deviation [m]; NaN as for the mass.
     explains : ndarray, shape (n,)
-        Share of the weighted difference that a link alone explains.
+        Share of the weighted difference that each link alone explains.
     wrong : tuple of int
         Links that together explain the difference, the most important first; empty for none.
     explained : float
-        Share that they explain.
+        Share of the weighted difference that the wrong links explain together.
     error_percent, fitted_error_percent : float
         Torque error with the described links and with fitted ones; friction fitted in both.
     grade : str
-        Of the identification: good, poor or unusable.
+        Grade of the identification: good, poor or unusable.
     fault : str
-        Why the recording cannot check the links; empty where it can.
+        Why the recording cannot check the links; empty if it can.
     rivals : tuple of int
-        Links that explain as much in place of a single wrong one.
+        Other links that explain as much as the single wrong link.
 
     """
 
@@ -97,7 +99,7 @@ class LinkCheck:
 
     @property
     def agrees(self) -> bool:
-        """Whether the fitted links lower the torque error by less than matters."""
+        """Whether fitted links reduce the torque error by less than 1 % of the torque."""
         return self.error_percent - self.fitted_error_percent < _MATERIAL
 
 
@@ -158,7 +160,9 @@ def _of_shapes(robot: Robot) -> Iterator[Remark]:
         ]
         volume[link] += abs(float(one.geometry.computeVolume()))
         if max(box.width(), box.height(), box.depth()) > _LONGEST:
-            yield Remark('bad', f"link '{link}': shape above {_LONGEST:g} m; millimetres?")
+            yield Remark(
+                'bad', f"link '{link}': shape above {_LONGEST:g} m; is it in millimetres?"
+            )
     for link, inertial in robot.description.links.items():
         if inertial is not None and link not in missing:
             yield from _of_centre(link, np.array(inertial.xyz), corners[link])
@@ -187,16 +191,17 @@ def _of_centre(link: str, centre: FloatArray, corners: Sequence[FloatArray]) -> 
 
 def check_links(found: Identification, described: ArmModel, grade: str, fault: str) -> LinkCheck:
     """
-    Find which links of a description explain what an identification found.
+    Find the links of a description that explain its difference from an identification.
 
     Parameters
     ----------
     found : Identification
-        Not constrained to physical consistency, so that its covariance is that of the data.
+        The identification, without constraints of physical consistency: its covariance is that of
+        the data.
     described : ArmModel
         The description, with the effects of the identification.
     grade, fault : str
-        Of the identification, and what the recording shows to be wrong.
+        Grade of the identification, and the fault of the recording if there is one.
 
     """
     robot, size = described.robot, len(LINK_PARAMETERS)
@@ -213,9 +218,11 @@ def check_links(found: Identification, described: ArmModel, grade: str, fault: s
     wrong = [] if error - fitted_error < _MATERIAL else _selected(rows, spread, total)
     changes, covariance, rest = _fit(rows, spread, wrong)
     freedom = max(1, len(rows) - nuisance.shape[1] - size * len(wrong))
-    covariance = covariance * max(1.0, rest / freedom)  # Birge ratio: what no link explains
+    covariance = covariance * max(
+        1.0, rest / freedom
+    )  # Birge ratio: accounts for the unexplained residual
     alone = [_fit(rows, spread, [k])[2] for k in range(robot.n_joints)]
-    # of two links that move alike each explains the difference alone
+    # if two links move alike, each of them explains the difference alone
     most = max(rest / _FURTHER, _REMAINS * len(rows)) if len(wrong) == 1 else 0.0
     body = robot.rigid_parameters.reshape(-1, size)[:, :4]
     measured, std = np.full((2, robot.n_joints, 4), np.nan)
@@ -265,7 +272,7 @@ def _errors(found: Identification, described: ArmModel) -> tuple[float, float]:
 
 
 def _selected(rows: FloatArray, spread: FloatArray, total: float) -> list[int]:
-    """Return the links of a forward selection, less one that the later ones make needless."""
+    """Return the wrong links by forward selection, without a link that became redundant."""
     every = range(len(spread) // len(LINK_PARAMETERS))
     wrong: list[int] = []
     rest = total

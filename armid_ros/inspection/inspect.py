@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a recording to what a person should know of it."""
+"""Inspection of a recording: facts, remarks and verdict."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ import numpy as np
 SCHEMA = 'armid/inspection/1'
 Weight = Literal['bad', 'doubt', 'note']
 
-#: Beyond two turns to either side positions of an arm are hardly in rad.
+#: Positions of an arm beyond two turns [rad] are probably not in rad.
 _TURNS = 4.0 * np.pi
-#: Steps between samples that vary by more than this share blur what is differentiated.
+#: If the sampling period varies by more than this share, derivatives are inaccurate.
 _JITTER = 0.2
 
 
 @dataclass(frozen=True)
 class Remark:
     """
-    Something a person should know.
+    A remark about a recording or a description.
 
     Attributes
     ----------
     weight : {'bad', 'doubt', 'note'}
-        Whether it spoils a result, may do so, or is good to know.
+        'bad' spoils results, 'doubt' may spoil results, 'note' is information.
     text : str
-        What, where, and what to do.
+        The fault, its place and the remedy.
 
     """
 
@@ -48,22 +48,22 @@ class Remark:
 @dataclass(frozen=True)
 class Inspection:
     """
-    What a recording holds.
+    The result of an inspection.
 
     Attributes
     ----------
     recording : Recording
-        As it was read.
+        The recording that was inspected.
     topics : tuple of Topic
-        Of the bag; empty for a table.
+        Topics of the bag; empty for a table.
     robot : Robot or None
-        Description, where one was given.
+        Description of the robot; None if none was given.
     sampling : Sampling
         Rate, jitter, gaps, period.
     joints : tuple of JointFacts
         In the order of the recording.
     trial : TrialFit or None
-        What an identification makes of it; None without a robot.
+        Result of a trial identification; None without a robot.
     remarks : tuple of Remark
         The worst first.
 
@@ -79,7 +79,7 @@ class Inspection:
 
     @property
     def verdict(self) -> str:
-        """One sentence: what this recording is good for."""
+        """Return one sentence on whether the recording is suitable for identification."""
         if self.trial is None:
             if self.recording.tau is None:
                 return 'No efforts: motion alone, from which nothing can be identified.'
@@ -114,18 +114,18 @@ def inspect(
     rng: np.random.Generator,
 ) -> Inspection:
     """
-    Look at a recording.
+    Inspect a recording.
 
     Parameters
     ----------
     recording : Recording
-        Of some joints; of those of the robot, in its order, where there is one.
+        The recording. With a robot, its joints are those of the robot, in the same order.
     robot : Robot, optional
-        Description: with it limits and units are checked, and an identification is tried.
+        Description, with which limits and units are checked and an identification is tried.
     topics : tuple of Topic, optional
-        Of the bag.
+        Topics of the bag.
     rng : numpy.random.Generator
-        Of the identification.
+        Random numbers for the identification.
 
     """
     sampling, joints = Sampling.of(recording), joint_facts(recording)
@@ -155,7 +155,7 @@ def inspect(
 
 
 def inspection_document(found: Inspection) -> dict[str, Any]:
-    """Return an inspection for programs to read."""
+    """Return an inspection as a JSON document."""
     trial = None
     if found.trial is not None:
         trial = asdict(found.trial)
@@ -190,25 +190,25 @@ def notes_on(robot: Robot) -> list[str]:
 
 
 def worst_first(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
-    """Return remarks by weight, those of one weight in their order."""
+    """Sort remarks by weight; remarks of equal weight keep their order."""
     return tuple(sorted(remarks, key=lambda remark: get_args(Weight).index(remark.weight)))
 
 
 def _said(text: str, others: Iterable[str]) -> bool:
-    """Whether one of several texts is in another one, that may be a whole sentence."""
+    """Return whether a text contains one of several others, regardless of case."""
     return any(other.casefold() in text.casefold() for other in others)
 
 
 def _of_fit(trial: TrialFit, said: Sequence[str]) -> Iterator[Remark]:
-    """Say what identify finds wrong with the recording, as far as it is not said."""
+    """Yield the faults that identify finds and that no remark contains already."""
     weight: Weight = 'bad' if trial.grade == 'unusable' else 'doubt'
     others = [*said, *trial.elsewhere]
     yield from (Remark(weight, fault) for fault in trial.faults if not _said(fault, others))
     if trial.poor and not trial.faults:
         yield Remark(
             'doubt',
-            f'rigid body and friction leave {", ".join(trial.poor)}; look for axes or zeros '
-            'other than those of the description, another unit, or contact',
+            f'rigid body and friction do not explain {", ".join(trial.poor)}; check axes, zero '
+            'positions and units of the description, and look for contact',
         )
 
 
@@ -225,7 +225,7 @@ def _of_time(recording: Recording, sampling: Sampling) -> Iterator[Remark]:
     elif lost or report.malformed or report.unstamped or report.incomplete:
         yield Remark('doubt', report.describe())
     if report.unwrapped:
-        yield Remark('note', f'jumps by whole turns undone: {", ".join(report.unwrapped)}')
+        yield Remark('note', f'jumps by whole turns were removed: {", ".join(report.unwrapped)}')
     if sampling.gaps:
         yield Remark(
             'doubt',
@@ -310,7 +310,7 @@ def _of_efforts(
             yield Remark(
                 'doubt',
                 f'efforts beyond three times the limit of the description: {", ".join(beyond)}; '
-                'mN m, or torques of the description too low?',
+                'are they in mN m, or are the limits of the description too low?',
             )
     if trial is None or trial.scale is None or trial.faults:
         return

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What every joint did, and whether its numbers agree with each other."""
+"""Facts about the joints of a recording, and consistency of positions and velocities."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from scipy.signal import savgol_filter
 
 #: A joint slower than this share of its own top speed is at rest.
 _REST = 0.02
-#: Samples to either side that a speed is fitted over.
+#: Samples on either side over which a speed is fitted.
 _HALF = 5
-#: A joint that stays within this is at rest [rad or m].
+#: A joint whose range is smaller than this is at rest [rad or m].
 STILL = 1e-3
 
 
@@ -29,7 +29,7 @@ class JointFacts:
     Attributes
     ----------
     name : str
-        Joint.
+        Name of the joint.
     lower, upper : float
         Range of the positions.
     speed : float
@@ -41,14 +41,14 @@ class JointFacts:
     repeated : float
         Share of the samples that repeat the position of the one before while it moves.
     velocity_ratio : float or None
-        Recorded velocity over that of the positions, which is 1 in equal units; None where
-        there is no velocity or no motion.
+        Recorded velocity divided by the derivative of position, 1 in equal units; None without
+        velocity or motion.
     velocity_fit : float
-        Correlation of the two.
+        Correlation of recorded velocity and derivative of position.
     effort_rms, effort_largest : float or None
-        Of the efforts; None where there are none.
+        Root mean square and largest absolute value of the efforts; None without efforts.
     effort_varies : bool
-        Whether they change at all.
+        Whether the efforts change.
 
     """
 
@@ -67,7 +67,7 @@ class JointFacts:
 
     @property
     def still(self) -> bool:
-        """Whether it stays where it is."""
+        """Whether the joint is at rest throughout."""
         return self.upper - self.lower < STILL
 
 

@@ -10,9 +10,9 @@ from armid_ros.identification.rows.period import least_change, parabola_minimum
 from armid_ros.recording import Recording
 import numpy as np
 
-#: A step of more than this many median ones is a gap.
+#: A step of more than this many median steps is a gap.
 GAP = 5.0
-#: Positions of two periods differ by less than this share of what the positions vary by.
+#: Positions of successive periods differ by less than this share of their variation.
 _SAME = 0.03
 _SEARCH_HZ = 20.0
 _LONGEST = 3000
@@ -26,19 +26,19 @@ class Sampling:
     Attributes
     ----------
     duration : float
-        [s].
+        Time from the first sample to the last [s].
     rate_hz : float
         Samples per second, from the median step.
     jitter : float
         Standard deviation of the steps, gaps left out, as a share of the median step.
     longest_step : float
-        [s].
+        Longest time between samples [s].
     gaps : int
-        Steps of more than five median ones.
+        Number of steps of more than five median steps.
     period : float or None
-        After which the motion repeats [s]; None where it does not.
+        Period of the motion [s]; None if the motion is not periodic.
     periods : float
-        How many of them there are.
+        Number of periods in the recording.
 
     """
 
@@ -52,7 +52,7 @@ class Sampling:
 
     @staticmethod
     def of(recording: Recording) -> Sampling:
-        """Measure a recording."""
+        """Return the sampling of a recording."""
         steps = np.diff(recording.t)
         median = float(np.median(steps))
         ordinary = steps[steps <= GAP * median]
@@ -70,11 +70,11 @@ class Sampling:
 
 def find_repetition(recording: Recording) -> float | None:
     """
-    Return the time after which all positions are what they were [s]; None where there is none.
+    Return the period of the motion [s]; None if the motion is not periodic.
 
-    For each lag the stretch of nearly that length is taken in which the positions change least
-    from one period to the next, in mean square over what they vary by in it; a run-in at the
-    beginning counts for nothing then. The first lag that is a minimum and small is the period.
+    For each lag, the change of positions over the lag is a mean square relative to their variance.
+    The stretch of about one lag with the least change counts, so a run-in at the beginning is
+    ignored. The period is the first lag with a small minimum.
 
     """
     rate = min(_SEARCH_HZ, 1.0 / recording.period, _LONGEST / max(recording.duration, 1e-9))

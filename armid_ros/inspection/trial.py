@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an identification with the usual friction makes of a recording, or why it refuses it."""
+"""Trial identification of a recording with the usual friction."""
 
 from __future__ import annotations
 
@@ -23,36 +23,36 @@ import numpy as np
 @dataclass(frozen=True)
 class TrialFit:
     """
-    An identification, tried.
+    Result of a trial identification.
 
     Attributes
     ----------
     refused : str
-        Why ``identify`` refuses the recording; empty where it does not.
+        Why ``identify`` refuses the recording; empty if it accepts the recording.
     relative_error_percent : float or None
         100 |tau - tau_hat| / |tau| of the fit.
     rank : int
-        Parameters that the motion tells apart, of ``theory``.
+        Number of parameters that the motion makes identifiable, at most ``theory``.
     theory : int
-        Parameters that any motion could.
+        Number of parameters that are identifiable with a suitable motion.
     condition_number : float or None
-        Of the weighted regressor.
+        Condition number of the weighted regressor.
     cutoff_hz : float or None
-        Of the position filter.
+        Cut-off of the position filter [Hz].
     scale : ndarray, shape (n,), or None
-        Efforts over what the description takes, joint by joint; NaN where it does not follow.
+        Ratio of efforts to torques of the description, per joint; NaN without correlation.
     notes : tuple of str
-        What the identification says.
+        Notes of the identification.
     elsewhere : tuple of str
-        Joints that moved, or stood elsewhere, without being driven.
+        Joints without drive that moved, or stood at another position than described.
     poor : tuple of str
         Joints whose torque the fit hardly describes, each with its error.
     grade : str
-        What ``identify`` calls the result: good, poor or unusable; empty where it refuses.
+        Grade by ``identify``: good, poor or unusable; empty if the recording is refused.
     reasons : tuple of str
-        Why, the worst first.
+        Reasons of the grade, the worst first.
     faults : tuple of str
-        Those that are of the recording itself, without a full stop.
+        Reasons that are faults of the recording itself, without a full stop.
 
     """
 
@@ -73,16 +73,16 @@ class TrialFit:
 
 def try_identification(robot: Robot, recording: Recording, rng: np.random.Generator) -> TrialFit:
     """
-    Identify, and keep what says whether that can be believed.
+    Try an identification and collect measures of its quality.
 
     Parameters
     ----------
     robot : Robot
         Description.
     recording : Recording
-        Of its joints.
+        Recording of the joints of the robot.
     rng : numpy.random.Generator
-        Of the identification.
+        Random numbers for the identification.
 
     """
     arm = ArmModel.of(robot, effects=USUAL_EFFECTS)

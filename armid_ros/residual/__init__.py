@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What a diagnosis leaves without a name: learned as a map, and the law that it looks like.
+The residual of a diagnosis: learned as a map, and approximated by a law of few terms.
 
-``learn_residual`` learns; what it returns is an arm with the map as an effect, how much of the
-residual the map and the law predict, and a table for other programs.
+``learn_residual`` returns an arm with the maps as an effect, and the shares of the residual that
+maps and laws predict. ``lookup_table`` returns the maps as a table for other programs.
 
 """
 

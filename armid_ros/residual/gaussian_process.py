@@ -1,13 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A Gaussian process of what is left of a joint, on inducing points.
+A Gaussian process of the residual of a joint, on inducing points.
 
-The inducing points are the means of cells of the state, found by k-means, with the mean torque of
-their rows. Length scales, amplitude and the noise of these means are those of the greatest
-marginal likelihood.
-Source: Rasmussen and Williams 2006, section 5.4; for inducing points Quinonero-Candela and
-Rasmussen 2005.
+K-means divides the states into cells. An inducing point is the mean state of a cell, with the mean
+residual torque. Length scales, amplitude and noise maximise the marginal likelihood. Source:
+Rasmussen and Williams 2006, section 5.4; for inducing points Quinonero-Candela and Rasmussen 2005.
 
 """
 
@@ -22,18 +20,19 @@ from armid_ros.residual.rows import JointRows
 import numpy as np
 import numpy.typing as npt
 
-#: Inducing points of a joint at most, and rows for each at least.
+#: Largest number of inducing points of a joint, and least number of rows for each.
 _POINTS, _ROWS = 200, 2
-#: As many of them are enough to find length scales and noise.
+#: Number of inducing points to which length scales and noise are fitted.
 _FOR_SCALES = 100
-#: Knees that are looked at, over the largest velocity.
+#: Knees of the velocity scale to try, as shares of the largest velocity.
 _KNEES = (0.02, 1.0)
-#: Length scales that are looked at, over the span of an input; one at the end does not matter.
+#: Bounds of the length scales, as shares of the span of an input; an input at the upper bound is
+#: irrelevant.
 _LENGTHS = (0.02, 10.0)
-#: Amplitudes that are tried, relative to the root mean square of the residual: where there are no
-#: data, the torque is taken to be no larger than where there are some.
+#: Bounds of the amplitude, relative to the root mean square of the residual. The upper bound
+#: limits the torque outside the data.
 _AMPLITUDES = (0.1, 2.0)
-#: Variances of the noise of a cell that are looked at, over the same.
+#: Bounds of the noise variance of a cell, relative to the mean square of the residual.
 _NOISES = (1e-6, 2.0)
 
 
@@ -52,16 +51,16 @@ def learn_map(rows: JointRows, rng: np.random.Generator) -> tuple[TorqueMap, Flo
     Parameters
     ----------
     rows : JointRows
-        Its residual.
+        Residual of the joint.
     rng : numpy.random.Generator
-        Draws the first cells.
+        Random numbers for the initial cells.
 
     Returns
     -------
     found : TorqueMap
-        Learned from all rows.
+        The map, learned from all rows.
     predicted : ndarray, shape (N,)
-        Torque of each row by maps that were learned from other blocks [N m].
+        Torque of each row, predicted by a map that was learned from the other blocks [N m].
 
     """
     from sklearn.cluster import MiniBatchKMeans
@@ -103,7 +102,7 @@ def _span(inputs: FloatArray) -> FloatArray:
 
 
 def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.bool_]) -> _Cells:
-    """Return means of the cells over some rows; cells without any are left out."""
+    """Return the means of the cells over the used rows, without empty cells."""
     own, n = labels[used], int(labels.max()) + 1
     count = np.bincount(own, minlength=n)
     there = count > 0
@@ -114,7 +113,7 @@ def _cells(rows: JointRows, labels: npt.NDArray[np.intp], used: npt.NDArray[np.b
 
 
 def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
-    """Return the greatest marginal likelihood, as a logarithm, and what has it."""
+    """Return the largest log marginal likelihood per cell, and its hyperparameters."""
     from sklearn.gaussian_process import GaussianProcessRegressor, kernels
 
     size = max(float(np.sqrt(np.mean(cells.torque**2))), 1e-12)
@@ -131,7 +130,7 @@ def _fitted(cells: _Cells, knee: float) -> tuple[float, _Scales]:
     lengths = np.asarray(found.k2.length_scale, dtype=float)
     lengths = np.where(lengths > 0.9 * _LENGTHS[1], np.inf, lengths * span)
     amplitude = float(size * np.sqrt(found.k1.constant_value))
-    # each cell in units of its own size: comparable between cells of different knees
+    # per cell and in units of torque, so that fits with different knees are comparable
     evidence = float(regressor.log_marginal_likelihood_value_) / len(cells.torque[some])
     noise = float(size * np.sqrt(white.noise_level))
     return evidence - float(np.log(size)), _Scales(noise, lengths, amplitude, knee)

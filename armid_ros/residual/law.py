@@ -1,12 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The law that a residual looks like: few terms of a library, by sparse regression.
+Approximation of a residual by a law: few terms of a library, by sparse regression.
 
-Terms are taken one by one, each the one most like what the others leave (orthogonal matching
-pursuit); as many as predict blocks of the data best that were not fitted, or fewer if they do so
-to one deviation. A suggestion, for a person to make an effect of.
-Source: Brunton, Proctor and Kutz 2016; Pati, Rezaiifar and Krishnaprasad 1993.
+Orthogonal matching pursuit adds the term that correlates most with the remaining residual.
+Cross-validation selects the fewest terms whose error is within one standard deviation of the least
+error. The law is a suggestion for an effect of one's own. Source: Brunton, Proctor and Kutz 2016;
+Pati, Rezaiifar and Krishnaprasad 1993.
 
 """
 
@@ -20,16 +20,16 @@ from armid_ros.motion import FloatArray
 from armid_ros.residual.rows import BLOCKS, JointRows
 import numpy as np
 
-#: Terms of a law at most: what takes more is a map.
+#: Largest number of terms of a law.
 _TERMS = 3
-#: Places in the range of a joint where something may begin to pull, as shares of it.
+#: Positions at which a one-sided force may begin, as shares of the range of a joint.
 _PLACES = (0.2, 0.35, 0.5, 0.65, 0.8)
-#: A law that predicts less than half of the squares is none.
+#: A law has to predict at least this share of the squared residual.
 _LEAST_SHARE = 0.5
 
 
 class Term(NamedTuple):
-    """A function of q, dq and the load w as text, such as 'dq^3'; its factor, and its unit."""
+    """Text of a function of q, dq and the load w, such as 'dq^3', its factor and its unit."""
 
     text: str
     coefficient: float
@@ -39,14 +39,14 @@ class Term(NamedTuple):
 @dataclass(frozen=True)
 class Law:
     """
-    A suggestion.
+    A suggested law of a residual.
 
     Attributes
     ----------
     terms : tuple of Term
-        The largest first.
+        Terms of the law, the largest first.
     share : float
-        Share of the squares of the residual that it predicts of blocks that were left out.
+        Share of the squared residual of held-out blocks that the law predicts.
 
     """
 
@@ -65,7 +65,7 @@ class Law:
         return said
 
     def document(self) -> dict[str, Any]:
-        """Return it for programs to read."""
+        """Return the law as a JSON document."""
         terms = [
             {'term': one.text, 'coefficient': one.coefficient, 'unit': one.unit}
             for one in self.terms
@@ -112,7 +112,7 @@ def _library(
 
 def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     """
-    Return the law that a residual looks like, None if it is like none of the library.
+    Return the law that approximates a residual; None if no law of the library does.
 
     Parameters
     ----------
@@ -125,14 +125,14 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
     ends = float(rows.inputs[:, 0].min()), float(rows.inputs[:, 0].max())
     columns = _library(rows.inputs, *ends, prismatic)
     x = np.column_stack([values for _, _, values in columns])
-    # squared residuals of each block under laws of so many terms that are fitted to the others
+    # squared residuals of each held-out block, by the number of terms of the law
     losses = np.zeros((_TERMS, BLOCKS))
     for block, others in enumerate(rows.folds()):
         for more in range(_TERMS):
             factors = _fit(x[others], rows.left[others], more + 1)
             losses[more, block] = np.sum((rows.left[~others] - x[~others] @ factors) ** 2)
     best = int(np.argmin(losses.sum(axis=1)))
-    # the fewest with which blocks are predicted as well as in the best way, to one deviation
+    # the fewest terms whose held-out error is within one standard deviation of the least error
     worse = losses[: best + 1] - losses[best]
     allowed = np.std(worse, axis=1, ddof=1) * np.sqrt(BLOCKS)
     count = int(np.argmax(worse.sum(axis=1) <= allowed)) + 1
@@ -148,18 +148,18 @@ def suggest_law(rows: JointRows, prismatic: bool) -> Law | None:
 
 
 def share_of(left: FloatArray, torque: FloatArray) -> float:
-    """Return the share of the squares of a residual that a torque takes."""
+    """Return the share of the squared residual that a torque explains."""
     return 1.0 - float(np.sum((left - torque) ** 2)) / max(float(np.sum(left**2)), 1e-300)
 
 
 def _fit(x: FloatArray, left: FloatArray, count: int) -> FloatArray:
-    """Return factors, all but so many of them zero, shape (L,)."""
+    """Return the factors of the terms, at most ``count`` of them nonzero, shape (L,)."""
     from sklearn.linear_model import orthogonal_mp
 
     size = np.sqrt(np.mean(x**2, axis=0))
     scale = np.where(size > 0.0, size, 1.0)
     with warnings.catch_warnings():
-        warnings.simplefilter('ignore')  # terms that depend on each other: the first one is taken
+        warnings.simplefilter('ignore')  # if terms depend on each other, the first one is used
         found = orthogonal_mp(x / scale, left, n_nonzero_coefs=count)
     chosen = np.flatnonzero(found)
     factors = np.zeros(x.shape[1])

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a diagnosis to what it leaves, learned: a map of each joint, and a law it looks like."""
+"""Learning the residual of a diagnosis: a map of each joint, and a suggested law."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
-#: Verdicts that leave something without a name.
+#: Verdicts with an unexplained residual.
 WORTH_A_MAP = ('partial', 'unknown')
-#: A joint with fewer rows says too little for a map.
+#: A joint with fewer rows has too few data for a map.
 _FEW = 100
-#: A map knows something where its deviation is less than this share of the prior's.
+#: A map is informative if its standard deviation is less than this share of the prior's.
 _KNOWN = 0.5
 #: File beside model.yaml with the maps on a grid of position, velocity and load.
 TABLE_FILE = 'residual.csv'
@@ -38,7 +38,7 @@ _HEAD = 'joint,position,velocity,load,torque,std'
 @dataclass(frozen=True)
 class JointResidual:
     """
-    What was learned of one joint.
+    The learned map and the suggested law of one joint.
 
     Attributes
     ----------
@@ -51,12 +51,12 @@ class JointResidual:
     before, after : float
         Root mean square of the residual without and with the map [N m].
     gain : float
-        Share of the squares that the map predicts of data it was not learned from: blocks left
-        out in turn, and held-out recordings where they come near the data.
+        Share of the squared residual that the map predicts in held-out data: blocks left out in
+        turn, and samples of held-out recordings near the training data.
     held_out : float or None
-        The same of held-out recordings alone; None where none comes near the data.
+        The same share for held-out recordings alone; None if none is near the training data.
     law : Law or None
-        What it looks like.
+        Suggested law; None if no law approximates the residual.
 
     """
 
@@ -70,14 +70,14 @@ class JointResidual:
     law: Law | None
 
     def axis(self, number: int, count: int) -> FloatArray:
-        """Return even values over the range of an input, shape (count,)."""
+        """Return evenly spaced values over the range of an input, shape (count,)."""
         return np.linspace(float(self.ranges[number, 0]), float(self.ranges[number, 1]), count)
 
 
 @dataclass(frozen=True)
 class Residual:
     """
-    What a diagnosis leaves, learned.
+    The residual of a diagnosis, learned.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Residual:
     arm : ArmModel
         The model with them.
     joints : tuple of JointResidual
-        Joints of which something can be predicted; the largest residual first.
+        Joints whose residual is predictable; the largest residual first.
 
     """
 
@@ -95,7 +95,7 @@ class Residual:
     joints: tuple[JointResidual, ...]
 
     def sentences(self) -> tuple[str, ...]:
-        """Say what was learned, a joint a line."""
+        """Return a sentence for each joint on its map and its law."""
         lines = []
         for one in self.joints:
             alone = ''
@@ -107,13 +107,13 @@ class Residual:
             if one.law is not None:
                 like = f'{one.law.text} ({percent_of(one.law.share)})'
             lines.append(
-                f'{one.joint}: a map without a name predicts {percent_of(one.gain)} of what is '
-                f'left{alone}; it looks like {like}'
+                f'{one.joint}: a learned map predicts {percent_of(one.gain)} of the '
+                f'residual{alone}; similar law: {like}'
             )
         return tuple(lines)
 
     def document(self, table: str) -> dict[str, Any]:
-        """Return what diagnosis.json holds; the table is a file's name."""
+        """Return the entry of diagnosis.json; ``table`` is the name of the file with the maps."""
         return {
             'method': 'gp',
             'table': table,
@@ -141,7 +141,7 @@ def percent_of(share: float) -> str:
 
 
 def require_libraries() -> None:
-    """Raise IdentificationError where what learns is not installed; it says how to do that."""
+    """Raise IdentificationError if scikit-learn is not installed."""
     try:
         import sklearn  # noqa: F401 - is it there?
     except ImportError:
@@ -155,20 +155,20 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
     """
     Learn a map of the residual that a diagnosis does not explain.
 
-    The residual is that of the patched model or, where nothing was named, of the model that was
-    diagnosed, with its rigid body fitted anew if the diagnosis did so.
+    The residual is that of the patched model. If the diagnosis has no findings, it is that of the
+    diagnosed model, whose rigid body is refitted if the diagnosis did so.
 
     Parameters
     ----------
     diagnosis : Diagnosis
         Its verdict, model and data.
     rng : numpy.random.Generator
-        Draws the first cells.
+        Random numbers for the initial cells.
 
     Returns
     -------
     Residual or None
-        None where everything has a name, or nothing of the rest can be predicted.
+        None if the findings explain the residual, or if no map predicts held-out data.
 
     Raises
     ------
@@ -186,8 +186,7 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
         validation = [overlay.trajectory for overlay in gap.overlays]
     every = joint_rows(base, diagnosis.data)
     unseen = joint_rows(base, validation) if validation else [None] * len(every)
-    # thousands of systems of a hundred rows: two threads would wait for each other fifteen times
-    # as long as they compute
+    # two threads would spend most of the time waiting, as each system has only a hundred rows
     import sklearn.linear_model  # noqa: F401 - so that its threads are limited as well
 
     with threadpool_limits(1):
@@ -208,11 +207,11 @@ def learn_residual(diagnosis: Diagnosis, rng: np.random.Generator) -> Residual |
 def _learned(
     joint: str, rows: JointRows, unseen: JointRows | None, base: ArmModel, rng: np.random.Generator
 ) -> JointResidual | None:
-    """Learn one joint; None where blocks that were left out are not predicted beyond chance."""
+    """Learn the map of one joint; None if it does not predict held-out blocks beyond chance."""
     if len(rows) < _FEW:
         return None
     learned, predicted = learn_map(rows, rng)
-    # a map has to gain on blocks it has not seen, even without the best of them
+    # the map has to reduce the error of held-out blocks, even without the best block
     saved = rows.left**2 - (rows.left - predicted) ** 2
     blocks = np.bincount(rows.block, saved, BLOCKS)
     if not blocks.sum() - blocks.max() > 0.0:
@@ -239,19 +238,19 @@ def _learned(
 
 
 def near_data(learned: TorqueMap, rows: JointRows) -> npt.NDArray[np.bool_]:
-    """Return which rows a map knows something of: they lie near those it was learned from."""
+    """Return a mask of the rows near those from which a map was learned, shape (N,)."""
     return np.asarray(learned.std(rows.inputs) < _KNOWN * learned.amplitude)
 
 
 def lookup_table(residual: Residual) -> str:
     """
-    Return the maps on a grid over the data as CSV, in SI units.
+    Return the maps as CSV on a grid over the range of the data, in SI units.
 
     Returns
     -------
     str
-        Joint, position, velocity, load, torque and its standard deviation; the load is empty
-        where it does not matter. Position varies slowest.
+        Joint, position, velocity, load, torque and its standard deviation; the load is empty if
+        the map does not depend on load. Position varies slowest.
 
     """
     lines = [_HEAD]

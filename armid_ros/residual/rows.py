@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The residuals of recordings, with the state of the arm in which they arose."""
+"""Residuals of recordings, with position, velocity and load of the joint."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from armid_ros.motion import FloatArray
 import numpy as np
 import numpy.typing as npt
 
-#: Parts of the data that are predicted from the others in turn.
+#: Number of blocks of the cross-validation: each is predicted from the others.
 BLOCKS = 10
 
 
 @dataclass(frozen=True)
 class JointRows:
     """
-    Rows in which a joint moves.
+    The informative rows of one joint.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class JointRows:
     left : ndarray, shape (N,)
         Measured torque minus that of the model [N m].
     block : ndarray of int, shape (N,)
-        Part of the data, 0 to BLOCKS - 1.
+        Number of the block of each row, 0 to BLOCKS - 1.
 
     """
 
@@ -47,7 +47,7 @@ class JointRows:
         return JointRows(self.inputs[chosen], self.left[chosen], self.block[chosen])
 
     def folds(self) -> Iterator[npt.NDArray[np.bool_]]:
-        """Yield which rows are in other blocks, shape (N,), for each block of which some are."""
+        """Yield a mask of the rows in all other blocks, shape (N,), for each block with rows."""
         for block in range(BLOCKS):
             others = self.block != block
             if others.any() and not others.all():
@@ -56,7 +56,7 @@ class JointRows:
 
 def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     """
-    Return what a model leaves of recordings, joint by joint.
+    Return the residuals of a model on recordings, joint by joint.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def joint_rows(arm: ArmModel, data: Sequence[Trajectory]) -> list[JointRows]:
     Returns
     -------
     list of JointRows
-        One a joint.
+        The rows of each joint.
 
     """
     links = [arm.link_motion(part.at_rows) for part in data]

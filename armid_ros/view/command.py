@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A recording to look at, with the arm that moves."""
+"""The command ``armid view``: a recording and its moving arm in rerun."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def view(
 
 @contextmanager
 def _whole(out: Path | None) -> Iterator[Path | None]:
-    """Yield a file beside its place and move it there, so that it is whole or absent."""
+    """Yield a temporary file, and move it to its place when it is complete."""
     if out is None:
         yield None
         return
@@ -90,7 +90,7 @@ def _whole(out: Path | None) -> Iterator[Path | None]:
 
 
 def _named(model: Path | None) -> tuple[str, ...]:
-    """Return the joints of what a diagnosis beside the model names."""
+    """Return the joints of the effects that a diagnosis beside the model names."""
     if model is None:
         return ()
     path = (model if model.is_dir() else model.parent) / 'diagnosis.json'

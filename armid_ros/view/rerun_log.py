@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A recording in rerun: curves and arm on one time line, in a window or in a file.
+A recording in rerun: curves and arm on one timeline, in a window or in a file.
 
 Entities are ``arm/<joint>``, ``torque/<joint>/measured`` and ``predicted``, ``residual/<joint>``,
 ``position/<joint>`` and ``velocity/<joint>``.
@@ -35,16 +35,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 TIMELINE = 'time'
-#: Where a viewer listens: rerun's own way to start one binds it to all interfaces.
+#: Address of the viewer; the start function of rerun would bind it to all interfaces.
 _HOST, _PORT = '127.0.0.1', 9876
-#: How long a viewer may take to listen, and how often is tried [s].
+#: Timeout of the start of a viewer, and time between attempts to connect [s].
 _PATIENCE, _TRY_EVERY = 20.0, 0.1
-#: Colours: of what was measured, predicted, left, of links, and of what is marked.
+#: Colours of measured torque, predicted torque, residual, links and marked links.
 _MEASURED, _PREDICTED, _RESIDUAL = (140, 145, 150), (213, 94, 0), (0, 114, 178)
 _LINK, _MARKED = (175, 182, 190), (230, 60, 40)
-#: Later than any recording begins that counts from its own start [s].
+#: Times above this count from 1970, times below from the start of the recording [s].
 _SINCE_1970 = 1e8
-#: Radius of a bar of an arm without bodies [m].
+#: Radius of the bars that stand for an arm without shapes [m].
 _BAR = 0.02
 #: Poses per second that are drawn.
 _POSE_RATE = 30.0
@@ -72,7 +72,7 @@ def rerun() -> ModuleType:
 
 
 def _has_screen() -> bool:
-    """Return whether a window can be opened: on Linux a display server has to be named."""
+    """Return whether a window can be opened; on Linux this needs a display server."""
     if not sys.platform.startswith('linux'):
         return True
     return bool(os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY'))
@@ -80,12 +80,12 @@ def _has_screen() -> bool:
 
 def open_stream(name: str, out: Path | None = None) -> Any:
     """
-    Open a window, or a file, for what is logged.
+    Open a window or a file for the logged data.
 
     Parameters
     ----------
     name : str
-        Of the recording.
+        Name of the recording.
     out : Path, optional
         File to write, .rrd; a window by default.
 
@@ -112,7 +112,7 @@ def open_stream(name: str, out: Path | None = None) -> Any:
 
 
 def _started_viewer() -> str:
-    """Start a viewer that this machine alone can reach, unless one listens; return its URL."""
+    """Start a viewer on the local interface unless one is running; return its URL."""
     command = [sys.executable, '-P', '-m', 'rerun_cli', '--expect-data-soon']
     deadline, viewer = time.monotonic() + _PATIENCE, None
     while True:
@@ -134,16 +134,16 @@ def log_recording(
     stream: Any, arm: ArmModel, recording: Recording, marked: Sequence[str] = ()
 ) -> list[str]:
     """
-    Log the moving arm, its curves, and the layout of the window; return what is not shown.
+    Log arm, curves and the layout of the window; return notes on links without drawing.
 
     Parameters
     ----------
     stream : rerun.RecordingStream
-        Where to.
+        Stream to which the recording is logged.
     arm : ArmModel
         The model.
     recording : Recording
-        What the arm did; torque is predicted where it has some.
+        The recording; torque is predicted if the recording has torque.
     marked : sequence of str
         Joints to be coloured.
 
@@ -186,7 +186,7 @@ def log_recording(
 
 
 def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Return times, shape (K,) [s], and poses, (K, n), some thirty a second, without NaN."""
+    """Interpolate about thirty poses per second; return times, (K,) [s], and poses, (K, n)."""
     t = recording.t
     count = max(2, int((t[-1] - t[0]) * _POSE_RATE) + 1)
     at = np.linspace(t[0], t[-1], min(count, len(t)))
@@ -198,7 +198,7 @@ def poses(recording: Recording) -> tuple[FloatArray, FloatArray]:
 
 
 def _log_bodies(stream: Any, robot: Robot, marked: Sequence[str]) -> list[str]:
-    """Log what an arm looks like: <visual>, <collision> where a link has none, or bars."""
+    """Log the shapes of links: <visual>, or <collision> without it; bars without any shape."""
     rr, drawn = rerun(), 0
     notes: list[str] = []
     absent: list[str] = []
@@ -264,7 +264,9 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
             layout.TimeSeriesView(
                 origin=f'{kind}/{_part(joint)}',
                 name=joint,
-                plot_legend=layout.PlotLegend(visible=number == 0),  # the same in all
+                plot_legend=layout.PlotLegend(
+                    visible=number == 0
+                ),  # the legend is the same in all views
             )
             for number, joint in enumerate(names)
         ]
@@ -282,11 +284,11 @@ def _layout(joints: Sequence[str], marked: Sequence[str]) -> Any:
 
 
 def _part(name: str) -> str:
-    """Return a name as part of an entity's path."""
+    """Escape a name for the path of an entity."""
     return str(rerun().escape_entity_path_part(name))
 
 
 def _times(t: FloatArray) -> Any:
-    """Return times as dates where they are seconds since 1970."""
+    """Return the time column: dates if times count from 1970, else durations."""
     kind = 'timestamp' if t[0] > _SINCE_1970 else 'duration'
     return rerun().TimeColumn(TIMELINE, **{kind: t})

@@ -67,10 +67,10 @@ def test_the_version_changes_with_the_bag(store):
 @pytest.mark.parametrize(
     ('pattern', 'regular', 'said'),
     [
-        ('/nowhere/*/*', None, 'no bag there'),
+        ('/nowhere/*/*', None, 'there is no bag'),
         ('gopher://host/*', None, 'gopher'),
         ('{store}/line_1/*/*/*', 'arm', 'has no group'),
-        ('{store}/line_1/*/*/*', 'robot_(.)', 'finds no arm'),
+        ('{store}/line_1/*/*/*', 'robot_(.)', 'does not match'),
         ('{store}/line_1/*/*/*', '(', '--arm'),
         ('{store}/line_1/*/*/*', '/line_1/()', '--arm'),
         ('{store}/line_1/*/*/*', '(none)?', '--arm'),

@@ -38,7 +38,7 @@ def test_identify_then_watch(bags, tmp_path):
     ('arguments', 'said'),
     [
         (('identify', '{bags}/*/*', '--out', '{out}'), '--robot'),
-        (('identify', '{bags}/none/*', '--robot', ROBOT, '--out', '{out}'), 'no bag there'),
+        (('identify', '{bags}/none/*', '--robot', ROBOT, '--out', '{out}'), 'there is no bag'),
         (('identify', '{bags}/*/*', '--robot', 'nobody', '--out', '{out}'), 'nobody'),
         (('identify', '{bags}/*/*', '--robots', '{bags}/none.csv', '--out', '{out}'), 'none.csv'),
         (
@@ -62,7 +62,7 @@ def test_wrong_input_is_one_line(bags, tmp_path, arguments, said):
     [
         ('name,robot\n', 'columns arm and robot'),
         ('arm,robot\narm_0000,\n', 'line 2'),
-        ('arm,robot\na,r\na,r\n', 'line 3: arm a is there twice'),
+        ('arm,robot\na,r\na,r\n', 'line 3: arm a appears twice'),
         ('arm,robot\nother,r\n', "arm 'arm_0000' is not in the table"),
     ],
 )

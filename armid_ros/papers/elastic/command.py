@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two links on springs: the three steps, from bags to parameters."""
+"""Identification of two links on springs in three steps, from bags to parameters."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def identify_springs(
     bags: Sequence[Path], robot: Robot, source: str, model: Path | None, out: Path, seed: int,
     as_json: bool,
 ) -> None:  # fmt: skip
-    """Fit springs to bags with both encoders of any arm, and write what was found."""
+    """Fit springs to bags with both encoders of any arm, and write the results."""
     staged = options.stage(out, SPRINGS_SCHEMA, source)
     body = robot if model is None else options.model_of(model, robot).body
     if not bags:

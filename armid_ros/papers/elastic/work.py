@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Two links on springs: the three steps, from bags to parameters."""
+"""Identification of two links on springs in three steps, from bags to parameters."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ STEP_SENSORS = ElasticSensors(motor_velocity=0.002, link_velocity=0.002, link_ac
 @dataclass(frozen=True)
 class ElasticOptions:
     """
-    What is identified, and what is known of sensors and motors.
+    Options of the identification: data, sensors and motors.
 
     Attributes
     ----------
@@ -66,13 +66,13 @@ class ElasticOptions:
     robot : str
         The arm.
     model : Path or None
-        A model.yaml with inertias, of arms that are no pair of links.
+        A model.yaml with inertias, for arms other than a pair of links.
     demo : bool
         Whether the shipped arm is simulated first.
     experiments : int
-        How many of 4 s each are.
+        Number of simulated experiments of 4 s.
     start : str or None
-        What the tuning begins with.
+        Initial parameters of the tuning.
     accelerometers, gear, kp, ki : str or None
         Distances [m], gear ratios, gains of the velocity loop, two numbers each.
 
@@ -91,7 +91,7 @@ class ElasticOptions:
     ki: str | None
 
     def machine(self) -> tuple[FloatArray, TwoLinkParameters, VelocityLoop]:
-        """Return places of sensors, drives and loop; by default those of the shipped arm."""
+        """Return positions of sensors, drives and loop; by default those of the shipped arm."""
         shipped = two_link_set('after')
         radius = shipped.assumptions['accelerometer_radius']
         radius = _two_numbers(self, 'accelerometers', radius)

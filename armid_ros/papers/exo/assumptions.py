@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the source of a shipped robot leaves open: assumed values with their reasons."""
+"""Values that the source of a shipped robot does not give: assumptions with reasons."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Assumption:
     Attributes
     ----------
     value : float, list, dict or str
-        What is assumed.
+        Assumed value.
     unit : str
         Its unit.
     reason : str

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A machine and its wearer: what ties them, from the machine's torques and both's angles."""
+"""Identification of the springs between a machine and its wearer, from torques and angles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from armid_ros.cli import parameters as options
 import click
 
-#: What a leg and its exoskeleton do; `armid_ros.papers.exo.plant.exercises.EXERCISES`.
+#: Motions of a leg and its exoskeleton; `armid_ros.papers.exo.plant.exercises.EXERCISES`.
 EXERCISES = ('step', 'quick_step', 'swing', 'lift', 'squat', 'rock')
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A machine and its wearer: what ties them, from the machine's torques and both's angles."""
+"""Identification of the springs between a machine and its wearer, from torques and angles."""
 
 from __future__ import annotations
 
@@ -53,18 +53,18 @@ _RATE = 1000.0
 @dataclass(frozen=True)
 class SimulationOptions:
     """
-    What is simulated where nothing was recorded.
+    Options of the simulation that replaces a recording.
 
     Attributes
     ----------
     gait_file : Path or None
-        Angles of walking.
+        File with the angles of walking.
     stiffness : float or None
-        Of the springs [N/m].
+        Stiffness of the springs [N/m].
     motion : str
-        What the pair does.
+        Name of the exercise.
     duration : float
-        Of the recording [s].
+        Duration of the recording [s].
     torque_noise, angle_noise : float
         Standard deviations [N m, deg].
 
@@ -80,7 +80,7 @@ class SimulationOptions:
     def record(
         self, path: Path, topics: Sequence[str], pair: TiedPair, gait: Gait, rng: Generator
     ) -> None:
-        """Record a motion of both as their sensors see it."""
+        """Simulate the recordings of both machines along a motion, with noise."""
         motions = exercise(pair, self.motion, np.arange(0.0, self.duration, 1.0 / _RATE), gait)
         tau = pair_torques(pair, *motions).tau
         tau = tau + self.torque_noise * rng.normal(size=tau.shape)
@@ -106,7 +106,7 @@ def identify_pair(
     gait = read_gait(simulated.gait_file)
     names = topics.split(',')
     if len(names) != 2:
-        raise ModelError(f'--topics {topics}: give two, of the machine and of its wearer')
+        raise ModelError(f'--topics {topics}: give two topics, of the machine and of its wearer')
     if bag is None:
         require_new(out / 'recording')
     staged = options.stage(out, SCHEMA)
@@ -149,7 +149,7 @@ def identify_pair(
 
 
 def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> SimulatedWalk:
-    """Let the simulated pair walk, its joints driven by torque."""
+    """Simulate the walking pair, with joints driven by torque."""
     tick(0.6, 'walking a whole cycle')
     walkers = walking_pair(stiffness)
     cycle, rate = gait_cycle(walkers, gait), read_assumptions()['torque_rate'].value
@@ -170,7 +170,7 @@ def _walk(pair: TiedPair, gait: Gait, stiffness: float | None, tick: Tick) -> Si
 def _identify(
     pair: TiedPair, machine: Recording, wearer: Recording, inertias: Any, tick: Tick
 ) -> list[Interaction]:
-    """Find one stiffness for all springs, and one for each."""
+    """Estimate one stiffness for all springs, and one for each."""
     found = []
     for share, separate in ((0.1, False), (0.35, True)):
         tick(share, 'identifying')
@@ -186,7 +186,7 @@ def _identify(
 
 
 def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
-    """Return single support of walking, over the gait cycle of the swing leg."""
+    """Return the motion of single support, over the gait cycle of the swing leg."""
     known = read_assumptions()
     begin, end = known['single_support'].value
     cycle = known['cycle_time'].value
@@ -198,7 +198,7 @@ def _shown(pair: TiedPair, gait: Gait) -> tuple[PairMotion, FloatArray, str]:
 def _recorded(
     pair: TiedPair, machine: Recording, wearer: Recording
 ) -> tuple[PairMotion, FloatArray, str]:
-    """Return the recorded motion as it is, of which positions alone are shown."""
+    """Return the recorded motion; only its positions are shown."""
     both = recorded_together(machine, wearer, pair.other)
     assert both.partner is not None
     motions = PairMotion(
@@ -246,7 +246,7 @@ def _document(
 
 
 def _feet(cycle: GaitCycle) -> list[dict[str, Any]]:
-    """Return what the feet of both bear."""
+    """Return the forces on the feet of both machines."""
     pair = cycle.pair
     return [
         {

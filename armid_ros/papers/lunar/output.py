@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""lunar.json: the lunar paper repeated, for programs to read."""
+"""The document lunar.json: results of the reproduction of the lunar paper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCHEMA = 'armid/lunar/1'
 
 def lunar_document(found: Reproduction) -> dict[str, Any]:
     """
-    Return the repeat as the document that lunar.json holds.
+    Return the reproduction as the document of lunar.json.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What the paper on the 6-DOF humanoid arm prints, joint by joint, shoulder first.
+Values of the paper on the 6-DOF humanoid arm, joint by joint, shoulder first.
 
-Its Table 3 is the arm on the moon, Table 4 the same with 0.3 kg in the hand, Table 6 the real arm
-on Earth. The torque columns are peaks; the percentage is the RMSE as a share of the peak.
+Table 3 is the arm on the moon, Table 4 the arm on the moon with 0.3 kg in the hand, Table 6 the
+real arm on Earth. The torque columns are peaks; the percentage is the RMSE as a share of the peak.
 
 """
 
@@ -31,9 +31,9 @@ class PaperTable:
     number : int
         Its number.
     title : str
-        What it is about.
+        Title of the table.
     robot : str
-        Shipped robot that stands for the arm.
+        Shipped robot that represents the arm.
     gravity : str
         'moon' or 'earth'.
     peak : ndarray, shape (6,)
@@ -41,8 +41,8 @@ class PaperTable:
     error : ndarray, shape (6,)
         Torque error of the paper [N m]: RMSE, in Table 6 the mean absolute error.
     noise : ndarray, shape (6,)
-        Torque noise of the repeat [N m]: what the paper measured in Table 6, as mean amplitude;
-        elsewhere the paper's RMSE, as standard deviation.
+        Torque noise of the reproduction [N m]. In Table 6, the noise that the paper measured, as
+        mean amplitude; otherwise the RMSE of the paper, as standard deviation.
 
     """
 
@@ -56,12 +56,12 @@ class PaperTable:
 
     @property
     def uniform(self) -> bool:
-        """Whether the noise is given by its mean amplitude, and the error is a mean too."""
+        """Whether noise and error are mean absolute values."""
         return self.number == 6
 
     @property
     def ratio(self) -> FloatArray:
-        """Return the error as in the paper: of the peak, in Table 6 of the noise, shape (6,)."""
+        """Return the error relative to the peak, in Table 6 to the noise, shape (6,)."""
         return self.error / (self.noise if self.uniform else self.peak)
 
 

@@ -14,13 +14,13 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
 import numpy as np
 
-#: Wanted of Tables 3 and 4 [% of the peak], and of Table 6 [of the noise].
+#: Limits of the errors of Tables 3 and 4 [% of the peak], and of Table 6 [of the noise].
 _WANTED = 1.0, 0.15
 
 
 def lunar_report(found: Reproduction, provenance: Provenance) -> str:
     """
-    Return report.html of the repeat.
+    Return report.html of the reproduction.
 
     Parameters
     ----------

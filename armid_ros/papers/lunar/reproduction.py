@@ -4,10 +4,10 @@
 The paper's experiments, repeated on the simulated arm.
 
 The arm of the paper's Table 2 runs one designed trajectory, slowly, with torque noise as large as
-the paper's errors. It is identified by its weight alone, as in the paper, and with the whole
-dynamics, from a description whose masses are 20 % too small. Errors are against the true torque
-along trajectories that were not used, and, as the paper may have measured them, against the noisy
-torque of the run itself.
+the paper's errors. The arm is identified with gravity torques alone, as in the paper, and with the
+full dynamics. The description has masses that are 20 % too small. Errors are relative to the true
+torque along held-out trajectories. Errors against the noisy torque of the run are given as well,
+as the paper may have used them.
 
 """
 
@@ -29,36 +29,36 @@ from armid_ros.simulation import Sensors, simulate
 import numpy as np
 import scipy.optimize
 
-#: The description is this much of the arm.
+#: Masses of the description relative to the arm.
 _BELIEVED = 0.8
-#: Samples per second that are recorded [Hz].
+#: Sampling rate of the recording [Hz].
 _RATE = 100.0
 #: Period of the trajectory [s], two of which are run: slow, as in the paper.
 _PERIOD = 60.0
-#: Trajectories that the errors are taken along, and their period [s].
+#: Number of held-out trajectories for the errors, and their period [s].
 HELD_OUT, _TEST = 5, 60.0
 #: Encoder of 18 bits.
 _RESOLUTION = 2 * np.pi / 2**18
-#: Poses among which the largest torques of an arm are looked for.
+#: Number of random poses in the search for the largest torques.
 _POSES = 5000
-#: Poses of each joint, those of the largest torques, from which it is searched further.
+#: Number of the best poses of each joint that start a local search.
 _STARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class MethodErrors:
     """
-    Errors of one way to identify the arm.
+    Errors of one method of identification.
 
     Attributes
     ----------
     result : Identification
-        What it found.
+        Result of the method.
     held_out : ndarray, shape (6,)
-        Error against the true torque along trajectories not used [N m]; RMSE, or for Table 6 the
+        Error against the true torque along held-out trajectories [N m]; RMSE, or for Table 6 the
         mean absolute error.
     noisy : ndarray, shape (6,)
-        The same against the noisy torque of the run [N m].
+        Error against the noisy torque of the run [N m].
 
     """
 
@@ -70,22 +70,22 @@ class MethodErrors:
 @dataclass(frozen=True, eq=False)
 class Repeated:
     """
-    One table, repeated.
+    Reproduction of one table.
 
     Attributes
     ----------
     table : PaperTable
-        What the paper has.
+        The table of the paper.
     joints : tuple of str
         Joints, shoulder first.
     peak : ndarray, shape (6,)
-        Largest torque that gravity can ask of each joint [N m].
+        Largest gravity torque of each joint over all poses [N m].
     peak_run : ndarray, shape (6,)
         Largest torque along the trajectories of the errors [N m].
     methods : tuple of MethodErrors
-        By the weight alone, and with the whole dynamics.
+        With gravity torques alone, and with the full dynamics.
     test : Fit
-        The first trajectory of the errors: true torque, and that of the weight alone.
+        First held-out trajectory: true torque, and prediction with gravity torques alone.
 
     """
 
@@ -97,7 +97,7 @@ class Repeated:
     test: Fit
 
     def ratio(self, errors: FloatArray) -> FloatArray:
-        """Return errors as the paper has them: of the peak, or of the noise, shape (6,)."""
+        """Return errors relative to the peak or to the noise, as in the paper, shape (6,)."""
         return errors / (self.table.noise if self.table.uniform else self.peak_run)
 
 
@@ -109,13 +109,13 @@ class Composite:
     Attributes
     ----------
     name : str
-        Its masses and moments, times gravity.
+        Expression of masses and moments, times gravity.
     joint : str
-        The joint that it belongs to.
+        Joint of the parameter.
     truth, value, std : float
-        On the moon without load [N mm].
+        True value, estimate and standard deviation on the moon without load [N mm].
     loaded_truth, loaded, loaded_std : float
-        With the load [N mm].
+        True value, estimate and standard deviation with the load [N mm].
 
     """
 
@@ -132,7 +132,7 @@ class Composite:
 @dataclass(frozen=True)
 class Reproduction:
     """
-    The whole paper.
+    Reproduction of the whole paper.
 
     Attributes
     ----------
@@ -141,7 +141,7 @@ class Reproduction:
     composites : tuple of Composite
         The minimal gravity parameters.
     load, load_std : float
-        Mass that the two runs on the moon differ by [kg].
+        Estimated mass of the load from the two runs on the moon, and its standard deviation [kg].
 
     """
 
@@ -160,9 +160,9 @@ def reproduce(
     Parameters
     ----------
     seed : int
-        Of every random number.
+        Seed of all random numbers.
     progress : callable, optional
-        Told the share that is done, 0 to 1, and what is being done.
+        Callback with the share that is done, 0 to 1, and the name of the step.
 
     """
     rng = np.random.default_rng(seed)
@@ -196,7 +196,7 @@ def reproduce(
 
 
 def attainable(robot: Robot, rng: np.random.Generator) -> FloatArray:
-    """Return the largest torque that gravity can ask of every joint, shape (n,) [N m]."""
+    """Return the largest gravity torque of every joint over all poses, shape (n,) [N m]."""
     n = robot.n_joints
 
     def torque(q: FloatArray) -> FloatArray:
@@ -253,7 +253,7 @@ def _repeat(
 def _recorded(
     truth: ArmModel, table: PaperTable, run: Excitation, rng: np.random.Generator
 ) -> tuple[Recording, Motion]:
-    """Run the arm; return what is recorded, with the noise of the table, and how it moved."""
+    """Simulate the arm; return the recording with the noise of the table, and the motion."""
     made = simulate(
         truth, run.motion(1000.0), rng=rng, sensors=Sensors(resolution=_RESOLUTION), rate=_RATE
     )
@@ -272,7 +272,7 @@ def _recorded(
 
 
 def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
-    """Return errors as the table has them: their mean size, or their root mean square."""
+    """Return the mean absolute error or the root mean square error, as in the table."""
     if table.uniform:
         return np.asarray(np.mean(np.abs(errors), axis=0))
     return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
@@ -281,7 +281,7 @@ def _size(errors: FloatArray, table: PaperTable) -> FloatArray:
 def _compared(
     bare: Repeated, loaded: Repeated, rng: np.random.Generator
 ) -> tuple[tuple[Composite, ...], float, float]:
-    """Return the composites of two runs, and the load that they differ by with its deviation."""
+    """Return the composites of two runs, and the load with its standard deviation."""
     robots = [load_robot(r.table.robot, gravity='moon') for r in (bare, loaded)]
     theory = gravity_composites(robots[0], rng)
     gravity = 1e3 * float(np.linalg.norm(robots[0].gravity))

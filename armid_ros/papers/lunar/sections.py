@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Tables, torque curves and gravity parameters of the lunar paper, repeated."""
+"""Sections with tables, torque curves and gravity parameters of the reproduction."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 
 
 def tables_section(repeated: Sequence[Repeated]) -> ContentSection:
-    """Show the paper's tables next to those of the repeat, joint by joint."""
+    """Return a section with the tables of paper and reproduction, joint by joint."""
     text = (
         'Peak: of the paper, and the largest torque of gravity at the joint. Errors are those of '
         'trajectories that were not used, against the true torque. Noisy is the error against the '
@@ -62,7 +62,7 @@ def _cells(values: FloatArray, count: int = 2) -> list[str]:
 
 
 def curves_section(repeated: Sequence[Repeated]) -> ContentSection:
-    """Show the true torque and that of the identified weight, along a trajectory not used."""
+    """Return a section with true and predicted torque along a held-out trajectory."""
     text = (
         'Weight alone, identified from the noisy run, along a trajectory that was not used. Drag '
         'across a plot, or pinch it, to zoom; double-click or double-tap to see it all.'
@@ -96,14 +96,14 @@ def _chart(one: Repeated, joint: int) -> Chart:
 
 def gravity_section(composites: Sequence[Composite], load: str) -> ContentSection:
     """
-    Show the minimal gravity parameters, with and without the load.
+    Return a section with the minimal gravity parameters, with and without the load.
 
     Parameters
     ----------
     composites : sequence of Composite
-        All of them.
+        All gravity parameters.
     load : str
-        The mass that the two runs differ by, as it is read.
+        Text of the estimated mass of the load.
 
     """
     text = (

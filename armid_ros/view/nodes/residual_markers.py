@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The residual markers node: what a model does not explain, drawn on the joints of the arm."""
+"""The residual markers node: draws the residual of each joint on the arm."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 #: Markers that are not drawn anew vanish after this [s].
 _LIFETIME = 2
-#: Residuals and torques are averaged over so much time (mean square) [s].
+#: Averaging time of the mean squares of residuals and torques [s].
 _WINDOW = 2.0
 #: Sizes as shares of the reach of the arm: arrow at the full scale, its shaft, letters.
 _ARROW, _SHAFT, _LETTER = 0.25, 0.015, 0.05
@@ -39,10 +39,11 @@ class ResidualMarkersNode(ListeningNode):
     """
     Draws the residual of the online identifier on the joints, for RViz and Foxglove.
 
-    At each joint an arrow along its axis is as long as the residual just now. A sphere is green
-    where the mean square of the residual over two seconds is small against that of the torque, and
-    red from `full` on; a text says both numbers. Above the base stands the diagnosis of
-    live_diagnosis as text. Positions are computed from joint_states; no transforms are needed.
+    At each joint, the length of an arrow along the axis shows the present residual. The colour of
+    a sphere shows the ratio of residual to torque, as root mean squares over two seconds. The
+    sphere is green for zero, and red from `full` on. A text shows residual and ratio. A text above
+    the base shows the diagnosis of live_diagnosis. Positions are computed from joint_states; no
+    transforms are needed.
 
     """
 
@@ -79,7 +80,7 @@ class ResidualMarkersNode(ListeningNode):
         self.look_every(1.0 / self.value('rate'), self.draw)
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say what is drawn, and what is missing."""
+        """Return what is missing (empty if the arm is drawn), and the ratio of each joint."""
         if self.robot is None:
             return self.awaited, {}
         if not np.isfinite(self._q).all():
@@ -88,7 +89,7 @@ class ResidualMarkersNode(ListeningNode):
         return '', {f'residual share {joint}': float(share) for joint, share in shares}
 
     def draw(self) -> None:
-        """Publish the markers of the arm as it is now."""
+        """Publish the markers of the arm at its present position."""
         if self.robot is None or not np.isfinite(self._q).all():
             return
         stamp = self.get_clock().now().to_msg()
@@ -105,7 +106,9 @@ class ResidualMarkersNode(ListeningNode):
 
     def _of_joints(self, robot: Robot) -> Sequence[Marker]:
         frames = LinkFrames.of(robot, self._q[np.newaxis]).frames
-        full = max(2.0 * float(np.sqrt(self._residual.max())), 1e-9)  # of the longest arrow
+        full = max(
+            2.0 * float(np.sqrt(self._residual.max())), 1e-9
+        )  # residual of the longest arrow
         lengths = _ARROW * self._reach * np.clip(self._now / full, -1.0, 1.0)
         markers = []
         for j, (joint, share) in enumerate(zip(robot.joints, self._shares(), strict=True)):
@@ -134,11 +137,11 @@ class ResidualMarkersNode(ListeningNode):
         return text
 
     def _shares(self) -> FloatArray:
-        """Return the residual against the torque of each joint, both as root mean square."""
+        """Return the ratio of residual to torque of each joint, both as root mean squares."""
         return np.asarray(np.sqrt(self._residual / np.maximum(self._torque, 1e-12)))
 
     def take_description(self, urdf: str) -> None:
-        """Draw on the robot of robot_description."""
+        """Use the robot of robot_description."""
         self._draw_on(robot_from_urdf(urdf, joints=names(self, 'joints') or None))
 
     def _draw_on(self, robot: Robot) -> None:
@@ -154,7 +157,7 @@ class ResidualMarkersNode(ListeningNode):
         self._reach = max(float(np.linalg.norm(steps, axis=1).sum()), 0.1)
 
     def take_sample(self, sample: JointSample) -> None:
-        """Take a joint state, where the arm is drawn and what its torque is."""
+        """Store the position of a joint state, and average its torque."""
         self._q = sample.q
         self._torque = self._averaged('torque', sample.t, self._torque, sample.tau)
 
@@ -170,7 +173,7 @@ class ResidualMarkersNode(ListeningNode):
         self._told = f'{message.verdict.replace("_", " ")}: {message.summary}'
 
     def _averaged(self, what: str, t: float, before: FloatArray, values: FloatArray) -> FloatArray:
-        """Return the mean square with one more sample; the first one is all there is."""
+        """Update a mean square with a sample; the first sample starts the average."""
         step, self._seen[what] = t - self._seen[what], t
         share = 1.0 if not before.any() else float(np.clip(step / _WINDOW, 0.0, 1.0))
         return np.asarray(before + share * (values**2 - before))

@@ -4,7 +4,7 @@
 Two links driven through springs: identification in three steps.
 
 Rigid least squares; subspaces of each joint on its own, with computed interaction torques as
-inputs; physical parameters, tuned to closed-loop step responses. ``identify_two_inertia`` does
-all of them. Source: Oaki and Adachi 2008.
+inputs; physical parameters, tuned to closed-loop step responses. ``identify_two_inertia`` runs all
+three steps. Source: Oaki and Adachi 2008.
 
 """

@@ -5,9 +5,9 @@ Experiments with a two-link arm as bags.
 
 /joint_states (or /motor/joint_states) has positions, velocities and torques of the motors as seen
 at the joints, /link/joint_states positions and velocities of the links, /reference/joint_states
-what the velocity loops are asked for, and an Imu topic per link the accelerometer on its axis, x
-outwards and y sideways. An experiment is a stretch in which the loops are asked to move: standing
-ends it, and so does a pause in the stamps.
+the reference velocities of the loops. An Imu topic per link has the accelerometer on the axis of
+the link, x outwards and y sideways. An experiment is a stretch with nonzero reference velocity;
+rest or a pause in the timestamps ends it.
 
 """
 
@@ -26,11 +26,11 @@ from armid_ros.robots import Robot
 import numpy as np
 import numpy.typing as npt
 
-#: Where the motors may be instead.
+#: Alternative topic of the motors.
 _OTHER_MOTOR = '/motor/joint_states'
-#: Share of the samples that all topics have to have.
+#: Least share of samples with a common timestamp on all topics.
 _SHARED = 0.9
-#: How long the loops are asked to stand between two experiments [s], and the shortest one [s].
+#: Time of rest between two experiments, and length of the shortest experiment [s].
 _STANDING, _SHORTEST = 0.1, 0.2
 
 
@@ -55,13 +55,13 @@ def read_runs(
     settings : ReadSettings
         Checksums and memory.
     read : callable, optional
-        Is given the recordings of joint states, which know how they were read.
+        Callback with the recordings of joint states.
 
     Raises
     ------
     RecordingError
-        A topic or quantity is missing, the samples of two topics are not of the same time, or the
-        loops are never asked to move.
+        If a topic or quantity is missing, the samples of two topics have different timestamps, or
+        the reference velocity is always zero.
 
     """
     motors = _motor_topic(path, settings)
@@ -117,7 +117,7 @@ def read_runs(
 def _accelerations(
     robot: Robot, radius: FloatArray, q: FloatArray, dq: FloatArray, sideways: Sequence[FloatArray]
 ) -> FloatArray:
-    """Return angular accelerations of the joints from what links feel sideways, shape (N, 2)."""
+    """Return angular accelerations of the joints from sideways accelerations, shape (N, 2)."""
     offset = np.asarray(robot.model.jointPlacements[2].translation)
     length = np.hypot(offset[0], offset[1])
     first = sideways[0] / radius[0]
@@ -134,7 +134,7 @@ def read_sides(
     Raises
     ------
     RecordingError
-        A topic is missing.
+        If a topic is missing.
 
     """
     motors = _motor_topic(path, settings)
@@ -153,7 +153,7 @@ def _motor_topic(path: str | Path, settings: ReadSettings) -> str:
 def _experiments(
     t: FloatArray, moving: npt.NDArray[np.bool_], period: float
 ) -> list[tuple[int, int, int]]:
-    """Return stretches of motion: a sample from which on it stood, the first and the end."""
+    """Return stretches of motion: last sample at rest, first sample of motion, and end."""
     pause, shortest = round(_STANDING / period), round(_SHORTEST / period)
     found = []
     cuts = np.flatnonzero(np.diff(t) > 1.5 * period) + 1
@@ -175,12 +175,12 @@ def _microseconds(recording: Recording) -> npt.NDArray[np.int64]:
 def _common(
     path: str | Path, names: Sequence[str], stamps: Sequence[npt.NDArray[np.int64]]
 ) -> npt.NDArray[np.int64]:
-    """Return the stamps that all topics have [us]; a few lost messages are no harm."""
+    """Return the timestamps that all topics have in common [us]; some messages may be lost."""
     common: npt.NDArray[np.int64] = reduce(np.intersect1d, stamps)
     if len(common) < _SHARED * max(map(len, stamps)):
         counts = ', '.join(f'{name} ({len(s)})' for name, s in zip(names, stamps, strict=True))
         raise RecordingError(
-            f'{path}: of the samples of {counts} only {len(common)} have the same stamps; stamp '
-            'alike what is measured at one time, and record all of it'
+            f'{path}: of the samples of {counts} only {len(common)} have equal timestamps; '
+            'use one timestamp for simultaneous measurements, and record all topics'
         )
     return common

@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Step 2: each joint on its own, with what the other link does to it as a second input.
+Step 2: each joint separately, with the interaction torque of the other link as input.
 
 Keep alpha for link 1 and beta for link 2 and call the rest of the link equations interaction
 torques ti; then alpha v1' + dl1 v1 = tau_g1 - ti1 and beta v2' + dl2 v2 = tau_g2 - ti2, which are
@@ -32,7 +32,7 @@ _HOLD: tuple[Hold, Hold] = ('zero', 'first')  # drives hold their torque, links 
 
 def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """
-    Return the derivatives of the torques of both links by alpha, beta and gamma.
+    Return the derivatives of the link torques with respect to alpha, beta and gamma.
 
     Parameters
     ----------
@@ -56,9 +56,9 @@ def link_columns(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
 
 def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArray:
     """
-    Return what each link feels of the motion of the other one, shape (N, 2) [N m].
+    Return the torque on each link by the motion of the other link, shape (N, 2) [N m].
 
-    Only beta and gamma of the parameters count. The acceleration has to be measured.
+    Only beta and gamma of the parameters are used. The motion needs measured accelerations.
 
     """
     others = np.array([0.0, parameters.beta, parameters.gamma])
@@ -69,9 +69,9 @@ def interaction_torques(link: Motion, parameters: TwoLinkParameters) -> FloatArr
 
 def direction(velocity: FloatArray) -> FloatArray:
     """
-    Return the mean sign of velocities between samples, shape (N, n), as straight lines have it.
+    Return the mean sign of linearly interpolated velocities between samples, shape (N, n).
 
-    The last row, after which nothing is known, is the sign itself.
+    The last row is the sign of the last sample.
 
     """
     size = np.abs(velocity)
@@ -125,7 +125,7 @@ def decouple(
     Raises
     ------
     IdentificationError
-        If the data cannot tell; see ``identify_subspace``.
+        If the data do not determine a system; see ``identify_subspace``.
 
     """
     t = runs[0].motor.t
@@ -143,8 +143,8 @@ def measured_response(
     """
     Estimate the frequency response from all inputs to all outputs by averaged spectra (H1).
 
-    Of no model and no order. The first input is held between samples; its response is that to the
-    continuous, held signal.
+    The estimate needs no model and no order. The first input is held between samples; its response
+    is that to the continuous, held signal.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def coupled_response(
     parameters: TwoLinkParameters, angles: npt.ArrayLike, frequency: npt.ArrayLike
 ) -> npt.NDArray[np.complex128]:
     """
-    Return the frequency response of both joints together, each from its own motor alone.
+    Return the response of each motor velocity to its own motor torque, joints coupled.
 
     Parameters
     ----------
@@ -219,6 +219,6 @@ def coupled_response(
 
 
 def decibel_error(found: npt.NDArray[np.complex128], wanted: npt.NDArray[np.complex128]) -> float:
-    """Return the root mean square difference of two frequency responses in size [dB]."""
+    """Return the root mean square difference of the magnitudes of two responses [dB]."""
     difference = 20.0 * np.log10(np.abs(found) / np.abs(wanted))
     return float(np.sqrt(np.mean(difference**2)))

@@ -3,10 +3,10 @@
 """
 Springs of any arm, joint by joint, from encoders on both sides of its transmissions.
 
-What a spring carries is what the rigid body takes along the motion of the links, inertia, gravity
-and the interaction of all of them included; the twist over it is one part compliance, one part
-free play. The rest of the motor's torque is its own: rotor, viscous and Coulomb friction. Both
-are linear, and slow: nothing is asked of the resonances, which follow from inertia and stiffness.
+The torque of a spring is that of inverse dynamics along the motion of the links. The twist has one
+part from compliance and one from free play. The rest of the motor torque is rotor inertia, viscous
+and Coulomb friction. Both models are linear, and slow motion is sufficient. The resonances follow
+from inertia and stiffness.
 
 """
 
@@ -31,18 +31,18 @@ import numpy as np
 import pinocchio as pin
 from scipy.signal import butter, sosfiltfilt
 
-#: Stretches without a pause that are shorter are left out [s].
+#: Shortest stretch without a pause that is used [s].
 _SHORTEST = 2.0
-#: Poses that the inertia of a joint is the mean over.
+#: Number of poses over which the inertia of a joint is averaged.
 _POSES = 200
-#: R^2 of the twist below which a joint does not show a spring.
+#: Least R^2 of the twist for an estimate of stiffness.
 _EXPLAINED = 0.9
 
 
 @dataclass(frozen=True, eq=False)
 class SpringEstimate:
     """
-    What two encoders and a torque show of one joint.
+    Spring, free play and motor of one joint, from two encoders and a torque.
 
     Attributes
     ----------
@@ -52,9 +52,9 @@ class SpringEstimate:
         Stiffness and free play.
     motor : ndarray, shape (3,), or None
         Rotor inertia [kg m^2], viscous friction [N m s/rad] and Coulomb torque [N m] of the motor
-        at the joint; None where no torque was recorded.
+        at the joint; None if no torque was recorded.
     inertia : float
-        Of what hangs on the joint, with the other joints held, mean over the recording [kg m^2].
+        Link inertia about the joint with the other joints held, mean over the recording [kg m^2].
 
     """
 
@@ -65,18 +65,18 @@ class SpringEstimate:
 
     @property
     def informative(self) -> bool:
-        """Whether the twist follows the load, so that there is a stiffness to speak of."""
+        """Whether the twist follows the load, so that the stiffness is identifiable."""
         fit = self.transmission
         return fit.explained > _EXPLAINED and bool(np.isfinite(fit.stiffness).all())
 
     @property
     def antiresonance(self) -> float:
-        """Frequency of the link alone on its spring, motor held [Hz]."""
+        """Natural frequency of the link on its spring with the motor held [Hz]."""
         return float(np.sqrt(self.transmission.stiffness[0] / self.inertia) / (2.0 * np.pi))
 
     @property
     def resonance(self) -> float:
-        """Frequency of motor and link against each other [Hz]; NaN without a rotor inertia."""
+        """Natural frequency of motor against link [Hz]; NaN without a rotor inertia."""
         if self.motor is None or self.motor[0] <= 0.0:
             return float('nan')
         return float(self.antiresonance * np.sqrt(1.0 + self.inertia / self.motor[0]))
@@ -93,11 +93,11 @@ def fit_springs(
     Parameters
     ----------
     robot : Robot
-        Whose inertias and gravity are known.
+        Robot with known inertias and gravity.
     sides : sequence of (Recording, Recording)
-        Motors at the joints and links, sampled together.
+        Recordings of motors (at the joints) and of links, with common timestamps.
     rng : numpy.random.Generator
-        Draws the blocks that intervals come from.
+        Random numbers for the bootstrap blocks of the intervals.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def fit_springs(
 
 
 def _stretches(motors: Recording, links: Recording) -> list[tuple[Motion, Motion]]:
-    """Return filtered motions of both sides without pauses; the torque is the motors'."""
+    """Return filtered motions of motors and links without pauses, with the motor torque."""
     period = motors.period
     sections = butter(4, CUTOFF, fs=1.0 / period, output='sos')
 

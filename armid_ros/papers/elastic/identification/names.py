@@ -30,7 +30,7 @@ def unpack(parameters: TwoLinkParameters) -> FloatArray:
 
 
 def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
-    """Return parameters with a vector of values, and the friction and drives of others."""
+    """Return parameters with new values; friction and drives are copied from others."""
     vector = np.asarray(values, dtype=float)
     pairs = vector[3:].reshape(len(PER_JOINT), 2)
     fields = {field: pair for (field, _, _), pair in zip(PER_JOINT, pairs, strict=True)}
@@ -39,7 +39,7 @@ def pack(values: npt.ArrayLike, like: TwoLinkParameters) -> TwoLinkParameters:
 
 
 def parameter_names(joints: tuple[str, ...]) -> tuple[ParameterName, ...]:
-    """Name the vector for an arm with these two joints."""
+    """Return the names of the vector's elements for an arm with these two joints."""
     rigid = [ParameterName(name, '', 'kg m^2') for name in ('alpha', 'beta', 'gamma')]
     own = [ParameterName(name, joint, unit) for _, name, unit in PER_JOINT for joint in joints]
     return (*rigid, *own)

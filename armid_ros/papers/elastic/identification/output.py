@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""elastic.json: what the three steps found, for programs to read."""
+"""The document elastic.json: results of the three steps."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def elastic_document(result: TwoInertiaIdentification, robot: str) -> dict[str, 
 
 
 def total_damping(result: TwoInertiaIdentification) -> list[dict[str, Any]]:
-    """Return dl + dm gear^2 of both joints, which is what is known of the two."""
+    """Return dl + dm gear^2 of both joints, the identifiable sum of the two."""
     assert result.tuning is not None
     estimate, gear = result.tuning.estimate, result.parameters.gear
     rows = []
@@ -87,7 +87,7 @@ def tuning_story(
     tuning: Tuning, start: TwoLinkParameters, truth: TwoLinkParameters
 ) -> dict[str, Any]:
     """
-    Compare a tuning with the arm that was simulated.
+    Return the errors of a tuning against the true parameters of a simulated arm.
 
     Returns
     -------

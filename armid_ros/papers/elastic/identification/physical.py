@@ -3,10 +3,10 @@
 """
 Step 3a: physical parameters of a decoupled joint from its identified frequency response.
 
-A first guess comes from the antiresonance and the resonance of the motor's velocity and from its
-slope below them: wa^2 = kg / J, wr^2 = kg (1 / J + 1 / Jm), v_m / tau -> 1 / ((Jm + J) s). Least
-squares on the logarithms of the responses to both inputs follow. The interaction torque has a free
-gain: a common error of its scale is no error of the joint.
+The initial value comes from the antiresonance and the resonance of the motor's velocity and from
+its slope below them: wa^2 = kg / J, wr^2 = kg (1 / J + 1 / Jm), v_m / tau -> 1 / ((Jm + J) s).
+Least squares on the logarithms of the responses to both inputs follow. The interaction torque has
+a free gain, so that an error of its scale does not bias the parameters of the joint.
 
 """
 
@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 ComplexArray = npt.NDArray[np.complex128]
-#: Where the responses are compared [Hz], and by how many frequencies, equally apart in logarithm.
+#: Frequency range of the comparison of responses [Hz], and number of logarithmic points.
 BAND = (1.0, 60.0)
 _POINTS = 120
 
@@ -76,14 +76,14 @@ def fit_joints(
     joints : sequence of str
         Their names.
     known : TwoLinkParameters
-        Gears, gamma and Coulomb friction, which are kept.
+        Gears, gamma and Coulomb friction, which are not changed.
 
     Returns
     -------
     fitted : TwoLinkParameters
         The arm.
     gain : ndarray, shape (2,)
-        Of the interaction torques; 1 where beta and gamma were right.
+        Gain of the interaction torques; 1 if beta and gamma are right.
 
     Raises
     ------

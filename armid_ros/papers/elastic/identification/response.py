@@ -4,10 +4,10 @@
 Closed-loop velocity responses of the two-link arm, with exact derivatives by its parameters.
 
 Many runs at once, as arrays; the derivatives come from the complex step, f(x + ih) = f + ih f',
-through every operation of the integration, friction included: what slips and what sticks is
-decided by the real part. The scheme is the plant's: the Pade approximation (2, 2) of the
-exponential for motors, springs and links, the middle of the step for what is not linear. Squire
-and Trapp 1998 for the complex step.
+through every operation of the integration, friction included: the real part decides which joints
+slip and which stick. The scheme is the plant's: the Pade approximation (2, 2) of the exponential
+for motors, springs and links, the middle of the step for what is not linear. Squire and Trapp 1998
+for the complex step.
 
 """
 
@@ -24,12 +24,12 @@ from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 
-#: Real values, or values with an infinitesimal change as their imaginary part.
+#: Real values, or complex values whose imaginary part is an infinitesimal change.
 DualArray = npt.NDArray[Any]
 #: Imaginary step: its square is lost in rounding, so the derivative has no truncation error.
 _STEP = 1e-30
 _ROUNDS = 16
-#: Parts that a sample is integrated in.
+#: Number of integration steps per sample.
 _SUBSTEPS = 2
 
 
@@ -41,7 +41,7 @@ class Steps:
     Attributes
     ----------
     q : ndarray, shape (E, 2)
-        Where the links stand at first [rad].
+        Initial positions of the links [rad].
     reference : ndarray, shape (N, E, 2)
         Reference velocities [rad/s].
     dt : float
@@ -49,7 +49,7 @@ class Steps:
     loop : VelocityLoop
         Gains.
     integral : ndarray, shape (E, 2)
-        What the integral of the loop holds at first [rad].
+        Initial integral of the loop [rad].
 
     """
 
@@ -61,7 +61,7 @@ class Steps:
 
     @classmethod
     def of(cls, runs: Sequence[ElasticRun], loop: VelocityLoop) -> Steps:
-        """Return the experiments of some runs, as long as the shortest of them."""
+        """Return the experiments of several runs, cut to the length of the shortest run."""
         count = min(len(run.motor) for run in runs)
         t = runs[0].motor.t
         return cls(
@@ -90,10 +90,10 @@ def sensitivities(
     steps : Steps
         The experiments.
     parameters : TwoLinkParameters
-        Where to differentiate.
+        Parameters at which the derivatives are taken.
     directions : ndarray, shape (D, 15)
-        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques; they
-        should be of the size of these.
+        Changes of the parameters of ``names.unpack``, then of the motors' Coulomb torques;
+        directions should have the magnitude of the parameters.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def sensitivities(
 
 def ringing(steps: Steps, parameters: TwoLinkParameters) -> FloatArray:
     """
-    Return derivatives of the velocities by what an arm at rest may still do.
+    Return derivatives of the velocities with respect to initial twist and link velocity.
 
     Returns
     -------
@@ -176,7 +176,7 @@ class _Arm:
             -(self.motor_damping + self.spring_damping) / self.rotor
         )
         self.a[:, 2 + joints, 4 + joints] = self.spring_damping / self.rotor
-        # What springs, dampers and friction of the links do to the links, before the inertia.
+        # Torques of springs, dampers and friction on the links.
         self.pull = np.zeros((batch, 2, 6), dtype)
         self.pull[:, joints, joints] = self.stiffness
         self.pull[:, joints, 2 + joints] = self.spring_damping
@@ -238,7 +238,7 @@ class _Arm:
 def _friction(
     response: DualArray, free: DualArray, level: DualArray, modes: npt.NDArray[np.int_]
 ) -> tuple[DualArray, npt.NDArray[np.int_]]:
-    """Find friction torques, (B, 2): bounds for what slips, whatever stops the rest."""
+    """Return friction torques, (B, 2): Coulomb torque if slipping, holding torque if sticking."""
     # response: change of velocity at the end of the step per torque; free: what that velocity is
     # without friction; modes, a first guess: 1 slips forwards, -1 backwards, 0 sticks
     modes = modes.copy()

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Step 1: the arm as if its joints were rigid, at frequencies far below its resonances.
+Step 1: the arm with rigid joints, at frequencies far below its resonances.
 
-tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). Motor and link inertia
-of joint 1 cannot be told apart then, nor motor and link friction of any joint; alpha + mm1 gear^2,
-beta, gamma, mm2 gear^2, the sums of friction and the Coulomb torques can.
+tau = (M + diag(mm gear^2)) q'' + h + (dl + dm gear^2) q' + fm gear sgn(q'). Identifiable are alpha
++ mm1 gear^2, beta, gamma, mm2 gear^2, the sums of friction and the Coulomb torques. Motor and link
+inertia of joint 1 are not identifiable apart, nor are motor and link friction of any joint.
 
 """
 
@@ -25,13 +25,13 @@ from armid_ros.papers.elastic.identification.interaction import direction, link_
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-#: What is kept of a signal [Hz]: a tenth of the lowest resonance of such arms, and some more.
+#: Cut-off of the signals [Hz]: about a tenth of the lowest resonance of such arms.
 CUTOFF = 2.5
-#: Ends that the filter has not settled in [s].
+#: Length of the ends in which the filter has not settled [s].
 _ENDS = 0.4
-#: Rows kept in the time of a period at the cutoff, and periods over which their errors last.
+#: Rows per period of the cut-off frequency, and correlation time of errors in periods.
 _KEPT, _LASTING = 10, 2
-#: Columns of which one is this share of the others are not identifiable apart.
+#: Least singular value relative to the largest for identifiable columns.
 _APART = 1e-6
 
 
@@ -63,8 +63,9 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     """
     Fit the rigid arm to slow motion by least squares, each joint weighted by its own noise.
 
-    Torques and columns pass the same low-pass filter. Accelerations are those of the links'
-    accelerometers, positions those of their encoders, friction follows the motors.
+    Torques and columns pass the same low-pass filter. Accelerations come from accelerometers on
+    the links, positions from encoders at the links. Friction depends on the velocity of the
+    motors.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
     sizes = np.linalg.eigvalsh(products / np.outer(scale, scale))
     if sizes[0] < _APART**2 * sizes[-1]:
         raise IdentificationError(
-            'the slow motion does not tell the rigid parameters apart; let both joints '
+            'the slow motion does not make the rigid parameters identifiable; let both joints '
             'accelerate in several poses'
         )
     solution = solve(problem)
@@ -103,7 +104,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
         *(ParameterName('dl + dm gear^2', joint, 'N m s/rad') for joint in joints),
         *(ParameterName('fm gear', joint, 'N m') for joint in joints),
     )
-    # rows are closer than the filter lets errors change
+    # errors of neighbouring rows are correlated by the filter
     rows, target = weighted_rows(problem, solution.weights)
     scores = rows * (target - rows @ solution.values)[:, np.newaxis]
     scores = scores.reshape(-1, len(joints), rows.shape[1]).sum(axis=1)
@@ -116,7 +117,7 @@ def fit_rigid(runs: Sequence[ElasticRun]) -> RigidFit:
 
 
 def _rows(run: ElasticRun, source: str) -> list[Regression]:
-    """Return the filtered rows of an experiment; none where it is shorter than the filter."""
+    """Return the filtered rows of an experiment; None if it is shorter than the filter."""
     motor, link = run.motor, run.link
     assert motor.tau is not None
     dt = float(motor.t[-1] - motor.t[0]) / (len(motor) - 1)
@@ -127,7 +128,7 @@ def _rows(run: ElasticRun, source: str) -> list[Regression]:
     table[:, :, :3] = link_columns(link.q, link.dq, link.ddq)
     table[:, 1, 3] = link.ddq[:, 1]
     table[:, [0, 1], [4, 5]] = motor.dq
-    # drives hold their torque from one sample to the next: that is half a sample later
+    # drives hold their torque between samples, which delays it by half a sample
     between = 0.5 * (table[:-1] + table[1:])
     between[:, [0, 1], [6, 7]] = direction(motor.dq)[:-1]
     between[:, :, 8] = motor.tau[:-1]

@@ -3,12 +3,11 @@
 """
 Multivariable subspace identification: PO-MOESP, of many experiments at once.
 
-Poles and output matrix come from the column space of what the past tells of the future (Verhaegen
+Poles and output matrix come from the column space of the projection of future on past (Verhaegen
 1994, past inputs and outputs as instruments, `ordinary MOESP` of Verhaegen and Dewilde 1992 with
 past outputs added); the input matrix then follows from a linear regression on whole simulated
-experiments, with free initial states. Written here for what the arm needs: many experiments with
-states of their own, and inputs that are not held over a sample, as a torque that comes from the
-motion of the arm is not.
+experiments, with free initial states. This implementation supports many experiments, each with its
+initial state, and inputs that vary within a sample, such as interaction torques.
 
 """
 
@@ -25,9 +24,9 @@ import numpy.typing as npt
 from scipy.signal import lfilter
 
 ComplexArray = npt.NDArray[np.complex128]
-#: What an input does between samples: stay ('zero') or go straight to the next one ('first').
+#: Interpolation of an input between samples: constant ('zero') or linear ('first').
 Hold = Literal['zero', 'first']
-#: Samples of the past, and of the future, that are related.
+#: Number of samples of the past, and of the future.
 _HORIZON = 24
 
 
@@ -94,13 +93,13 @@ def identify_subspace(
     order : int
         Number of states r.
     hold : sequence of {'zero', 'first'}
-        What each input does between samples.
+        Interpolation of each input between samples.
 
     Raises
     ------
     IdentificationError
-        If the data are too short, an input does nothing, or the poles found are not those of a
-        sampled system.
+        If the data are too short, an input or output is always zero, or the poles are not those of
+        a sampled system.
 
     """
     needed = 4 * _HORIZON * (experiments[0].u.shape[1] + experiments[0].y.shape[1])
@@ -122,7 +121,7 @@ def identify_subspace(
     if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
         raise IdentificationError(
             f'subspace identification: order {order} gives poles that no sampled system has; '
-            'take more data or another order'
+            'use more data or another order'
         )
     poles = np.log(eigenvalues.astype(complex)) / dt
     modal = c @ vectors
@@ -196,7 +195,7 @@ def _inputs(
 
 
 def _driven(u: FloatArray, dt: float, poles: ComplexArray, hold: Hold) -> ComplexArray:
-    """Return what an input does to modes with unit input gain, shape (N, r)."""
+    """Return the response of modes with unit input gain to an input, shape (N, r)."""
     states = np.empty((len(u), len(poles)), complex)
     for k, pole in enumerate(poles):
         factor = np.exp(pole * dt)

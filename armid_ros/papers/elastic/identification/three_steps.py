@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The three steps, one after the other: from measured experiments to physical parameters."""
+"""The three steps in order: from measured experiments to physical parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from armid_ros.simulation.motor_control import VelocityLoop
 import numpy as np
 import numpy.typing as npt
 
-#: Quantiles of the poses that stand for all of them.
+#: Quantiles of the poses that represent all poses.
 _SHARES = np.linspace(0.02, 0.98, 25)
 
 
@@ -49,7 +49,7 @@ class MeasuredJoint:
 @dataclass(frozen=True, eq=False)
 class TwoInertiaIdentification:
     """
-    What the three steps found.
+    Results of the three steps.
 
     Attributes
     ----------
@@ -58,19 +58,19 @@ class TwoInertiaIdentification:
     rigid : RigidFit
         Step 1.
     measured : tuple of MeasuredJoint
-        Responses of no model, for comparison.
+        Measured responses without a model, for comparison.
     systems : tuple of StateSpace
         Step 2, of both joints.
     untuned : TwoLinkParameters
         Parameters after step 3a.
     interaction_gain : ndarray, shape (2,)
-        Of the interaction torques there; 1 where beta and gamma were right.
+        Gain of the interaction torques in step 3a; 1 if beta and gamma are right.
     experiments : int
         Number of experiments through the resonances.
     angles : ndarray, shape (S,)
         Poses of joint 2 that the experiments went through [rad].
     tuning : Tuning or None
-        Step 3b, where there were step responses.
+        Step 3b; None without step responses.
 
     """
 
@@ -107,21 +107,21 @@ def identify_two_inertia(
     runs : sequence of ElasticRun
         Experiments through the resonances, with some slow motion.
     drives : TwoLinkParameters
-        Gears and torque constants; nothing else of it is used.
+        Gears and torque constants; other parameters are not used.
     steps : sequence of ElasticRun
-        Step responses under a velocity loop, for the tuning; none leaves that out.
+        Step responses under a velocity loop for the tuning; without them there is no tuning.
     loop : VelocityLoop, optional
         The loop's gains.
     start : TwoLinkParameters, optional
-        Where the tuning begins, in place of what step 3a found; Coulomb friction is that of
-        step 1 all the same.
+        Initial values of the tuning instead of those of step 3a; Coulomb friction is always that
+        of step 1.
     progress : callable, optional
-        Is told the share that is done and what comes next.
+        Callback with the share that is done and the next step.
 
     Raises
     ------
     IdentificationError
-        If the data do not tell; the message says which step, and what to do.
+        If the data do not determine the parameters; the message names the step and the remedy.
 
     """
     if steps and loop is None:

@@ -1,14 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Stiffness of a joint with an encoder on either side, and how far it can be told from free play.
+Stiffness and free play of a joint with two encoders, and their correlation.
 
 The twist of motor against link is compliance times the torque in the transmission, plus half the
-backlash to the side of the flank that carries the load. That torque is the motor's less friction
-and acceleration of the rotor, so what follows the sign and the size of the velocity, and the
-acceleration, is fitted as well. Friction of the motor over stiffness, and lost motion that follows
-the direction of travel, are one number without another measurement; so are viscous friction of
-the motor over stiffness, and a delay between the encoders.
+backlash to the side of the flank that carries the load. That torque is the motor torque less
+friction and rotor acceleration. Parts of the twist in proportion to sign of velocity, velocity and
+acceleration are therefore fitted as well. Two pairs are not identifiable apart: Coulomb friction
+over stiffness and lost motion by direction of travel; viscous friction over stiffness and a delay
+between the encoders.
 
 """
 
@@ -26,20 +26,20 @@ from scipy.signal import butter, sosfiltfilt
 IntArray = npt.NDArray[np.intp]
 
 CUTOFF = 8.0
-#: Length of the blocks that intervals are drawn from [s], and how often.
+#: Length of the bootstrap blocks [s], and number of draws.
 _BLOCK, _DRAWS = 0.5, 400
-#: Torque within which the flank changes, as a share of the median size of the torque.
+#: Torque range in which the flank changes, as a share of the median torque.
 _MESHING = 0.05
-#: Velocity below which a joint counts as standing, as a share of the fastest.
+#: Velocity below which a joint is at rest, as a share of the largest velocity.
 _STANDING = 0.02
-#: Changes of flank that show free play.
+#: Least number of flank changes for an estimate of free play.
 _REVERSALS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class TwoEncoders:
     """
-    One joint as two encoders and a torque see it.
+    Signals of one joint: two encoders and a torque.
 
     Attributes
     ----------
@@ -48,9 +48,9 @@ class TwoEncoders:
     motor, link : ndarray, shape (N,)
         Positions on either side, both at the joint [rad].
     torque : ndarray, shape (N,)
-        Of the motor, at the joint; or what the spring carries, where that is known [N m].
+        Torque of the motor at the joint, or torque of the spring if known [N m].
     carried : bool
-        Whether the torque is what the spring carries, so that it needs no correction.
+        Whether the torque is that of the spring, so that it needs no correction.
 
     """
 
@@ -73,14 +73,13 @@ class TransmissionFit:
     stiffness_alone : tuple of float
         The same without free play.
     backlash : tuple of float
-        Whole free play [rad]; NaN within infinite bounds where the load changes flanks too
-        rarely for it to be seen.
+        Total free play [rad]; NaN with infinite bounds if the load changes flanks too rarely.
     delay : tuple of float
-        Twist per velocity: by how much the link's encoder is read later than the motor's [s].
+        Twist per velocity: delay of the link encoder after the motor encoder [s].
     correlation : float
         Of compliance and backlash, -1 to 1; near either end the two are collinear.
     reversals : int
-        Times that the load changed flanks; without any, backlash is an offset.
+        Number of flank changes; without any, backlash is an offset.
     explained : float
         R^2 of the whole model.
 
@@ -107,14 +106,14 @@ def fit_transmission(records: Sequence[TwoEncoders], rng: np.random.Generator) -
     Parameters
     ----------
     records : sequence of TwoEncoders
-        Recordings; each has an offset and a slope of its encoders of its own.
+        Recordings; each has its own offset and slope between the encoders.
     rng : numpy.random.Generator
-        Draws the blocks that the intervals come from.
+        Random numbers for the bootstrap blocks of the intervals.
 
     Raises
     ------
     IdentificationError
-        If the joint moves too little for it.
+        If the joint moves too little.
 
     """
     pieces = [_columns(record) for record in records]
@@ -168,7 +167,7 @@ def _columns(record: TwoEncoders) -> tuple[FloatArray, FloatArray, FloatArray, i
 def _joined(
     pieces: Sequence[tuple[FloatArray, FloatArray, FloatArray, int]],
 ) -> tuple[FloatArray, FloatArray, list[IntArray]]:
-    """Put recordings below each other, with slopes and offsets of their own, and cut blocks."""
+    """Stack recordings, each with its own slope and offset, and cut them into blocks."""
     rows = sum(len(twist) for _, twist, _, _ in pieces)
     shared, count = pieces[0][0].shape[1] - 2, len(pieces)
     table = np.zeros((rows, shared + 2 * count))
@@ -188,7 +187,7 @@ def _joined(
 def _drawn(
     table: FloatArray, twist: FloatArray, blocks: list[IntArray], draws: list[IntArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the least-squares solution, and those of blocks drawn at random."""
+    """Return the least-squares solution, and the solutions of random sets of blocks."""
     scale = np.linalg.norm(table, axis=0)
     scaled = table / scale
     normal = np.array([scaled[b].T @ scaled[b] for b in blocks])
@@ -209,7 +208,7 @@ def _interval(value: float, spread: FloatArray) -> tuple[float, float, float]:
 
 
 def _inverse(value: float, spread: FloatArray) -> tuple[float, float, float]:
-    """Turn a compliance into a stiffness; infinite where the interval reaches zero."""
+    """Convert a compliance into a stiffness; infinite if the interval contains zero."""
     compliance, lower, upper = _interval(value, spread)
     bounds = [1.0 / c if c > 0.0 else np.inf for c in (compliance, upper, lower)]
     return bounds[0], bounds[1], bounds[2]

@@ -1,16 +1,14 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Step 3b: the parameters that make simulated velocity responses the measured ones.
+Step 3b: fit of simulated velocity responses to the measured ones.
 
-Nonlinear least squares in the logarithms of the parameters, which keeps them positive and makes
-every one a scale factor. A rigid motion shows the sum of the viscous frictions of motor and link
-of a joint, dl + dm gear^2, alone, and what a vibration shows of their difference is far below its
-noise: free, the fit runs away with much noise; tied to the split of the start, which is not right,
-the error of the split goes into the stiffness, and no interval knows. So the split is believed to
-a factor of two, and the data decide how much of that is left. Coulomb torques begin where step 1
-has them and are free: taken for known, their error would go into all others. Nor does an arm that
-stands stand still: what its springs still ring with is noise of a known course in the velocities.
+Nonlinear least squares in the logarithms of the parameters, so that all stay positive. The data
+determine the sum of the viscous frictions of motor and link, dl + dm gear^2, but hardly their
+ratio. A free ratio makes the fit diverge, and a fixed one biases the stiffness. The ratio
+therefore has a prior with a standard deviation of a factor of two. Coulomb torques start from step
+1 and are nuisance parameters. An arm at rest still vibrates: these initial vibrations are treated
+as correlated noise of the velocities.
 
 """
 
@@ -38,13 +36,13 @@ from scipy.optimize import least_squares
 #: Places of dl and dm of both joints in the parameter vector, and of the Coulomb torques after it.
 _LINK, _MOTOR = (7, 8), (9, 10)
 _COULOMB = (SIZE, SIZE + 1)
-#: How far the split of friction and the Coulomb torques are believed: logarithms, one deviation.
+#: Prior standard deviations of the friction ratio and of the Coulomb torques (logarithms).
 _SPLIT, _BELIEVED = np.log(2.0), 0.1
-#: Motion of an arm that has come to rest, one standard deviation: twist of the springs [rad] and
-#: velocity of the links [rad/s], some tenths of a second after a step of 1 rad/s.
+#: Standard deviations of the initial vibration: twist of the springs [rad] and velocity of the
+#: links [rad/s], some tenths of a second after a step of 1 rad/s.
 _RINGING = np.array([1e-5, 1e-5, 1e-3, 1e-3])
 _ROUNDS = 3
-#: Residuals are looked at for this share of an experiment for whether they last (1 / share).
+#: Residuals are correlated over at most this fraction (1 / n) of an experiment.
 _LASTING = 10
 
 
@@ -76,7 +74,7 @@ class Tuning:
 
     @property
     def rms(self) -> tuple[float, float]:
-        """Root mean square of what is not explained before and after, noise included [rad/s]."""
+        """Root mean squares of the residuals before and after tuning, noise included [rad/s]."""
         return (
             float(np.sqrt(np.mean((self.before - self.measured) ** 2))),
             float(np.sqrt(np.mean((self.after - self.measured) ** 2))),
@@ -84,7 +82,7 @@ class Tuning:
 
 
 def _prior() -> FloatArray:
-    """Return the prior of the logarithms of factors, a row of unit deviation each, (4, 15)."""
+    """Return the prior of the logarithms of factors, rows of unit standard deviation, (4, 15)."""
     rows = np.zeros((4, SIZE + 2))
     for row, (link, motor) in enumerate(zip(_LINK, _MOTOR, strict=True)):
         rows[row, link], rows[row, motor] = 1.0 / _SPLIT, -1.0 / _SPLIT
@@ -105,7 +103,7 @@ def tune(
     runs : sequence of ElasticRun
         Measured responses to steps of the reference, from rest.
     start : TwoLinkParameters
-        Where to begin; its drives stay.
+        Initial parameters; the drives are not changed.
     loop : VelocityLoop
         Gains of the loop.
 
@@ -141,7 +139,7 @@ def tune(
         return np.vstack([slopes.reshape(-1, len(base)), prior])
 
     factors = np.zeros(len(base))
-    for _ in range(_ROUNDS):  # from the second on every sensor counts by its own noise
+    for _ in range(_ROUNDS):  # from the second pass on, every sensor is weighted by its own noise
         fit = least_squares(
             residual, factors, jac=jacobian, method='trf', x_scale='jac', xtol=1e-9
         )
@@ -152,7 +150,7 @@ def tune(
     after = arm(factors)
     found = unpack(after)
     rows, left = jacobian(factors), residual(factors)
-    # residuals last: scores of a sample are those of its channels, and the prior has none
+    # residuals are correlated: sum the scores over the channels of a sample, without the prior
     white_noise, data = _covariance(rows), len(left) - len(prior)
     scores = (rows * left[:, np.newaxis])[:data].reshape(*measured.shape, -1).sum(axis=2)
     lags = max(1, count // _LASTING)
@@ -170,10 +168,10 @@ def tune(
 
 @dataclass(frozen=True, eq=False)
 class _Whitener:
-    """What arms that ring at first put into velocities is taken from them."""
+    """Whitening of velocities for the initial vibrations of the arm."""
 
-    shapes: FloatArray  # (E, 4, N C): how ringing looks, orthonormal
-    shares: FloatArray  # (E, 4): what of each is taken away
+    shapes: FloatArray  # (E, 4, N C): orthonormal basis of the vibrations
+    shares: FloatArray  # (E, 4): share of each that is removed
 
     @classmethod
     def of(cls, steps: Steps, parameters: TwoLinkParameters, weight: FloatArray) -> _Whitener:
@@ -193,7 +191,7 @@ class _Whitener:
 
 
 def _covariance(jacobian: FloatArray) -> FloatArray:
-    """Return the covariance of the factors where the residuals have unit variance."""
+    """Return the covariance of the factors for residuals of unit variance."""
     scale = np.linalg.norm(jacobian, axis=0)
     if not np.all(scale > 0.0):
         raise IdentificationError(
@@ -202,7 +200,7 @@ def _covariance(jacobian: FloatArray) -> FloatArray:
     _, sizes, rows = np.linalg.svd(jacobian / scale, full_matrices=False)
     if sizes[-1] < 1e-10 * sizes[0]:
         raise IdentificationError(
-            'the step responses do not tell the parameters apart; add steps of both joints, in '
+            'the step responses do not determine the parameters; add steps of both joints, in '
             'several poses'
         )
     half = rows.T / sizes

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of an elastic arm under a velocity loop, and what its sensors make of them."""
+"""Simulated runs of an elastic arm under a velocity loop, and its sensors."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ import numpy.typing as npt
 @dataclass(frozen=True, eq=False)
 class Experiment:
     """
-    What is asked of an elastic arm that stands somewhere.
+    The inputs of an experiment with an elastic arm that starts from rest.
 
     Attributes
     ----------
     q : ndarray, shape (n,)
-        Where the links are [rad].
+        Initial positions of the links [rad].
     velocity : ndarray, shape (N, n)
         Reference of the velocity loop, a row per step [rad/s].
     torque : ndarray, shape (N, n), or None
-        What is added to the torque of the loop [N m].
+        Torque that is added to the torque of the loop [N m].
 
     """
 
@@ -41,7 +41,7 @@ class Experiment:
 @dataclass(frozen=True, eq=False)
 class ElasticSensors:
     """
-    Noise of encoders and accelerometers, standard deviations; perfect unless told otherwise.
+    Standard deviations of the noise of encoders and accelerometers, zero by default.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class ElasticSensors:
     position: npt.ArrayLike = 0.0
 
     def measure(self, run: ElasticRun, rng: np.random.Generator) -> ElasticRun:
-        """Return a true run as it is measured."""
+        """Return a run with sensor noise added."""
 
         def noisy(values: FloatArray, std: npt.ArrayLike) -> FloatArray:
             return np.asarray(values + np.asarray(std) * rng.standard_normal(values.shape))
@@ -84,12 +84,12 @@ def run_elastic(plant: Plant, loop: VelocityLoop, experiment: Experiment) -> Ela
     Run one experiment from rest, one row per step, and return the true motion.
 
     The loop sees the true velocity of the motors; the torque is held within the limits of the
-    robot. Accelerations of the motors are zero: nothing measures them.
+    robot. Accelerations of the motors are not measured, and set to zero.
 
     Raises
     ------
     TrajectoryError
-        If a link gets beyond its limits.
+        If a link exceeds its limits.
 
     """
     control, still = MotorControl(loop, plant.dt), np.zeros_like(experiment.velocity)

@@ -23,7 +23,7 @@ _STEP = 0.5
 #: Amplitude of the slow velocity [rad/s], and its lowest and highest frequency [Hz]; each
 #: experiment has its own.
 _SPEED, _SLOW = 0.8, (0.3, 1.0)
-#: How far the links begin from zero at most [rad].
+#: Largest initial position of the links [rad].
 _REACH = np.pi / 3.0
 
 
@@ -38,8 +38,8 @@ def resonance_experiments(
     Return experiments that excite all joints through their resonances, in many poses.
 
     Motors follow a slow sine of velocity under a loop of low gain, so that friction has one sign
-    most of the time, and get a multisine of torque on top. Poses are random, around the arm
-    stretched, where links act on each other most.
+    most of the time, and get a multisine of torque on top. Poses are random, around the stretched
+    arm, in which interaction is largest.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def step_experiments(
     Parameters
     ----------
     poses, velocities : sequence of array_like, each of shape (n,)
-        Where each begins [rad], and what it asks for [rad/s].
+        Initial position [rad] and reference velocity [rad/s] of each experiment.
 
     """
     steps = round(_STEP / _DT)

@@ -1,3 +1,3 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is shown of an arm with elastic joints."""
+"""Report on an arm with elastic joints."""

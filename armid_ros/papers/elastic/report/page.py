@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of two links on springs: how stiff they are, and how the joints answer."""
+"""The report of two links on springs: stiffness and responses of the joints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armid_ros.report.provenance import Provenance
 from armid_ros.report.sections.frame import Origin, VerdictSection
 from armid_ros.robots.two_link import TwoLinkParameters
 
-#: How far the measured, decoupled response may be from that of the parameters [dB rms].
+#: Largest difference of measured decoupled response and model for a good grade [dB rms].
 _CLOSE_DB = 0.5
 
 
@@ -31,13 +31,13 @@ def elastic_report(
     Parameters
     ----------
     result : TwoInertiaIdentification
-        What the three steps found.
+        Results of the three steps.
     robot : str
         Its name.
     known : TwoLinkParameters or None
-        What the parameters are compared with.
+        Reference parameters for comparison.
     source : str
-        Where that comes from, in words.
+        Source of the reference parameters.
     provenance : Provenance
         Files, versions, settings, seed.
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of two links on springs, with intervals, against those that are known."""
+"""Parameters of two links on springs with intervals, and reference parameters."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ def parameters_section(
     result: TwoInertiaIdentification, known: TwoLinkParameters | None, source: str
 ) -> ContentSection:
     """
-    Show parameters with intervals against those that are known.
+    Return a section with parameters, intervals and reference parameters.
 
     Parameters
     ----------
     result : TwoInertiaIdentification
-        What was found.
+        Results of the identification.
     known : TwoLinkParameters, or None
-        What it is compared with.
+        Reference parameters for comparison.
     source : str
-        Where that comes from.
+        Source of the reference parameters.
 
     """
     names = parameter_names(result.joints)
@@ -69,7 +69,7 @@ def parameters_section(
 
 
 def rigid_section(fit: RigidFit) -> ContentSection:
-    """Show what slow motion tells of the arm as if its joints were rigid."""
+    """Return a section with the parameters of step 1, the arm with rigid joints."""
     estimate = fit.estimate
     rows = [
         (pretty(name.name), name.joint, *measured(value, HALF_WIDTH * std), pretty(name.unit))

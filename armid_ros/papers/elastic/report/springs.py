@@ -24,7 +24,7 @@ _MOTORS = (
 
 
 def _springs(found: Sequence[SpringEstimate]) -> ContentSection:
-    """Show stiffness, free play and motor of every joint."""
+    """Return a section with stiffness, free play and motor of every joint."""
     springs, motors = [], []
     for one in found:
         fit = one.transmission

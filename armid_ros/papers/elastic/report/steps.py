@@ -17,7 +17,7 @@ from armid_ros.report.notation import digits
 import numpy as np
 import numpy.typing as npt
 
-#: What is shown, and what responses are compared in [Hz].
+#: Frequency ranges of the plots and of the comparison of responses [Hz].
 _SHOWN, _COMPARED = (2.0, 100.0), (5.0, 60.0)
 _POINTS = 300
 _ROLES: tuple[Role, Role] = ('residual', 'predicted')
@@ -25,7 +25,7 @@ _SIZE = 'size [dB re rad/(N m s)]'
 
 
 def responses_section(result: TwoInertiaIdentification) -> ContentSection:
-    """Show frequency responses from motor torque to motor velocity of both joints."""
+    """Return a section with responses from motor torque to motor velocity of both joints."""
     text = (
         'From motor torque to motor velocity. The torque between the links is a second input. '
         'Each joint then responds like one motor and one link on a spring. Drag across a plot, or '
@@ -42,7 +42,7 @@ def responses_section(result: TwoInertiaIdentification) -> ContentSection:
 
 
 def decibels_apart(result: TwoInertiaIdentification, joint: int) -> float:
-    """Return how far measured and physical responses of a joint are apart, 5 to 60 Hz [dB]."""
+    """Return the difference of measured and model responses of a joint, 5 to 60 Hz [dB]."""
     measured = result.measured[joint]
     seen = (measured.frequency >= _COMPARED[0]) & (measured.frequency <= _COMPARED[1])
     ideal = ideal_response(result.parameters, joint, measured.frequency[seen])[:, 0, 0]
@@ -133,7 +133,7 @@ def _degrees(values: npt.NDArray[np.complex128]) -> FloatArray:
 
 
 def steps_section(tuning: Tuning) -> ContentSection:
-    """Show velocities of the links after steps of the reference, before and after tuning."""
+    """Return a section with link velocities after reference steps, before and after tuning."""
     before, after = tuning.rms
     text = (
         'Velocities of the links after steps of the reference. Before tuning '

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""Springs between two machines while both move: samples in, present stiffness out."""
+"""Online identification of the springs between two machines."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from armid_ros.papers.exo.identification.slack import find_slack, Slack
 from armid_ros.recording import Recording
 import numpy as np
 
-#: Samples are averaged to about this rate [Hz]: far above how people move, and cheap.
+#: Samples are averaged to about this rate [Hz], far above the frequencies of human motion.
 _RATE = 100.0
-#: Springs without slack that leave this many times the noise, as a mean square, are worth a look.
+#: Ratio of the mean square residual to the noise above which slack is fitted.
 _SIGN = 1.5
 
 
 @dataclass(frozen=True)
 class InteractionSettings:
     """
-    How springs are identified online.
+    Settings of the online identification of springs.
 
     Attributes
     ----------
     memory : float
-        How much of the past counts [s].
+        Length of the time window of the estimate [s].
     period : float
         Time between two estimates [s].
     slack_period : float
-        Time between two looks for slack, which take several estimates [s].
+        Time between two fits of slack, which need several estimates [s].
     inertias : {'known', 'free'}
-        Whether the machine's inertias are those of its description or are estimated as well.
+        Whether the inertias of the machine are taken from its description or estimated.
 
     """
 
@@ -47,7 +47,7 @@ class InteractionSettings:
     inertias: Inertias = 'known'
 
     def __post_init__(self) -> None:
-        """Refuse times that do not fit."""
+        """Raise IdentificationError if the times are inconsistent."""
         if not (self.memory >= 3.0 and 0.0 < self.period <= self.memory and self.slack_period > 0):
             raise IdentificationError(
                 f'a memory of {self.memory:g} s and estimates every {self.period:g} s: the memory '
@@ -57,7 +57,7 @@ class InteractionSettings:
 
 @dataclass
 class _Averages:
-    """Means of successive samples, as many as the rate asks for."""
+    """Means of successive samples at the averaged rate."""
 
     memory: float
     t: deque[float] = field(default_factory=deque)
@@ -95,16 +95,17 @@ class OnlineInteraction:
     Parameters
     ----------
     machines : TiedMachines
-        Both, and where springs may be.
+        Both machines, and the attachment points of the springs.
     settings : InteractionSettings
-        Memory and how often.
+        Time window and periods.
 
     Attributes
     ----------
     together, separate : Interaction or None
-        One stiffness for all springs, and one for each; None before there is enough.
+        Estimates with one stiffness for all springs, and with one for each; None before there are
+        enough data.
     slack : Slack or None
-        How loose the straps are; None while springs without slack explain the torques.
+        Slack of the straps; None while springs without slack explain the torques.
 
     """
 
@@ -115,26 +116,26 @@ class OnlineInteraction:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Discard all samples and estimates."""
         self.interrupt()
         self.together: Interaction | None = None
         self.separate: Interaction | None = None
         self.slack: Slack | None = None
 
     def interrupt(self) -> None:
-        """Forget the motion so far, which what comes does not continue; estimates stay."""
+        """Discard the samples, for a break in the motion; estimates are kept."""
         self._own.clear()
         self._far.clear()
         self._due: float | None = None
         self._slack_due: float | None = None
 
     def take_other(self, t: float, q: FloatArray) -> None:
-        """Take in positions of the other machine, shape (m,) [rad], at a time [s]."""
+        """Add a sample of positions of the other machine, shape (m,) [rad], at a time [s]."""
         self._far.take(t, q)
 
     def take(self, t: float, q: FloatArray, tau: FloatArray) -> bool:
         """
-        Take in positions and torques of the machine.
+        Add a sample of positions and torques of the machine.
 
         Parameters
         ----------
@@ -151,7 +152,8 @@ class OnlineInteraction:
         Raises
         ------
         IdentificationError
-            If the motion of the last seconds shows no springs, or the machines share no time.
+            If the last seconds do not identify the springs, or the times of the machines do not
+            overlap.
 
         """
         self._own.take(t, np.concatenate([q, tau]))

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether straps hang loose: how far they give before they pull.
+Slack of the straps: the extension at which a strap starts to pull.
 
-A strap with slack pulls with k (|D| - slack) along D, and not at all where it is drawn out less.
-The slack is not linear: the stiffness is fitted at several slacks, and that of the best fit is
-refined by the parabola through it and its neighbours, whose bend says how sure it is.
+A strap with slack pulls with k (|D| - slack) along D if |D| exceeds the slack, and not otherwise.
+The torque is nonlinear in the slack, so the stiffness is fitted at several slacks. A parabola
+through the best fit and its neighbours gives the slack, and its curvature the standard deviation.
 
 """
 
@@ -18,25 +18,25 @@ from armid_ros.identification.ties.problem import InteractionProblem
 from armid_ros.identification.ties.stiffness import identify_interaction, Interaction
 import numpy as np
 
-#: Slacks that are tried [m]; a strap that hangs looser is off.
+#: Slacks to try [m]; a strap with more slack is not worn.
 _TRIED = (0.0, 0.001, 0.002, 0.004, 0.006)
-#: Steps to either side of the best one, successively [m].
+#: Successive step sizes on either side of the best slack [m].
 _REFINED = (5e-4, 2e-4)
-#: Drop of the misfit, in units of its own noise, from which straps are slack: z > 5.
+#: Decrease of the misfit, in standard deviations of its noise, above which slack is significant.
 _LEAST_GAIN = 25.0
 
 
 @dataclass(frozen=True)
 class Slack:
     """
-    How far the ties between two machines give before they pull.
+    The slack of the ties between two machines.
 
     Attributes
     ----------
     value, std : float
-        The slack of all of them and its standard deviation [m].
+        Common slack of all ties and its standard deviation [m].
     gain : float
-        Drop of the misfit from that without slack, in units of its noise.
+        Decrease of the misfit relative to the fit without slack, in units of its noise.
     interaction : Interaction
         The stiffnesses with this slack.
 
@@ -49,7 +49,7 @@ class Slack:
 
     @property
     def seen(self) -> bool:
-        """Whether straps are surely slack."""
+        """Whether the slack is significant."""
         return self.gain > _LEAST_GAIN
 
 
@@ -60,7 +60,7 @@ def find_slack(problem: Callable[[float], InteractionProblem]) -> Slack:
     Parameters
     ----------
     problem : callable
-        Sets up the regression for a slack [m].
+        Callback that returns the regression for a slack [m].
 
     """
     fits: dict[float, Interaction] = {}

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The interaction identifier node: joint states of two machines in, what ties them out."""
+"""The interaction identifier node: identifies the springs between two machines."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from sensor_msgs.msg import JointState
 
-#: Messages held while an estimate is made: several seconds at 1 kHz.
+#: Queue length of subscriptions during an estimate: several seconds at 1 kHz.
 _DEPTH = 10_000
 _TOPICS = ('exo/joint_states', 'human/joint_states')
-#: What is taken of the messages of either.
+#: Fields that are used of the messages of each machine.
 _FIELDS = (('position', 'effort'), ('position',))
-#: What is said of joint states that are left out.
+#: Warning about joint states that are left out.
 _DAMAGED = DISTURBANCES | {
     'spike': 'joint states that jump for single samples are left out',
     'pulse': 'torques that jump for single samples, as an arm may do, are left out',
@@ -43,14 +43,14 @@ _DAMAGED = DISTURBANCES | {
 
 class InteractionIdentifierNode(ArmidNode):
     """
-    Finds what ties the exoskeleton to its wearer, from its torques and the angles of both.
+    Identifies the springs between exoskeleton and wearer, from torques and both's angles.
 
     Attributes
     ----------
     identifier : OnlineInteraction
-        Does it.
+        The online identifier.
     received : int
-        Joint states received of both.
+        Number of joint states received from both machines.
 
     """
 
@@ -109,7 +109,7 @@ class InteractionIdentifierNode(ArmidNode):
         return str(self.identifier.machines.robot.name)
 
     def match(self) -> None:
-        """Look at who publishes joint states, and say at once when they stop or come again."""
+        """Find the publishers of joint states, and report when they stop or resume."""
         for topic in self.topics:
             topic.match()
         stopped = any(fresh.stopped for fresh in self.freshness)
@@ -118,7 +118,7 @@ class InteractionIdentifierNode(ArmidNode):
             self.publish_diagnostics()
 
     def reset(self) -> str:
-        """Forget everything."""
+        """Discard all samples and estimates."""
         self.identifier.reset()
         for machine, gate in enumerate(self._gates):
             gate.reset()
@@ -126,7 +126,7 @@ class InteractionIdentifierNode(ArmidNode):
         return 'the estimate begins anew'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say what ties the machines."""
+        """Return the estimated stiffnesses for diagnostics."""
         core = self.identifier
         values: dict[str, object] = {'received': self.received}
         for part in (core.together, core.separate):
@@ -144,13 +144,13 @@ class InteractionIdentifierNode(ArmidNode):
         return '; '.join(filter(None, (f.trouble() for f in self.freshness))), values
 
     def level(self, troubled: bool) -> bytes:
-        """Return STALE when joint states of a machine have stopped."""
+        """Return STALE if the joint states of a machine have stopped."""
         if any(fresh.stopped for fresh in self.freshness):
             return DiagnosticStatus.STALE
         return super().level(troubled)
 
     def _take(self, machine: int, message: JointState) -> None:
-        """Take what the machine (0) or its wearer (1) sends."""
+        """Process joint states of the machine (0) or of its wearer (1)."""
         self.received += 1
         self.freshness[machine].heard()
         topic, n = _TOPICS[machine], len(self._joints[machine])
@@ -169,7 +169,7 @@ class InteractionIdentifierNode(ArmidNode):
                 self.complaints.say(topic, str(error))
 
     def _signals(self, machine: int, message: JointState) -> list[StreamSample]:
-        """Return samples of what a machine sends, without those that are damaged."""
+        """Return the samples of a message; raise RecordingError if the message is damaged."""
         topic, gate, fields = _TOPICS[machine], self._gates[machine], _FIELDS[machine]
         try:
             order = joint_places(self._joints[machine], message.name)
@@ -179,7 +179,7 @@ class InteractionIdentifierNode(ArmidNode):
                     raise RecordingError(f'{len(message.name)} names but {len(part)} of {name}')
             signal = np.concatenate([part[order] for part in parts])
             if not np.all(np.abs(signal) <= LARGEST):
-                raise RecordingError('numbers that no machine has')
+                raise RecordingError('values that no machine reaches')
             t = self._time(message)
         except RecordingError as error:
             self.complaints.say(topic, f'{topic}: {error}')
@@ -201,7 +201,7 @@ class InteractionIdentifierNode(ArmidNode):
     def _time(self, message: JointState) -> float:
         stamp = message.header.stamp
         if stamp.sec < 0 or stamp.nanosec >= 10**9:
-            raise RecordingError('a stamp that is no time')
+            raise RecordingError('an invalid timestamp')
         if self._epoch is None:
             self._epoch = stamp.sec
         return float(stamp.sec - self._epoch) + 1e-9 * stamp.nanosec

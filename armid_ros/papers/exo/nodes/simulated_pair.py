@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated leg pair node: an exoskeleton and its wearer, each with its joint states."""
+"""The simulated leg pair node: publishes joint states of an exoskeleton and its wearer."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ ALL = 'all'
 
 class SimulatedPairNode(ArmidNode):
     """
-    The shipped leg pair, stepping to and fro, on exo/joint_states and human/joint_states.
+    Publishes the stepping leg pair on exo/joint_states and human/joint_states.
 
-    A pair that has fallen, as all joints driven by torque in open loop do, says so and publishes
-    nothing more until ~/reset.
+    With all joints driven by torque in open loop the pair falls. The node then reports the fall
+    and publishes nothing until ~/reset.
 
     """
 
@@ -66,14 +66,14 @@ class SimulatedPairNode(ArmidNode):
 
     def __init__(self, start_ns: int | None = None, **kwargs: Any) -> None:
         """
-        Make the node.
+        Create the node.
 
         Parameters
         ----------
         start_ns : int, optional
-            Stamp of the beginning [ns]; by default that of the node's clock.
+            First timestamp [ns]; by default the time of the node's clock.
         **kwargs
-            For rclpy's Node.
+            Passed to Node of rclpy.
 
         """
         super().__init__('simulated_pair', **kwargs)
@@ -95,11 +95,11 @@ class SimulatedPairNode(ArmidNode):
 
     @property
     def stamp_ns(self) -> int:
-        """Stamp of the present state [ns]."""
+        """Timestamp of the present state [ns]."""
         return self._origin_ns + round(self.pair.t * 1e9)
 
     def step(self) -> int:
-        """Move on to the next sample, publish it on both topics, and return its stamp [ns]."""
+        """Simulate the next sample, publish it on both topics, and return its timestamp [ns]."""
         if self.pair.fallen:
             return self.stamp_ns
         sample = self.pair.advance()
@@ -112,7 +112,7 @@ class SimulatedPairNode(ArmidNode):
         return self.stamp_ns
 
     def catch_up(self) -> None:
-        """Move as far as real time has, times the factor; what cannot be made up is given up."""
+        """Simulate up to real time times the factor; a delay that is too long is dropped."""
         if not self.pair.fallen:
             factor = self.value('real_time_factor')
             skipped = self.real_time.catch_up(factor, 1.0 / self.value('rate'))
@@ -120,14 +120,14 @@ class SimulatedPairNode(ArmidNode):
                 self._origin_ns += round(skipped * 1e9)
 
     def reset(self) -> str:
-        """Put both back to where they began; time goes on."""
+        """Return both machines to the initial state; time continues."""
         self._origin_ns = self.stamp_ns
         self.pair.reset()
         self.real_time.begin()
-        return 'both are where they began'
+        return 'both are in the initial state'
 
     def condition(self) -> tuple[str, Mapping[str, object]]:
-        """Say whether the pair still stands, and whether it keeps up with real time."""
+        """Return whether the pair stands, and whether the simulation keeps up with real time."""
         values = {
             'simulated_time': self.pair.t,
             'off_the_gait_deg': math.degrees(self.pair.deviation),

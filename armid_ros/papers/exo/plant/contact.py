@@ -21,7 +21,7 @@ import numpy as np
 @dataclass(frozen=True)
 class Ground:
     """
-    What the ground does to a point that touches it.
+    Contact parameters of the ground.
 
     Attributes
     ----------
@@ -34,8 +34,8 @@ class Ground:
     friction : float
         mu [-].
     creep : float
-        Sliding speed at which friction has three quarters of its most [m/s]; the source does not
-        say how its engine goes from rest to sliding.
+        Sliding speed at three quarters of the largest friction [m/s]; the source does not describe
+        the transition from rest to sliding.
 
     """
 
@@ -52,7 +52,7 @@ class Ground:
         Parameters
         ----------
         height, rising, sliding : ndarray, shape (...)
-            Of the points above the ground [m], and their velocity up and forward [m/s].
+            Height of the points above the ground [m], and their velocity up and forward [m/s].
 
         Returns
         -------

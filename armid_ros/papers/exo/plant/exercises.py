@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Motions that a person can give for an identification, one foot staying where it is.
+Exercises of a person for an identification, with one foot on the ground.
 
 Each is a sum of a few sines of hip and knee of both legs; the stance foot is flat and the trunk
 upright, as in all of the pair's motions on one foot. The machine follows its wearer with less
@@ -22,14 +22,14 @@ import numpy as np
 @dataclass(frozen=True)
 class Exercise:
     """
-    One motion.
+    An exercise.
 
     Attributes
     ----------
     what : str
-        What the person does.
+        Description of the motion of the person.
     middle, reach : tuple of float, length 4
-        Of stance hip and knee, swing hip and knee [deg].
+        Mean and amplitude of stance hip and knee, swing hip and knee [deg].
     period : float
         [s].
 
@@ -41,7 +41,7 @@ class Exercise:
     period: float
 
 
-#: By name; steps are those of the gait, to and fro.
+#: Exercises by name; steps follow the gait, forward and back.
 EXERCISES = {
     'step': Exercise('step forward and back', (0.0,) * 4, (0.0,) * 4, 1.8),
     'quick_step': Exercise('the same, twice as quickly', (0.0,) * 4, (0.0,) * 4, 0.9),
@@ -64,7 +64,7 @@ EXERCISES = {
 
 def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None) -> PairMotion:
     """
-    Let the shipped pair, on one foot, do an exercise.
+    Return the motion of the shipped pair, on one foot, during an exercise.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def exercise(pair: TiedPair, name: str, t: FloatArray, gait: Gait | None = None)
     t : ndarray, shape (N,)
         Time [s].
     gait : Gait, optional
-        Of steps; the shipped one by default.
+        Gait for stepping; the shipped one by default.
 
     """
     plan = EXERCISES[name]

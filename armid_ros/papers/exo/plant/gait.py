@@ -3,8 +3,8 @@
 """
 Walking: hip, knee and ankle over a gait cycle, and the joint motion of both legs from it.
 
-A leg is known by its phase, 0 at heel strike; the other leg is half a cycle later. The stance foot
-stays flat and the trunk upright, so that the stance ankle is knee - hip.
+The phase of a leg is 0 at heel strike; the other leg is half a cycle later. The stance foot stays
+flat and the trunk upright, so that the stance ankle is knee - hip.
 
 """
 
@@ -20,7 +20,7 @@ from armid_ros.motion import FloatArray, Motion, read_only
 from armid_ros.papers.exo.assumptions import leg_pair_file
 import numpy as np
 
-#: Harmonics of the series through a gait; walking has nothing beyond.
+#: Number of harmonics of a gait; higher ones are negligible in walking.
 _HARMONICS = 6
 _COLUMNS = ['phase', 'hip_deg', 'knee_deg', 'ankle_deg']
 
@@ -55,7 +55,7 @@ class Gait:
         return cls(cosine, np.vstack([np.zeros((1, 3)), solution[harmonics + 1 :]]))
 
     def __call__(self, phase: FloatArray, derivative: int = 0) -> FloatArray:
-        """Return angles or a derivative by the phase, shape (N, 3), at phases of shape (N,)."""
+        """Return angles or their derivative with respect to phase, (N, 3), at phases (N,)."""
         w = 2.0 * np.pi * np.arange(len(self.cosine))
         turn = np.outer(phase, w) + derivative * np.pi / 2.0
         return np.asarray(
@@ -66,7 +66,7 @@ class Gait:
 
 class Phase(NamedTuple):
     """
-    Where in the gait cycle a leg is, 0 at heel strike.
+    The phase of a leg in the gait cycle, 0 at heel strike.
 
     Attributes
     ----------
@@ -81,12 +81,12 @@ class Phase(NamedTuple):
 
 
 def steady_phase(t: FloatArray, cycle_time: float, start: float = 0.0) -> Phase:
-    """Return the phase of walking on, from a phase at t = 0."""
+    """Return the phase of steady walking, given the phase at t = 0."""
     return Phase(start + t / cycle_time, np.full_like(t, 1.0 / cycle_time), np.zeros_like(t))
 
 
 def stepping_phase(t: FloatArray, period: float, start: float, stop: float) -> Phase:
-    """Return the phase of stepping forward from start to stop and back, over and over."""
+    """Return the phase of repeated stepping from start to stop and back."""
     w, half = 2.0 * np.pi / period, (stop - start) / 2.0
     return Phase(
         start + half * (1.0 - np.cos(w * t)),
@@ -107,7 +107,7 @@ def read_gait(path: Path | None = None) -> Gait:
     Raises
     ------
     TrajectoryError
-        If the file has other columns, something that is no number, or too few rows.
+        If the file has other columns, invalid numbers, or too few rows.
 
     """
     path = path or leg_pair_file('human_legs/gait.csv')
@@ -119,9 +119,9 @@ def read_gait(path: Path | None = None) -> Gait:
     try:
         rows = np.array([[float(cell) for cell in line.split(',')] for line in lines[1:]])
     except ValueError as error:
-        raise TrajectoryError(f'{path}: {error}; every row is four numbers') from None
+        raise TrajectoryError(f'{path}: {error}; every row must have four numbers') from None
     if rows.shape[1:] != (len(_COLUMNS),) or not np.isfinite(rows).all():
-        raise TrajectoryError(f'{path}: every row is four finite numbers')
+        raise TrajectoryError(f'{path}: every row must have four finite numbers')
     if len(rows) < 2 * _HARMONICS + 1:
         raise TrajectoryError(
             f'{path}: {len(rows)} rows; a cycle takes at least {2 * _HARMONICS + 1}'
@@ -136,13 +136,13 @@ def stance_motion(gait: Gait, joints: tuple[str, ...], t: FloatArray, phase: Pha
     Parameters
     ----------
     gait : Gait
-        Of one leg.
+        Gait of one leg.
     joints : tuple of str, length 6
         Stance ankle, knee, hip, swing hip, knee, ankle.
     t : ndarray, shape (N,)
         Time [s].
     phase : Phase
-        Of the stance leg at these times.
+        Phase of the stance leg at these times.
 
     """
     speed, acceleration = phase.speed[:, np.newaxis], phase.acceleration[:, np.newaxis]

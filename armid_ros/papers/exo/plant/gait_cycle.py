@@ -1,13 +1,13 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The whole gait cycle: single and double support of both machines, and what the ground does.
+The whole gait cycle: single and double support of both machines, and ground forces.
 
-Joints move as a walkable gait prescribes and trunks keep their lean; where the hips are follows
-from what acts: weight, springs between the two, and the ground at both heels and toes, (27). So
-feet strike and leave the ground when they do, and nobody says which leg stands. The torques are
-those of Newton and Euler with all of these forces; what is left on the hips is nothing, and what
-is left on the trunk is a moment from outside that keeps it from falling over.
+Joint motion is prescribed by a walkable gait, and the lean of the trunks is constant. The hips
+move by the forces: weight, springs, and the ground at both heels and toes, (27). Foot contact
+follows from the simulation and is not prescribed. Torques come from Newton and Euler with all
+forces. No force remains on the hips; the moment that remains on the trunk is an external moment
+that prevents a fall.
 
 """
 
@@ -35,9 +35,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-#: Steps of the integration in a cycle, and cycles that go by before one is shown.
+#: Integration steps per cycle, and number of cycles before the returned one.
 _STEPS, _SETTLING = 2400, 2
-#: A foot bears weight beyond this share of the machine's [-].
+#: A foot bears weight if its force exceeds this share of the machine's weight.
 _BEARS = 0.01
 _PLANE = np.array([0, 2])
 
@@ -45,22 +45,22 @@ _PLANE = np.array([0, 2])
 @dataclass(frozen=True)
 class GaitCycle:
     """
-    One cycle of a walking pair, from a right heel strike of the wearer as planned to the next.
+    One cycle of a walking pair, between two planned right heel strikes of the wearer.
 
     Attributes
     ----------
     pair : TiedPair
         The machines.
     phase : ndarray, shape (N,)
-        Of the right leg, 0 to 1.
+        Phase of the right leg, 0 to 1.
     motions : PairMotion
-        Of both; of the floating joints, forward, up and lean, too.
+        Motions of both machines, including the floating joints forward, up and lean.
     ground, other_ground : ndarray, shape (N, 4, 2)
         Force on right heel and toe and left heel and toe, forward and up [N].
     torques : PairTorques
-        Of all joints; those of the floating joints are what is left over.
+        Torques of all joints; those of the floating joints are the remaining external forces.
     soil : Ground
-        What they walk on.
+        The ground.
 
     """
 
@@ -84,7 +84,7 @@ class GaitCycle:
         return np.asarray(tau[:, floating(robot)[2]])
 
     def support(self, *, other: bool = False) -> npt.NDArray[np.int_]:
-        """Return how many feet bear weight, shape (N,)."""
+        """Return the number of feet that bear weight, shape (N,)."""
         robot = self.pair.other if other else self.pair.robot
         return np.asarray(np.sum(self.feet(other=other)[:, :, 1] > _BEARS * weight(robot), axis=1))
 
@@ -96,7 +96,7 @@ class _Course:
     contact: FloatArray  # (2 K, 4, 2)
     contact_speed: FloatArray
     tied: FloatArray  # (2 K, S, 2)
-    pull: FloatArray  # (2 K, 2): weight and what accelerating limbs do [N]
+    pull: FloatArray  # (2 K, 2): weight and inertial force of the limbs [N]
     mass: float
 
 
@@ -107,14 +107,14 @@ def weight(robot: Robot) -> float:
 
 def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
     """
-    Let a pair walk until it does the same every cycle, and return one.
+    Simulate a walking pair until its motion is periodic, and return one cycle.
 
     Parameters
     ----------
     pair : TiedPair
         A pair that is free to walk: ``walking_pair``.
     gait : Gait
-        Of the wearer; the nearest one that can be walked is taken.
+        Gait of the wearer; replaced by the nearest walkable gait.
 
     """
     known = read_assumptions()
@@ -159,7 +159,7 @@ def gait_cycle(pair: TiedPair, gait: Gait) -> GaitCycle:
 
 
 def ground_forces(robot: Robot, motion: Motion, ground: Ground) -> FloatArray:
-    """Return what the ground does to heels and toes along a motion, shape (N, 4, 2) [N]."""
+    """Return the ground forces on heels and toes along a motion, shape (N, 4, 2) [N]."""
     place, jacobian = points_motion(robot, *contacts(robot), motion.q)
     speed = np.einsum('ncxj,nj->ncx', jacobian, motion.dq)
     return ground.force(place[..., 2], speed[..., 2], speed[..., 0])
@@ -195,7 +195,7 @@ def walking_torques(
 def _joint_motion(
     robot: Robot, plan: WalkableGait, t: FloatArray, phase: FloatArray, cycle: float
 ) -> Motion:
-    """Return the motion of the legs with hips that stay where they are."""
+    """Return the motion of the legs with fixed hips."""
     parts = np.zeros((3, len(t), robot.n_joints))
     for order in range(3):
         for side, shift in zip(SIDES, (0.0, 0.5), strict=True):
@@ -225,7 +225,7 @@ def _course(pair: TiedPair, motion: Motion, other: bool) -> _Course:
 
 
 def _start(gaits: tuple[WalkableGait, WalkableGait], late: float, cycle: float) -> FloatArray:
-    """Return where hips are and how fast as planned, shape (8,): machine, wearer."""
+    """Return planned position and velocity of the hips, machine and wearer, shape (8,)."""
     places, speeds = [], []
     for plan, lag in zip(gaits, (late, 0.0), strict=True):
         path = plan.hips + np.outer(np.arange(len(plan.hips)) / len(plan.hips), [plan.stride, 0.0])
@@ -278,7 +278,7 @@ def _placed(
     rate: FloatArray,
     cycle: float,
 ) -> Motion:
-    """Return the motion of legs with the hips where they were found."""
+    """Return the motion of the legs with the simulated motion of the hips."""
     parts = [np.array(part[rows]) for part in (legs.q, legs.dq, legs.ddq)]
     hips = floating(robot)[:2]
     for values, found in zip(parts, (place, speed, rate), strict=True):
@@ -295,24 +295,24 @@ def check_cycle(
     ground_forces: FloatArray | None = None,
 ) -> GaitCheck:
     """
-    Let one joint of the machine walk a cycle by its torque, on the ground, its hips free.
+    Simulate a cycle in which one joint of the machine is driven by its torque.
 
-    The source puts computed torques into another engine and reads off how far hip and knee are
-    from the gait.
+    The source applies computed torques in another simulator and reports the errors of hip and
+    knee. The hips are free, and the feet touch the ground.
 
     Parameters
     ----------
     cycle : GaitCycle
-        What was prescribed, and what acts then.
+        Prescribed motion, and its forces.
     joint : str
         The joint that follows its torque.
     rate : float
         Torque samples per second, joined by cubic splines.
     believed : TiedPair, optional
-        The machines that the torques are computed for; by default those that there are.
+        The machines for which the torques are computed; by default the simulated ones.
     ground_forces : ndarray, shape (N, 4, 2), optional
-        Forces on heels and toes that the torques are computed for [N]; by default those that
-        there are.
+        Forces on heels and toes for which the torques are computed [N]; by default the simulated
+        ones.
 
     """
     pair, motions = cycle.pair, cycle.motions
@@ -329,7 +329,7 @@ def driving_torque(
     believed: TiedPair | None = None,
     ground_forces: FloatArray | None = None,
 ) -> DrivingTorque:
-    """Return nothing for the hips, and the splined torque of a joint, shape (3,) [N, N m]."""
+    """Return zero force on the hips and the interpolated torque of a joint, (3,) [N, N m]."""
     tau = cycle.torques.tau
     if believed is not None or ground_forces is not None:
         on_feet = cycle.ground if ground_forces is None else ground_forces

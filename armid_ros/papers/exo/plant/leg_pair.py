@@ -1,7 +1,7 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-Two machines tied by springs: what each has to supply, and what each feels of the other.
+Two machines tied by springs: joint torques and spring forces.
 
 A pair is any two robots with a common base frame. The shipped one is a man and the exoskeleton
 that he wears, tied at both thighs and both shanks.
@@ -41,18 +41,18 @@ import numpy.typing as npt
 @dataclass(frozen=True)
 class TiedPair:
     """
-    A machine, the other one, and the springs between them.
+    Two machines and the springs between them.
 
     Attributes
     ----------
     robot, other : Robot
         The exoskeleton and its wearer, or any other two.
     ties : tuple of Tie
-        Where the S springs are.
+        Attachment points of the S springs.
     stiffness : ndarray, shape (S,)
         k [N/m].
     slack : ndarray, shape (S,)
-        Way that a spring gives before it pulls [m]; zero by default.
+        Extension at which a spring starts to pull [m]; zero by default.
 
     """
 
@@ -63,7 +63,7 @@ class TiedPair:
     slack: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Spread single numbers over the springs and check them."""
+        """Expand single numbers to all springs, and check the values."""
         size = (len(self.ties),)
         for name in ('stiffness', 'slack'):
             values = getattr(self, name)
@@ -80,7 +80,7 @@ class TiedPair:
 
     @property
     def machines(self) -> TiedMachines:
-        """Both, and where they are tied, whatever the springs are."""
+        """Both machines and the attachment points, without stiffnesses."""
         return TiedMachines(self.robot, self.other, self.ties)
 
     @property
@@ -102,9 +102,9 @@ class TiedPair:
 
     def forces(self, way: FloatArray) -> FloatArray:
         """
-        Return what springs that are drawn out so do to the machine.
+        Return the spring forces on the machine for given extensions.
 
-        They do the opposite to the other one.
+        The forces on the other machine are opposite.
 
         Parameters
         ----------
@@ -125,12 +125,12 @@ class TiedPair:
 
 class PairMotion(NamedTuple):
     """
-    How both machines move, on one time base.
+    Motions of both machines on one time base.
 
     Attributes
     ----------
     own, other : Motion
-        Of the machine (exoskeleton) and of the other one (wearer).
+        Motion of the machine (exoskeleton) and of the other one (wearer).
 
     """
 
@@ -141,14 +141,14 @@ class PairMotion(NamedTuple):
 @dataclass(frozen=True)
 class PairTorques:
     """
-    What a motion of a pair takes.
+    Torques and spring forces of a motion of a pair.
 
     Attributes
     ----------
     tau, other_tau : ndarray, shape (N, n) and (N, m)
         Torques of the machine's joints and of the other one's [N m].
     forces : ndarray, shape (N, S, 3)
-        What the springs do to the machine [N].
+        Spring forces on the machine [N].
 
     """
 
@@ -166,7 +166,7 @@ def pair_torques(pair: TiedPair, motion: Motion, other_motion: Motion) -> PairTo
     pair : TiedPair
         The machines and their springs.
     motion, other_motion : Motion
-        How each moves, on one time base.
+        Motion of each machine, on one time base.
 
     """
     geometry = pair.geometry(motion, other_motion)
@@ -187,9 +187,9 @@ def leg_pair(
     Parameters
     ----------
     stiffness : array_like, optional
-        Of all springs or of each [N/m]; by default what ``assumptions.yaml`` has.
+        Stiffness of all springs or of each [N/m]; by default that of ``assumptions.yaml``.
     segments : sequence of str
-        Those that are tied.
+        Segments with a tie.
 
     Raises
     ------
@@ -206,18 +206,18 @@ def leg_pair(
 
 def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = None) -> PairMotion:
     """
-    Let the leg pair walk: the wearer as the gait says, the exoskeleton nearly so.
+    Return the motion of the walking pair: the wearer follows the gait, the exoskeleton nearly.
 
     Parameters
     ----------
     pair : TiedPair
         The shipped pair.
     gait : Gait
-        Of one leg.
+        Gait of one leg.
     t : ndarray, shape (N,)
         Time [s].
     start : float, optional
-        Phase of the stance leg at t = 0; by default where single support begins.
+        Phase of the stance leg at t = 0; by default at the beginning of single support.
 
     """
     known = read_assumptions()
@@ -228,18 +228,18 @@ def walking(pair: TiedPair, gait: Gait, t: FloatArray, start: float | None = Non
 
 def stepping(pair: TiedPair, gait: Gait, t: FloatArray, period: float | None = None) -> PairMotion:
     """
-    Let the leg pair step forward through single support and back, for as long as one likes.
+    Return the motion of the pair during repeated steps through single support and back.
 
     Parameters
     ----------
     pair : TiedPair
         The shipped pair.
     gait : Gait
-        Of one leg.
+        Gait of one leg.
     t : ndarray, shape (N,)
         Time [s].
     period : float, optional
-        Of a step forward and back [s]; by default what ``assumptions.yaml`` has.
+        Time of a step forward and back [s]; by default that of ``assumptions.yaml``.
 
     """
     known = read_assumptions()
@@ -252,7 +252,7 @@ def following(
     pair: TiedPair, t: FloatArray, moving: Callable[[tuple[str, ...], FloatArray], Motion]
 ) -> PairMotion:
     """
-    Let the machine follow its wearer: late, with less amplitude, its joints not quite aligned.
+    Return the motions of wearer and machine; the machine follows late, with errors.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def following(
     t : ndarray, shape (N,)
         Time [s].
     moving : callable (joints, t) -> Motion
-        How the wearer moves.
+        Callback for the motion of the wearer.
 
     """
     known = read_assumptions()

@@ -1,11 +1,12 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-What each foot bears by the source's rule: a leg, and the trunk's share by (20) to (22).
+Forces on the feet by the source's rule: the leg, and a share of the trunk, (20) to (22).
 
-Two feet on the ground leave open how much each bears. The source splits the trunk between the legs
-by the distances of the thighs from it; a foot then bears what its leg and its share of the trunk
-weigh and take to accelerate, less what the springs carry. While one foot stands it bears all.
+With two feet on the ground, the force on each foot is not determined. The source splits the trunk
+between the legs by the distances of the thighs from it; a foot then bears weight and inertial
+force of its leg and its share of the trunk, less the spring forces. A single foot on the ground
+bears the total.
 
 """
 
@@ -22,14 +23,14 @@ _PLANE = np.array([0, 2])
 
 def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
     """
-    Return what both feet bear by (20) to (22), right and left, shape (N, 2, 2) [N].
+    Return the forces on right and left foot by (20) to (22), shape (N, 2, 2) [N].
 
     Parameters
     ----------
     cycle : GaitCycle
-        The motion, and which feet stand.
+        The motion, and the feet on the ground.
     other : bool
-        Whether of the wearer.
+        Whether the feet are those of the wearer.
 
     """
     robot, motion = (
@@ -65,9 +66,9 @@ def feet_by_shares(cycle: GaitCycle, *, other: bool = False) -> FloatArray:
 
 def ground_by_shares(cycle: GaitCycle) -> FloatArray:
     """
-    Return the same on heels and toes of the machine, (N, 4, 2) [N].
+    Return the forces by (20) to (22) on heels and toes of the machine, (N, 4, 2) [N].
 
-    The rule does not say where under a foot its force is; it is taken to be where the ground's is.
+    The rule does not give the centre of pressure; that of the simulated ground is used.
 
     """
     feet = feet_by_shares(cycle)

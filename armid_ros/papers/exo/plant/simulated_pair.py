@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The tied pair as it stands there: both step to and fro, by prescription or by torque."""
+"""The simulated pair: both machines step to and fro, by prescription or by torque."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from armid_ros.papers.exo.plant.torque_driven import drive_by_torque
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
-#: Samples that are computed in one go.
+#: Number of samples per block of the simulation.
 _BLOCK = 50
 #: Runge-Kutta steps in a block: 5 ms at 1 kHz, half the time between two torque samples.
 _INTEGRATED = 10
-#: A driven joint so far off the gait has fallen [rad].
+#: If a driven joint deviates more than this from the gait, the pair has fallen [rad].
 _FALLEN = np.radians(60.0)
 
 
@@ -33,9 +33,9 @@ class PairSample:
     t : float
         Time [s].
     q, dq, tau : ndarray, shape (n,)
-        Of the machine [rad, rad/s, N m].
+        State and torques of the machine [rad, rad/s, N m].
     other_q, other_dq : ndarray, shape (m,)
-        Of its wearer.
+        State of the wearer [rad, rad/s].
 
     """
 
@@ -49,18 +49,18 @@ class PairSample:
 
 class SimulatedPair:
     """
-    A pair that steps through single support and back, for as long as one likes.
+    A pair that steps repeatedly through single support and back.
 
     Joints that are driven follow the torques of the gait, sampled and splined as in the source;
-    all others are where the gait has them. Driven one at a time a joint stays with the gait; all
-    joints together are an inverted pendulum in open loop, and fall.
+    all others follow the gait. A single driven joint stays near the gait. If all joints are
+    driven, the pair is an inverted pendulum in open loop, and falls.
 
     Parameters
     ----------
     pair : TiedPair
         The machines and their springs.
     gait : Gait
-        Of one leg.
+        Gait of one leg.
     driven : sequence of str
         Joints of the machine that follow torques.
     torque_rate : float
@@ -106,7 +106,7 @@ class SimulatedPair:
         self.reset()
 
     def reset(self) -> None:
-        """Put both back to where they began."""
+        """Return both machines to the initial state."""
         self._steps = 0
         self._first = 0
         self._block: tuple[PairMotion, FloatArray] | None = None
@@ -120,11 +120,11 @@ class SimulatedPair:
 
     @property
     def fallen(self) -> bool:
-        """Whether a driven joint is so far off the gait that there is no way back."""
+        """Whether a driven joint deviates so far from the gait that the pair has fallen."""
         return bool(self.deviation > _FALLEN)
 
     def advance(self) -> PairSample:
-        """Let a sample's time go by, and read the sensors."""
+        """Simulate one sample, and return the sensor readings."""
         self._steps += 1
         if self._block is None or self._steps - self._first > _BLOCK:
             self._first = self._steps - 1
@@ -154,7 +154,7 @@ class SimulatedPair:
         return PairMotion(own, other), tau
 
     def _driven(self, own: Motion) -> Motion:
-        """Let the driven joints follow their torques over the block."""
+        """Integrate the driven joints with their torques over the block."""
         coarse = np.linspace(own.t[0], own.t[-1], 2 * _INTEGRATED + 1)
         prescribed, other = stepping(self.pair, self._gait, coarse)
         if self._state is not None:

@@ -3,9 +3,8 @@
 """
 Hybrid dynamics of a tied pair: some joints follow torques, all others a prescribed motion.
 
-That is how the source checks its torques: one joint walks by its torque, the rest of both bodies
-as prescribed. With every joint driven by torques alone the pair is an inverted pendulum that
-nothing holds, and falls.
+The source checks its torques in this way: one joint is driven by its torque, and all others are
+prescribed. If all joints are driven by torques alone, the pair is an inverted pendulum and falls.
 
 """
 
@@ -25,13 +24,13 @@ from scipy.interpolate import CubicSpline
 
 #: Torques of the driven joints, shape (d,) [N m], at a time [s].
 DrivingTorque = Callable[[float], FloatArray]
-#: Rate of a state, shape (s,), at a sample of what is prescribed.
+#: Function for the rate of a state, shape (s,), at a sample of the prescribed motion.
 Rate = Callable[[int, FloatArray], FloatArray]
 
 
 def splined(t: FloatArray, tau: FloatArray, rate: float) -> DrivingTorque:
     """
-    Sample torques at a rate and draw cubic splines through the samples.
+    Sample torques at a rate and interpolate by cubic splines.
 
     Parameters
     ----------
@@ -58,7 +57,7 @@ def runge_kutta(rate: Rate, k: int, h: float, x: FloatArray) -> tuple[FloatArray
     rate : callable
         Rate of the state at a sample.
     k : int
-        Where to begin.
+        First sample.
     h : float
         Time from sample k to k + 2 [s].
     x : ndarray, shape (s,)
@@ -100,7 +99,7 @@ def drive_by_torque(
     torque : callable
         Their torques.
     ground : Ground, optional
-        What the feet of a pair that is free to walk stand on.
+        Ground under the feet of a pair that is free to walk.
 
     Returns
     -------
@@ -114,7 +113,9 @@ def drive_by_torque(
 
     """
     if len(motion) % 2 == 0:
-        raise TrajectoryError(f'{len(motion)} samples; steps of two take an odd number')
+        raise TrajectoryError(
+            f'{len(motion)} samples; integration steps of two samples need an odd number'
+        )
     columns = [pair.robot.index(joint) for joint in driven]
     rate = _forward_dynamics(pair, PairMotion(motion, other_motion), columns, torque, ground)
     x = np.concatenate([motion.q[0, columns], motion.dq[0, columns]])
@@ -139,7 +140,7 @@ def _forward_dynamics(
     torque: DrivingTorque,
     ground: Ground | None,
 ) -> Rate:
-    """Return what gives speeds and accelerations of the free joints at a sample, shape (2 d,)."""
+    """Return a function for velocities and accelerations of the driven joints, shape (2 d,)."""
     robot, own, tied = pair.robot, motions.own, len(pair.ties)
     ends = [(tie.joint, np.array(tie.point)) for tie in pair.ties]
     if ground is not None:
@@ -181,7 +182,7 @@ def _forward_dynamics(
 @dataclass(frozen=True)
 class GaitCheck:
     """
-    One joint driven by its torque, against what was prescribed.
+    Result for one joint driven by its torque, against the prescribed motion.
 
     Attributes
     ----------
@@ -190,7 +191,7 @@ class GaitCheck:
     prescribed : ndarray, shape (N,)
         Its prescribed position [rad].
     motion : Motion
-        How the machine moved.
+        Motion of the machine.
 
     """
 
@@ -205,10 +206,10 @@ class GaitCheck:
 
     @property
     def error(self) -> FloatArray:
-        """How far the joint is off, shape (N,) [rad]."""
+        """Error of the joint position, shape (N,) [rad]."""
         return self.followed - self.prescribed
 
     @property
     def most(self) -> float:
-        """How far it is off at most [deg]."""
+        """Largest error of the joint position [deg]."""
         return float(np.degrees(np.abs(self.error).max()))

@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-A gait that walks: both feet stay where they stand, over the whole cycle.
+A walkable gait: feet on the ground do not move over the whole cycle.
 
-Curves of hip, knee and ankle, as they are drawn in books, belong to no body: put onto segments of
-given lengths, feet slide and sink by centimetres while both are on the ground. The nearest curves
-for which they do not are found by least squares, together with the path of the hips.
+Published curves of hip, knee and ankle do not fit segments of given lengths: feet on the ground
+would slide and sink by centimetres. Least squares find the nearest curves without this error,
+together with the path of the hips.
 
 """
 
@@ -18,18 +18,18 @@ from armid_ros.papers.exo.plant.gait import Gait
 import numpy as np
 from scipy.optimize import least_squares
 
-#: Harmonics of the curves; the hips have the even ones, for both legs do the same.
+#: Harmonics of the curves; the hips have only even ones, because both legs move alike.
 _HARMONICS = 8
 _SAMPLES = 100
-#: When heel and toe are on the ground, in cycles since heel strike.
+#: Intervals with heel and toe on the ground, in cycles since heel strike.
 HEEL_DOWN, TOE_DOWN = (0.0, 0.42), (0.12, 0.62)
-#: How far curves of hip, knee and ankle may be from those asked for [rad], and a foot on the
-#: ground from where it stands [m]: one standard deviation of the least squares.
+#: Standard deviations of the least squares: angles from the given curves [rad], and foot on the
+#: ground from its fixed position [m].
 _FREEDOM = np.radians([3.0, 3.0, 10.0])
 _PLACE = 0.3e-3
-#: Push on the hips forward and up, in addition to their weight [m/s^2]: people walk smoothly.
+#: Standard deviation of the acceleration of the hips forward and up [m/s^2]: walking is smooth.
 _HURRY = np.array([1.0, 1.5])
-#: Height of the swing foot in the middle of its way [m], when, and how strictly.
+#: Height of the swing foot in mid-swing [m], its phase, and its standard deviation [m].
 _CLEARANCE, _SWING, _CLEAR = 0.02, (0.68, 0.93), 3e-3
 
 
@@ -53,19 +53,19 @@ class LegLength:
 @dataclass(frozen=True)
 class WalkableGait:
     """
-    Curves of one leg, and how the hips move with them.
+    Curves of one leg, and the motion of the hips.
 
     Attributes
     ----------
     gait : Gait
         Hip flexion, knee flexion, ankle dorsiflexion.
     lean : float
-        Of the trunk, forward [rad].
+        Forward lean of the trunk [rad].
     stride : float
-        Way of a cycle [m].
+        Distance per cycle [m].
     hips : ndarray, shape (N, 2)
-        Path of the hips forward and up over a cycle, evenly sampled, the way at even speed left
-        out [m].
+        Path of the hips forward and up over a cycle, evenly sampled, without the mean forward
+        motion [m].
 
     """
 
@@ -86,9 +86,9 @@ def foot_points(
     angles : ndarray, shape (N, 3)
         Hip, knee and ankle [rad].
     hips : ndarray, shape (N, 2)
-        Where the hips are, forward and up [m].
+        Position of the hips, forward and up [m].
     lean : float
-        Of the trunk, forward [rad].
+        Forward lean of the trunk [rad].
     leg : LegLength
         Lengths.
 
@@ -109,18 +109,18 @@ def walkable(
     lean: float | None = None,
 ) -> WalkableGait:
     """
-    Find the nearest gait with feet that stay where they stand.
+    Find the nearest gait whose feet do not move on the ground.
 
     Parameters
     ----------
     gait : Gait
-        The curves that are asked for.
+        The desired curves.
     leg : LegLength
         Lengths of the legs.
     cycle : float
         Time of a cycle [s].
     stride, lean : float, optional
-        Way of a cycle [m] and lean of the trunk [rad]; by default whatever suits the curves.
+        Distance per cycle [m] and lean of the trunk [rad]; fitted to the curves by default.
 
     """
     curves = _Curves(cycle, stride, lean)
@@ -130,7 +130,7 @@ def walkable(
     swing = _inside(phase, _SWING)
 
     def feet(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return how far heel and toe are from where the foot stands, and the lower's height."""
+        """Return distances of heel and toe from the fixed foot, and height of the lower."""
         angles, hips, own_lean, own_stride = curves.of(x)
         way = np.column_stack([own_stride * phase, np.zeros(_SAMPLES)])
         heel, toe = foot_points(angles, hips + way, own_lean, leg)
@@ -166,8 +166,8 @@ def walkable(
 class _Curves:
     """Curves of a leg and a path of the hips, by the coefficients of their series."""
 
-    # the vector has those of hip, knee and ankle, of the hips forward and up, then lean, stride
-    # and the place where the foot stands
+    # order of the vector: hip, knee, ankle, path of the hips forward and up, lean, stride,
+    # position of the fixed foot
 
     def __init__(self, cycle: float, stride: float | None, lean: float | None):
         self.phase = np.arange(_SAMPLES) / _SAMPLES

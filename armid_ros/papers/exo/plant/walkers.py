@@ -1,11 +1,11 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
 """
-The leg pair free to walk: both machines hang from their hips, which nothing holds.
+The leg pair that is free to walk: the hips of both machines are floating joints.
 
-A description of a body on one foot is hung up anew by its trunk: two slides and a hinge from the
-ground to the trunk, then hip, knee and ankle of either leg. Bodies, inertias and anatomical angles
-stay what they are; only the root moves from the foot to the hips, so that either foot can stand.
+The root of a description moves from the foot to the trunk, so that either foot can be on the
+ground. Two slides and a hinge connect ground and trunk; hip, knee and ankle of each leg follow.
+Bodies, inertias and anatomical angles do not change.
 
 """
 
@@ -25,7 +25,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 SIDES = ('right', 'left')
-#: What carries the trunk: way forward and up [m], lean [rad].
+#: Joints of the trunk: forward and up [m], lean [rad].
 FLOATING = ('forward', 'up', 'lean')
 _LEG = ('hip', 'knee', 'ankle')
 #: Links of a leg and their axes: flexion and dorsiflexion are positive.
@@ -36,7 +36,7 @@ SEGMENTS = tuple(f'{side}_{link}' for side in SIDES for link in ('shank', 'thigh
 
 def walker(robot: Robot) -> Robot:
     """
-    Hang a body on one foot from its trunk.
+    Convert a body on one foot to a body with a floating trunk.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def walking_pair(stiffness: npt.ArrayLike | None = None) -> TiedPair:
     Parameters
     ----------
     stiffness : array_like, optional
-        Of all springs or of each [N/m]; by default what ``assumptions.yaml`` has.
+        Stiffness of all springs or of each [N/m]; by default that of ``assumptions.yaml``.
 
     """
     exo, human = (walker(load_robot(name)) for name in ('exoskeleton_legs', 'human_legs'))
@@ -106,13 +106,13 @@ def walking_pair(stiffness: npt.ArrayLike | None = None) -> TiedPair:
 
 
 def columns(robot: Robot, side: str) -> list[int]:
-    """Return where hip, knee and ankle of a leg are among the joints."""
+    """Return the indices of hip, knee and ankle of a leg."""
     prefix = robot.joints[0].split('_')[0]
     return [robot.index(f'{prefix}_{side}_{joint}') for joint in _LEG]
 
 
 def floating(robot: Robot) -> list[int]:
-    """Return where forward, up and lean of the trunk are among the joints."""
+    """Return the indices of forward, up and lean of the trunk."""
     prefix = robot.joints[0].split('_')[0]
     return [robot.index(f'{prefix}_{name}') for name in FLOATING]
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a machine and its wearer: what ties them, and what each feels of the other."""
+"""The report of a machine and its wearer: stiffness of the ties, and forces."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ def exo_report(
     Parameters
     ----------
     pair : TiedPair
-        Both machines, with the stiffness that was found.
+        Both machines, with the estimated stiffness.
     motions : PairMotion
-        The motion of both that is shown.
+        The motion of both machines to show.
     abscissa : ndarray, shape (N,)
-        What it is drawn over.
+        Abscissa of the plots.
     name : str
         Name and unit of the abscissa.
     found : sequence of Interaction
-        One stiffness for all, then one for each.
+        Estimates with one stiffness for all ties, then with one for each.
     walked : SimulatedWalk or None
-        What is known of simulated data; None of recorded ones.
+        Truth of simulated data; None for recorded data.
     provenance : Provenance
         Files, versions, settings, seed.
 

@@ -18,7 +18,7 @@ import numpy as np
 
 _MARGIN = 0.06
 _SCALE = 260.0
-#: Springs are drawn so many times longer than they are, or nobody would see them.
+#: Magnification of the extension of springs, which would be invisible otherwise.
 _MAGNIFIED = 4.0
 
 
@@ -30,13 +30,13 @@ class Poses(Section):
     Attributes
     ----------
     width, height : float
-        Of the strip.
+        Size of the strip.
     own, other : tuple of str
         Polylines of both machines, as coordinates of SVG.
     ties : tuple of tuple of float
         x1, y1, x2, y2 of every spring, from the other machine; four times as long as it is.
     captions : tuple of (float, str)
-        Where each pose is, and when.
+        Position and time of each pose.
 
     """
 

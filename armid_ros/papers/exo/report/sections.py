@@ -28,14 +28,14 @@ _ROLES: tuple[Role, ...] = ('residual', 'predicted', 'before', 'measured')
 
 def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) -> ContentSection:
     """
-    Show what ties the two, with intervals.
+    Return a section with the stiffness of the ties and its intervals.
 
     Parameters
     ----------
     found : sequence of Interaction
-        One stiffness for all, then one for each.
+        Estimates with one stiffness for all ties, then with one for each.
     truth : mapping of str to float
-        True stiffness by segment [N/m], where the data were simulated; empty otherwise.
+        True stiffness by segment [N/m]; empty unless the data were simulated.
 
     """
     heads = ['Spring', 'Stiffness [N/m]', '± 95 %', 'Bias of plain least squares']
@@ -63,7 +63,7 @@ def stiffness_section(found: Sequence[Interaction], truth: Mapping[str, float]) 
 
 
 def _range(values: FloatArray) -> str:
-    """Return the least and the largest of values to two digits, once if they are alike."""
+    """Format least and largest value to two digits, or one value if both are equal."""
     ends = dict.fromkeys(f'{end:.2g}' for end in (values.min(), values.max()))
     return ' to '.join(ends)
 
@@ -71,7 +71,7 @@ def _range(values: FloatArray) -> str:
 def forces_section(
     pair: TiedPair, motions: PairMotion, abscissa: FloatArray, name: str
 ) -> ContentSection:
-    """Show what each segment feels of the other machine, and what that makes of the torques."""
+    """Return a section with the spring forces, and their part of the torques."""
     torques = pair_torques(pair, *motions)
     alone = pair_torques(pair.with_stiffness(0.0), *motions)
     size = np.linalg.norm(torques.forces, axis=2)
@@ -101,7 +101,7 @@ def forces_section(
 
 
 def assumptions_section() -> ContentSection:
-    """Show what the source leaves open: name, value with unit, reason."""
+    """Return a section with the assumptions: name, value with unit, reason."""
     rows = [
         (name.replace('_', ' '), _shown(entry), entry.reason)
         for name, entry in read_assumptions().items()

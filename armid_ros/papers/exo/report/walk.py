@@ -1,6 +1,6 @@
 # Copyright 2026 The armid_ros developers
 # SPDX-License-Identifier: Apache-2.0
-"""A pair that walks a whole cycle: both bodies moving, what the feet bear, joints by torque."""
+"""Sections on a whole cycle of walking: both bodies, forces on the feet, torque-driven joints."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from markupsafe import Markup
 import numpy as np
 
 _FRAMES = 72
-#: Size of the drawing [px], scale [px/m], and where hips are and ground is in it.
+#: Size of the drawing [px], scale [px/m], and positions of hips and ground [px].
 _WIDTH, _HEIGHT, _SCALE, _HIPS, _GROUND = 640, 420, 260.0, 300.0, 385.0
-#: Springs are drawn so many times longer than they are; forces at so many px per newton.
+#: Magnification of the extension of springs, and scale of forces [px/N].
 _MAGNIFIED, _FORCE = 4.0, 0.16
 _TRUNK = 0.55
 _ABSCISSA = 'gait cycle of the right leg'
-#: How far a joint may be off by the source, in degrees.
+#: Largest error of a joint in the source [deg].
 SOURCE = {'hip': 1.5, 'knee': 2.5}
 
 
 @dataclass(frozen=True)
 class Driven:
     """
-    A joint by its torque.
+    Results for a joint driven by its torque.
 
     Attributes
     ----------
     right, softer : GaitCheck
-        With the torque that is right, and with that for springs that are too soft.
+        Results with the right torque, and with the torque for springs that are too soft.
     shared : GaitCheck
-        With the torque for feet that bear what (20) to (22) say.
+        Result with the torque for forces on the feet by (20) to (22).
 
     """
 
@@ -57,14 +57,14 @@ class Driven:
 
     @property
     def source(self) -> float:
-        """How far it is off at most by the source [deg]."""
+        """Largest error of the joint position in the source [deg]."""
         return SOURCE[self.joint.split('_')[-1]]
 
 
 @dataclass(frozen=True)
 class SimulatedWalk:
     """
-    What is known of a pair that was simulated.
+    Truth of a simulated pair.
 
     Attributes
     ----------
@@ -73,9 +73,9 @@ class SimulatedWalk:
     cycle : GaitCycle
         A whole cycle of walking.
     driven : sequence of Driven
-        Joints by their torque over that.
+        Joints driven by torque over this cycle.
     softer : float
-        By which share springs were taken too soft.
+        Relative error of the stiffness of springs that are too soft.
     rate : float
         Torque samples per second.
 
@@ -91,21 +91,21 @@ class SimulatedWalk:
 @dataclass(frozen=True)
 class Walk(Section):
     """
-    Both bodies over a cycle, moving.
+    Animation of both bodies over a cycle.
 
     Attributes
     ----------
     cycle : GaitCycle
-        How they walk.
+        The motion of both bodies.
     driven : sequence of Driven
-        Joints by their torque, to choose from.
+        Joints driven by torque, to choose from.
 
     """
 
     title: ClassVar[str] = 'Walking'
     package: ClassVar[str] = 'armid_ros.papers.exo.report'
     template: ClassVar[str] = 'walk.html'
-    #: Width and height of the drawing, and where the ground is [px].
+    #: Width and height of the drawing, and height of the ground [px].
     size: ClassVar[tuple[int, int, float]] = (_WIDTH, _HEIGHT, _GROUND)
 
     cycle: GaitCycle
@@ -113,7 +113,7 @@ class Walk(Section):
 
     @property
     def choices(self) -> list[str]:
-        """Return what can be shown."""
+        """Return the choices of the animation."""
         figure = {'hip': ' (figure 3)', 'knee': ' (figure 4)'}
         return [
             'as prescribed',
@@ -126,7 +126,7 @@ class Walk(Section):
 
     @property
     def held(self) -> tuple[str, str]:
-        """Return the largest moments that keep trunks at their lean, machine and wearer [N m]."""
+        """Return the largest external moments on the trunks, machine and wearer [N m]."""
         own, other = (
             f'{np.abs(self.cycle.trunk_moment(other=other)).max():.0f}' for other in (False, True)
         )
@@ -134,7 +134,7 @@ class Walk(Section):
 
     @property
     def data(self) -> Markup:
-        """Return what the script draws: a list of frames, each with its lines."""
+        """Return the data of the animation script: a list of frames, each with lines."""
         cycle = self.cycle
         rows = np.linspace(0, len(cycle.phase) - 1, _FRAMES + 1).astype(int)[:-1]
         wearer = cycle.motions.other.select(rows)
@@ -159,7 +159,7 @@ class Walk(Section):
         )
 
     def _feet(self, rows: FloatArray, ahead: FloatArray) -> list[Any]:
-        """Return where the ground pushes and how: feet of wearer, then of machine."""
+        """Return points and forces of ground contact: feet of the wearer, then of the machine."""
         arrows = []
         for other in (True, False):
             robot = self.cycle.pair.other if other else self.cycle.pair.robot
@@ -179,7 +179,7 @@ class Walk(Section):
 
 
 def feet_section(cycle: GaitCycle) -> ContentSection:
-    """Show what feet bear over a cycle: by the ground, and by the source's rule."""
+    """Return a section with forces on the feet, simulated and by the source's rule."""
     text = (
         "What the ground does to the feet, by the contact of the source's Table 3 "
         '(100 N/mm^1.5, 1 N s/mm, friction 0.3). Vertical lines: from one foot on the ground to '
@@ -217,7 +217,7 @@ def feet_section(cycle: GaitCycle) -> ContentSection:
 
 
 def by_torque_section(walked: SimulatedWalk) -> ContentSection:
-    """Show joints driven by their torques over the whole cycle, with what the source found."""
+    """Return a section with torque-driven joints over the cycle, and the source's results."""
     text = (
         f'One joint follows its torque alone ({walked.rate:g} samples per second, cubic splines) '
         'through swing and stance; hips are free, all other joints move as prescribed. Largest '
@@ -273,7 +273,7 @@ def _bodies(robot: Robot, motion: Motion, ahead: FloatArray) -> list[Any]:
 
 
 def _placed(points: FloatArray, ahead: FloatArray) -> FloatArray:
-    """Return points forward and up [m] in px, as seen by one who walks beside the wearer."""
+    """Return points forward and up [m] in px, relative to the wearer."""
     shape = (-1,) + (1,) * (points.ndim - 2)
     x = _HIPS + _SCALE * (points[..., 0] - ahead.reshape(shape))
     return np.stack([x, _GROUND - _SCALE * points[..., 1]], axis=-1)
