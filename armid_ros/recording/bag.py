@@ -118,7 +118,9 @@ class Bag(Source):
                     merged[topic.name] = replace(described, count=count)
         for name, count in self._metadata.counts.items():
             if count and name not in merged:
-                self._damage.add(f'{FILE_NAME} counts {count} messages of {name}, there are none')
+                self._damage.add(
+                    f'{FILE_NAME} states {count} messages of {name}, but the bag has none'
+                )
         return tuple(merged.values())
 
     def topic_of(self, type_name: str, wanted: str | None = None) -> Topic:
@@ -158,7 +160,7 @@ class Bag(Source):
         expected = self._metadata.counts.get(topic, count)
         if count != expected:
             self._damage.add(
-                f'{FILE_NAME} counts {expected} messages of {topic}, there are {count}'
+                f'{FILE_NAME} states {expected} messages of {topic}, but the bag has {count}'
             )
 
     def messages(self) -> Iterator[RawMessage]:

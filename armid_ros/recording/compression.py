@@ -58,7 +58,7 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     try:
         said = stated_size(stored, compression)
         if said is not None and said != size:
-            raise RecordingError(f'holds {said} bytes where {size} are stated')
+            raise RecordingError(f'holds {said} bytes, but {size} are stated')
         if not size:
             return b''
         if compression == 'zstd':
@@ -71,7 +71,7 @@ def decompressed(stored: _Buffer, compression: str, size: int) -> bytes:
     except CORRUPT as error:
         raise RecordingError(str(error) or 'it cannot be decompressed') from error
     if len(content) != size:
-        raise RecordingError(f'holds {len(content)} bytes where {size} are stated')
+        raise RecordingError(f'holds {len(content)} bytes, but {size} are stated')
     return content
 
 

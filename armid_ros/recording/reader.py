@@ -67,7 +67,7 @@ def read_recording(
     """
     joints = tuple(joints)
     if not joints or len(set(joints)) != len(joints):
-        raise RecordingError(f'{path}: joints wanted must differ and not be none, got {joints}')
+        raise RecordingError(f'{path}: give at least one joint, and each joint once; got {joints}')
     with Bag(path, settings) as bag:
         chosen = choose_topics(bag, joints, topic)
         decoder = JointStateDecoder(joints, sum(one.count for one in chosen))
@@ -289,7 +289,7 @@ def check_joints(where: str, decoder: JointStateDecoder, joints: Sequence[str]) 
     present = ','.join(name for name in joints if name in decoder.names_seen)
     hint = f'; --joints {present} reads the others' if present else ''
     if found:
-        hint = f"; if '{found}' is '{missing[0]}', say --rename {found}:{missing[0]}{hint}"
+        hint = f"; if '{found}' is '{missing[0]}', use --rename {found}:{missing[0]}{hint}"
     raise RecordingError(
         f'{where} does not name {"joint" if len(missing) == 1 else "joints"} {listed}; '
         f'its joints are {", ".join(decoder.names_seen)}{hint}'
@@ -336,6 +336,6 @@ def read_robot_description(path: str | Path, settings: ReadSettings = DEFAULT) -
     if len(set(texts.values())) > 1:
         raise RecordingError(
             f'{path}: holds the descriptions of several robots ({", ".join(texts)}); '
-            'save the one meant as a URDF file'
+            'save the description of this arm as a URDF file'
         )
     return next(iter(texts.values()), None)

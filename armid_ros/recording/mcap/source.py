@@ -219,7 +219,7 @@ class McapSource(Source):
         expected = sum(summary.channel_message_counts.get(channel, 0) for channel in channels)
         if count != expected:
             self._found.damage.add(
-                f'{count} messages of {what} where the writer counted {expected}'
+                f'{count} messages of {what}, but the writer counted {expected}'
             )
 
     def _describe(self, channel: Channel, count: int) -> Topic:

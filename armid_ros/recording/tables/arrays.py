@@ -85,7 +85,7 @@ def read_hdf5(path: Path) -> Table:
 def _require_packed(what: str, size: int, stored: int) -> None:
     """Raise a RecordingError if the stated size of an array is impossible or over the limit."""
     if size > _MOST_PACKED * stored:
-        raise RecordingError(f'{what} states {size} bytes, of which {stored} are there')
+        raise RecordingError(f'{what} states {size} bytes, but the file has {stored}')
     DEFAULT.require(size, what)
 
 
