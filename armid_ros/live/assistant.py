@@ -129,7 +129,7 @@ class InProcess:
             return Done(f'wrote {", ".join(Save.FILES)} to {result.save(job.folder)}')
         run = next_run(diagnosis, np.random.default_rng(job.seed))
         if run is None:
-            return Done('no name is in doubt: there is nothing to separate', success=False)
+            return Done('no candidates are ambiguous: no motion is needed', success=False)
         return Done(run.sentence, excitation=excitation_text(run.excitation))
 
 

@@ -63,8 +63,8 @@ class LiveSettings:
         """Raise an IdentificationError if the window is shorter than the shortest motion."""
         if not 0.0 < self.shortest <= self.window:
             raise IdentificationError(
-                f'a window of {self.window:g} s is never as long as the shortest one that is '
-                f'looked at, {self.shortest:g} s'
+                f'a window of {self.window:g} s is shorter than the shortest motion that is '
+                f'diagnosed, {self.shortest:g} s'
             )
 
 

@@ -180,7 +180,7 @@ def answer(request: DiagnosisRequest) -> tuple[Answer, Diagnosis | None]:
             window = window.select(window.t >= changed)
             window = replace(window, t=window.t - (window.t[0] if len(window) else 0.0))
         if window.duration < request.shortest:
-            text = f'the arm changed {window.duration:.0f} s ago: more motion is needed'
+            text = f'the arm changed {window.duration:.0f} s ago: the diagnosis needs more motion'
             return answered(WAITING, text), None
         rng, misfit = np.random.default_rng(request.seed), request.misfit
         if request.healthy is not None and not request.baseline:
