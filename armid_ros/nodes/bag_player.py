@@ -77,7 +77,7 @@ class _JumpGuard:
             pose = pose.updated(message.name, message.position, 0, seen)
         lost = pose.staleness(time.monotonic(), self.timeout)
         if lost:
-            return f'trajectory: {self._states.topic_name}: {lost}; it is not known where it is'
+            return f'trajectory: {self._states.topic_name}: {lost}; arm position unknown'
         speeds = reference.dq
         if speeds is None:
             speeds = np.diff(reference.q, axis=0) / np.diff(reference.t)[:, np.newaxis]

@@ -278,7 +278,7 @@ class ExcitationPublisherNode(ArmidNode):
             values['controller_error'] = self._controller.error
         waiting = 'waiting for a controller and joint states' if self._waiting else ''
         if elapsed is not None and elapsed > self.duration + self.value('state_timeout'):
-            waiting = 'the controller does not say that the end is reached; ~/stop gives it up'
+            waiting = 'the controller does not report the end of the run; ~/stop ends the run'
         return self._trouble or waiting or self._rehearsed, values
 
     def objection(self, values: Mapping[str, Any]) -> str:
@@ -300,7 +300,7 @@ class ExcitationPublisherNode(ArmidNode):
 
     def _loaded(self, path: str) -> Excitation:
         if not path:
-            raise TrajectoryError('a running node designs none; name a file')
+            raise TrajectoryError('a running node designs no excitation; name a file')
         return checked(load_excitation(path), self._planner, path)
 
     def close(self) -> None:
@@ -369,7 +369,7 @@ class ExcitationPublisherNode(ArmidNode):
                 self._say_trouble(f'not started: {error}')
         elif time.monotonic() > self._deadline:
             self._waiting = False
-            self.get_logger().warning(f'{missing}; call ~/start when that has changed')
+            self.get_logger().warning(f'{missing}; call ~/start when this is solved')
 
     def _give_up(self, reason: str, *, blocked: bool = False) -> None:
         """Stop the arm on its path; a blocked arm is held at its position."""
@@ -427,7 +427,7 @@ class ExcitationPublisherNode(ArmidNode):
     def _on_experiment(self, message: String) -> None:
         """Take an excitation from the topic experiment; only ~/start runs it."""
         if self.elapsed is not None:
-            raise TrajectoryError('an excitation is under way; the new one is not taken')
+            raise TrajectoryError('an excitation is under way; the new excitation is ignored')
         excitation = read_excitation(message.data, self._experiments.topic_name)
         self._excitation = checked(excitation, self._planner, self._experiments.topic_name)
         self.tell(f'took an excitation of {self._excitation.duration:g} s; ~/start runs it')

@@ -198,7 +198,7 @@ class IdentificationRunNode(ArmidNode):
             lambda: not self._missing() or time.monotonic() > deadline,
         )
         if self._missing():
-            raise ArmidError(f'{" and ".join(self._missing())} did not come up')
+            raise ArmidError(f'{" and ".join(self._missing())} did not start in time')
         if self.value('rehearse'):
             yield from self._excited('rehearse')
         bags = []

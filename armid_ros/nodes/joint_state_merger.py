@@ -114,7 +114,7 @@ class JointStateMergerNode(ArmidNode):
             if types:
                 if types[0] not in _EFFORTS:
                     raise RecordingError(
-                        f'{types[0]} holds no efforts; those that do: {", ".join(_EFFORTS)}'
+                        f'{types[0]} holds no efforts; types with efforts: {", ".join(_EFFORTS)}'
                     )
                 self._efforts = MatchedSubscription(
                     self, message_class(types[0]), topic, self._on_efforts
@@ -213,9 +213,7 @@ class JointStateMergerNode(ArmidNode):
         n = len(self.joints)
         some = [k for k, name in enumerate(called) if math.isfinite(known.get(name, math.nan))]
         if not some:
-            raise RecordingError(
-                f'torques of {", ".join(known)}, and of none of {", ".join(called)}'
-            )
+            raise RecordingError(f'torques of {", ".join(known)}, but none of {", ".join(called)}')
         torques = np.array([known[called[k]] for k in some]) * self._gains[some]
         self._take(tuple(n + k for k in some), stamp, np.vstack([torques, torques]))
 

@@ -112,7 +112,7 @@ class LiveDiagnosisNode(ListeningNode):
         """Restart with the original model."""
         self._require().reset()
         self._publish_model()
-        return 'the diagnosis begins anew, with the model as it was given'
+        return 'the diagnosis begins anew, with the original model'
 
     def save(self) -> str:
         """Start to write the last diagnosis; its end is logged."""
@@ -140,7 +140,7 @@ class LiveDiagnosisNode(ListeningNode):
         self._watch.take(sample.t, sample.q, sample.tau)
         live.add(*sample)
         if learning and not live.learning:
-            self.tell('the misfit of the model is learned; from now on it is diagnosed')
+            self.tell('the misfit of the model is known; diagnoses begin')
         if live.due and not self._helper.busy:
             self._helper.ask(live.request())
 
@@ -176,7 +176,7 @@ class LiveDiagnosisNode(ListeningNode):
         if self.awaited:
             return self.awaited, values
         if not (self.freshness.stopped or self.complaints.fresh) and live.learning:
-            return 'learning the misfit of the model: nothing may be wrong yet', values
+            return 'learning the misfit of the model: the arm must be healthy', values
         trouble = self.freshness.trouble()
         if not (trouble or self.complaints.fresh):
             trouble = self.stamps.of_results(self.joint_states.topic)
@@ -259,7 +259,7 @@ class LiveDiagnosisNode(ListeningNode):
 
     def _require(self) -> LiveDiagnosis:
         if self.live is None:
-            raise IdentificationError('there is no robot yet: robot_description has not come')
+            raise IdentificationError('no robot is known: robot_description was not received')
         return self.live
 
 

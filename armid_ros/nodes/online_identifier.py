@@ -313,7 +313,7 @@ class OnlineIdentifierNode(ListeningNode):
 
     def _require(self) -> OnlineIdentifier:
         if self.identifier is None:
-            raise IdentificationError('there is no robot yet: robot_description has not come')
+            raise IdentificationError('no robot is known: robot_description was not received')
         return self.identifier
 
 

@@ -211,7 +211,7 @@ class RecorderNode(ArmidNode):
         refused = sorted(filter(self._is_wanted, self._refused))
         absent = sorted(set(self.missing) - set(refused))
         trouble = '; '.join(
-            [f'nobody publishes {", ".join(absent)}'] * bool(absent)
+            [f'no node publishes {", ".join(absent)}'] * bool(absent)
             + [f'not recorded: {", ".join(refused)}'] * bool(refused)
         )
         values: dict[str, object] = {
@@ -309,9 +309,9 @@ class RecorderNode(ArmidNode):
         count = sum(topic.count for topic in writer.topics)
         kept = f'{count} messages are in {writer.file}'
         if not os.path.lexists(writer.file):
-            kept = f'{count} messages went with it'
+            kept = f'its {count} messages are lost'
         elif lacking:
-            kept += f', without its index ({lacking}): `armid recover` makes it whole'
+            kept += f', without its index ({lacking}): `armid recover` restores the index'
         return RecordingEnded(f'{reason}; recording ends: {kept}')
 
 

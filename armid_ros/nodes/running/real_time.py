@@ -43,7 +43,7 @@ class RealTime:
 
     def catch_up(self, factor: float, period: float) -> float:
         """
-        Move as far as real time has, times a factor; what cannot be made up is given up.
+        Simulate until real time times a factor; time that cannot be made up is skipped.
 
         Parameters
         ----------

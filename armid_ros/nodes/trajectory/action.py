@@ -213,7 +213,7 @@ class TrajectoryAction:
         elif status == GoalStatus.STATUS_CANCELED or result.error_code == _REPLACED:
             self._end(goal, self._taken_over())
         else:
-            why = _ERRORS.get(result.error_code, 'it says no reason')
+            why = _ERRORS.get(result.error_code, 'without a reason')
             detail = f' ({result.error_string})' if result.error_string else ''
             self._end(goal, f'{self.name} gave up the trajectory: {why}{detail}')
 

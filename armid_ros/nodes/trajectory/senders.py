@@ -75,7 +75,7 @@ class TrajectorySenders:
             return ''
         if self._kind == 'action':
             return f'no controller offers the action {self._name}'
-        return '' if self.readers else f'nobody subscribes to {self.topic}'
+        return '' if self.readers else f'no node subscribes to {self.topic}'
 
     @property
     def under_way(self) -> bool:
