@@ -25,9 +25,8 @@ from armid_ros.recording.sqlite_source import SqliteSource
 
 
 def _ros1(path: Path, settings: ReadSettings) -> Source:
-    from armid_ros.recording.ros1_source import (
-        Ros1Source,
-    )  # this import takes as long as reading a bag
+    # this import takes as long as reading a bag
+    from armid_ros.recording.ros1_source import Ros1Source
 
     return Ros1Source(path, settings)
 

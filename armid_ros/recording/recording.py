@@ -392,9 +392,9 @@ def recorded_together(
     Parameters
     ----------
     recording : Recording
-        Of the arm.
+        Recording of the arm.
     other : Recording
-        Of the other machine, on the same clock.
+        Recording of the other machine, on the same clock.
     robot : Robot
         Its description.
     ties : sequence of Tie

@@ -121,7 +121,7 @@ class BagWriter:
         chunk_age : float
             Age at which a chunk is written when the next message arrives [s].
         compression : {'zstd', 'lz4', 'none'}
-            Of the chunks.
+            Compression of the chunks.
         clock : callable
             Returns the time that the age of chunks is measured with [s].
 

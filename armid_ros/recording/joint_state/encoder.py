@@ -66,7 +66,7 @@ def joint_state_cdr(
     q, dq, tau : array_like, shape (N, n), or None
         Positions, velocities, efforts; None leaves the field empty.
     frame_id : str
-        Of the headers.
+        Frame of the headers.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def write_recording(
     robot_description : str, optional
         URDF to be written to /robot_description.
     compression : {'zstd', 'lz4', 'none'}
-        Of the chunks.
+        Compression of the chunks.
     chunk_size : int
         Bytes of messages a chunk holds.
 

@@ -44,7 +44,7 @@ def open_table(path: Path, *, episode: int | None = None) -> Table:
         CSV (also with semicolons, tabs, blanks; .gz too), NPY, NPZ, MAT, HDF5, Parquet, or the
         folder of a LeRobot dataset.
     episode : int, optional
-        Of a LeRobot dataset; the first by default.
+        Episode of a LeRobot dataset; the first by default.
 
     Raises
     ------

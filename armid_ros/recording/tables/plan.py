@@ -41,7 +41,7 @@ class QuantitySource:
     chosen : Family
         Columns.
     unit : str
-        Of the file.
+        Unit in the file.
     factor : ndarray, shape (n,)
         To SI.
     guessed : bool

@@ -68,7 +68,7 @@ class ColumnSettings:
     rename : tuple of (str, str)
         Pairs of joint names, or beginnings of them, in the file and their replacements.
     episode : int or None
-        Of a LeRobot dataset.
+        Episode of a LeRobot dataset.
 
     """
 

@@ -94,7 +94,7 @@ class Table:
     source : str
         The file.
     columns : tuple of TableColumn
-        Those with numbers in them.
+        Columns with numbers.
     described : str
         Kind of the file, for the user.
     first_line : int or None
@@ -217,7 +217,7 @@ def table_of_arrays(
     arrays : mapping of str to ndarray
         Numeric arrays; scalars and arrays of other lengths are skipped.
     described : str
-        What kind of file it is.
+        Kind of the file.
 
     """
     usable = {
