@@ -98,7 +98,7 @@ class InProcess:
         return self._result is not None
 
     def ask(self, job: Job) -> None:
-        """Do a job."""
+        """Run a job."""
         try:
             self._result = self._done(job)
         except ArmidError as error:

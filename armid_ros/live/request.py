@@ -71,7 +71,7 @@ class DiagnosisRequest:
     material : float
         Share of a joint's torque below which a cause does not matter.
     seed : int
-        Of the diagnosis.
+        Random seed of the diagnosis.
     end : float
         Time of the last sample of the window, on the time base of the node [s].
     healthy : Healthy or None
