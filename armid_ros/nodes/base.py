@@ -109,9 +109,8 @@ class ArmidNode(Node):
 
     def pace(self, parameter: str, callback: Callable[[], None]) -> None:
         """Call a function at the rate of a parameter [Hz], also after the parameter changes."""
-        if (
-            parameter in self._paced
-        ):  # a changed period of a timer takes effect only after the old one
+        # a changed period of a timer takes effect only after the old one
+        if parameter in self._paced:
             self.destroy_timer(self._paced[parameter][1])
         timer = self.create_timer(1.0 / self.value(parameter), callback)
         self._paced[parameter] = callback, timer

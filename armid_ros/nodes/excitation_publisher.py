@@ -211,9 +211,8 @@ class ExcitationPublisherNode(ArmidNode):
         )
         gate = MotionGate.of(planned, self._planner)
         motion = planned.motion()
-        first = max(
-            math.ceil(HANDOVER * self._rate), 1
-        )  # the set point differs from the measured position
+        # the set point differs from the measured position
+        first = max(math.ceil(HANDOVER * self._rate), 1)
         message = write_trajectory(motion.select(slice(first, None)), first / self._rate)
         now = self.get_clock().now()
         if not self.value('zero_stamp'):

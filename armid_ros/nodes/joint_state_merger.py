@@ -220,9 +220,8 @@ class JointStateMergerNode(ArmidNode):
     def _take(self, some: tuple[int, ...], stamp: int, values: FloatArray) -> None:
         """Add values of some joints, and publish the samples that are complete."""
         n = len(self.joints)
-        self._epoch_ns = (
-            self._epoch_ns or stamp
-        )  # a float has too few digits for seconds since 1970
+        # a float has too few digits for seconds since 1970
+        self._epoch_ns = self._epoch_ns or stamp
         for t, merged in self._merger.take(some, (stamp - self._epoch_ns) * 1e-9, values):
             q, dq, tau = merged[0, :n], merged[1, :n], merged[0, n:]
             message = JointState(name=list(self.joints), position=q.tolist(), effort=tau.tolist())

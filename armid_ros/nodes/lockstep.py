@@ -107,7 +107,7 @@ def run_lockstep(
     identifier : OnlineIdentifier, optional
         Identifies the arm online; without it, a run takes half of the time.
     rate : float
-        Of joint_states [Hz].
+        Rate of joint_states [Hz].
     approach : float
         Time to move from the initial position to the start of the excitation [s].
     on_progress : callable, optional

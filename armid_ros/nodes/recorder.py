@@ -275,9 +275,8 @@ class RecorderNode(ArmidNode):
 
     def _write(self, writer: BagWriter, topic: str, stamped: bool, data: bytes, now: int) -> None:
         sent = header_stamp(data) if stamped else 0
-        if (
-            self._simulated
-        ):  # /clock has coarse steps, but no message is received before it was sent
+        # /clock has coarse steps, but no message is received before it was sent
+        if self._simulated:
             now = max(now, sent)
         try:
             writer.write(topic, data, now, sent or now)

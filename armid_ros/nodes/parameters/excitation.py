@@ -294,7 +294,7 @@ def checked(excitation: Excitation, planner: TransferPlanner, source: str) -> Ex
     planner : TransferPlanner
         Planner with arm and obstacles.
     source : str
-        Where it came from, for messages.
+        Origin of the excitation, for messages.
 
     Raises
     ------

@@ -79,9 +79,8 @@ class _Ending:
         self._parent = os.getppid()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
-        if (
-            signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN
-        ):  # ignored signals stay ignored, as under nohup
+        # ignored signals stay ignored, as under nohup
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
             signal.signal(signal.SIGHUP, self._on_hang_up)
 
     @property
