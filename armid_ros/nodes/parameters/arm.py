@@ -38,7 +38,7 @@ ARM_PARAMETERS = (
         'effects',
         [''],
         'Effects, each as NAME[@joint+joint]:quantity=value,quantity=value; set on the running '
-        'node, the arm goes on with them from where it is.',
+        'node, the arm continues with them.',
         read_only=False,
     ),
     NodeParameter(
@@ -53,7 +53,9 @@ ARM_PARAMETERS = (
         choices=('computed_torque', 'gravity_pd'),
     ),
     *(
-        NodeParameter(name, [0.0], f'{what}, one or one a joint; 0: none.', unit, read_only=False)
+        NodeParameter(
+            name, [0.0], f'{what}, one or one per joint; 0: none.', unit, read_only=False
+        )
         for name, what, unit in (
             ('torque_noise', 'Standard deviation', 'N m or N'),
             ('position_noise', 'Standard deviation', 'rad or m'),

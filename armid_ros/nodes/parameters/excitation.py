@@ -153,7 +153,7 @@ PUBLISHER_PARAMETERS = (
     NodeParameter(
         'stopping',
         0.5,
-        'Time in which the arm is brought to rest; longer where its limits require it. Without '
+        'Time in which the arm is brought to rest; longer if its limits require it. Without '
         'zero_stamp the arm is not started where clocks differ by more than a tenth of it.',
         's',
         limits=(0.1, 10.0),

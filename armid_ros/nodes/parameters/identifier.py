@@ -56,7 +56,7 @@ IDENTIFIER_PARAMETERS = (
     NodeParameter(
         'torque_noise',
         [0.0],
-        'Standard deviation of a torque sample, one a joint; [0.0]: from the residuals.',
+        'Standard deviation of a torque sample, one per joint; [0.0]: from the residuals.',
         'N m or N',
     ),
     NodeParameter(
